@@ -1,0 +1,28 @@
+"""The two ways in which a calculation is refused."""
+
+
+class InputError(ValueError):
+    """Bad input: one line that names the place, the key, the value and what is allowed.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong and what is allowed, in one line.
+    where : str, optional
+        The file (and line) or the argument that holds it; put in front of the message.
+
+    Examples
+    --------
+    >>> str(InputError("motor.resistance = -1 ohm: must be positive", where="my.toml"))
+    'my.toml: motor.resistance = -1 ohm: must be positive'
+    """
+
+    def __init__(self, message: str, where: str | None = None) -> None:
+        line = f"{where}: {message}" if where else message
+        super().__init__(" ".join(line.split()))
+        self.message = message
+        self.where = where
+
+
+class NumericalError(ArithmeticError):
+    """A calculation that could not be finished to its stated accuracy; the message says what to try."""
