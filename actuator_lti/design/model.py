@@ -94,7 +94,7 @@ class Friction:
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
-    """The speed measurement: w itself, or a difference over m velocity periods of (quantised) angle, filtered."""
+    """The speed measurement: w itself, or a difference over m velocity periods of angle, filtered."""
 
     counts_per_rev: int | None = None
     speed: SpeedSource = "ideal"
@@ -167,7 +167,7 @@ class Validation:
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """A limit on a figure of the report; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
+    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
 
     id: str
     quantity: str
@@ -193,7 +193,7 @@ class Tolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One value of the design file with its pedigree; ``path`` is its dotted key, ``text`` as it was written."""
+    """One value of the design file with its pedigree: dotted key, text as written, SI value."""
 
     path: str
     text: str
@@ -246,7 +246,7 @@ class Design:
 
     @property
     def inertia_kgm2(self) -> float:
-        """J, everything that turns, seen from the motor shaft (paper, equation 12, for any number of stages)."""
+        """J, all that turns, at the motor shaft (paper, equation 12, for any number of stages)."""
         total = self.motor.rotor_inertia_kgm2
         ratio = 1.0
         for gear in self.gears:
