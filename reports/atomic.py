@@ -1,0 +1,83 @@
+"""Files that are either whole or not there: written beside their place, then moved onto it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from actuator_lti.errors import InputError
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written.
+    """
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | Path, data: bytes) -> None:
+    """Write bytes; see `write_text`."""
+    write_together({path: data})
+
+
+def write_together(files: Mapping[str | Path, bytes]) -> None:
+    """Write several files: none is moved into place before all are on disk.
+
+    Parameters
+    ----------
+    files : mapping of path to bytes
+        Missing folders are made.
+
+    Raises
+    ------
+    InputError
+        If a folder cannot be made or written; nothing is left behind then.
+    """
+    staged: list[tuple[Path, Path]] = []
+    try:
+        for name, data in files.items():
+            path = Path(name)
+            staged.append((_stage(path, data), path))
+        while staged:
+            temporary, path = staged[0]
+            os.replace(temporary, path)
+            staged.pop(0)
+    except OSError as error:
+        raise InputError(
+            f"cannot write: {error.strerror or error}", where=str(error.filename or "")
+        ) from error
+    finally:
+        for temporary, _ in staged:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+
+def _stage(path: Path, data: bytes) -> Path:
+    """Put the data beside its place, flushed to disk, and give the temporary path."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o666 & ~_umask())
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+    return Path(name)
+
+
+def _umask() -> int:
+    """Give the mask that new files of this process get."""
+    mask = os.umask(0o022)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,66 @@
+"""All commands of `actuator-lti`; each lives in the module of its name and imports only typer at the top."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Annotated
+
+import typer
+
+# In the order in which the help lists them, by the panel that they stand in.
+PANELS: dict[str, tuple[str, ...]] = {
+    "Designs": ("designs", "init", "objects"),
+    "Linear loops": ("margins", "report"),
+    "Nonlinear checks": ("simulate", "validate"),
+    "Bench records": ("identify", "correlate"),
+    "Variants and history": ("compare", "montecarlo", "tune", "nightly"),
+}
+
+
+def build() -> typer.Typer:
+    """Assemble the application from its command modules."""
+    app = typer.Typer(
+        name="actuator-lti",
+        add_completion=False,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(about)
+    for panel, commands in PANELS.items():
+        for command in commands:
+            _register(app, command, panel)
+    return app
+
+
+def say_version(wanted: bool) -> None:
+    """Print the version and stop, where it was asked for."""
+    if wanted:
+        from reports.provenance import package_version
+
+        typer.echo(f"actuator-lti {package_version()}")
+        raise typer.Exit
+
+
+def about(
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=say_version, help="Print the version and stop."),
+    ] = False,
+) -> None:
+    """Linear loop analysis of electromechanical actuators, checked by an exact nonlinear simulator."""
+
+
+def _register(app: typer.Typer, command: str, panel: str) -> None:
+    """Add a command: the function of its name, or the typer application `app` where it has sub-commands."""
+    module_name = f"reports.cli.{command}"
+    if find_spec(module_name) is None:  # during construction only
+        return
+    module = import_module(module_name)
+    group = getattr(module, "app", None)
+    if isinstance(group, typer.Typer):
+        app.add_typer(group, name=command, rich_help_panel=panel)
+    else:
+        app.command(command, rich_help_panel=panel)(getattr(module, command))

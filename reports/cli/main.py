@@ -1,0 +1,20 @@
+"""Entry point of the command `actuator-lti`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and give the exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without the program's name; those of the process where left out.
+    """
+    from reports.cli.app import build
+    from reports.cli.errors import run
+
+    given = None if arguments is None else list(arguments)
+    return run(lambda: build()(args=given, prog_name="actuator-lti", standalone_mode=False))

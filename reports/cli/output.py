@@ -1,0 +1,31 @@
+"""What commands print: JSON for machines, tables for people, both on standard output."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+def print_json(data: Any) -> None:
+    """Print a JSON value (numpy numbers and arrays too; NaN and infinity become null), one line end after it."""
+    import json
+
+    from reports.document import plain
+
+    sys.stdout.write(json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2) + "\n")
+
+
+def console() -> Console:
+    """Give the console for people: colours on a terminal, plain text in a pipe."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() else 120
+    return Console(highlight=False, width=width)
+
+
+def print_line(text: str) -> None:
+    """Print one line of plain text."""
+    sys.stdout.write(text + "\n")

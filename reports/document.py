@@ -1,0 +1,287 @@
+"""The document that every report, page and PDF is made of: plain JSON, versioned, without NaN.
+
+A document holds sections, a section holds blocks; the builders below make blocks of each kind.
+Whoever draws a page reads only this, never the results themselves.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+
+SCHEMA = "actuator-lti/report"
+VERSION = 1
+STATUSES = ("pass", "fail", "warn", "info")
+BLOCK_KEYS: dict[str, tuple[str, ...]] = {
+    "table": ("caption", "columns", "rows"),
+    "figure": ("figure", "data", "caption", "alt"),
+    "text": ("text",),
+    "facts": ("items",),
+    "verdicts": ("items",),
+    "details": ("title", "blocks"),
+}
+
+Block = dict[str, Any]
+Section = dict[str, Any]
+
+
+def plain(value: Any) -> Any:
+    """Turn numpy values, tuples and mappings into what JSON knows; NaN and infinity become ``None``.
+
+    Raises
+    ------
+    TypeError
+        For anything else (a complex number, an object): say which part of it is meant.
+
+    Examples
+    --------
+    >>> plain({"a": (1, float("nan")), "b": np.float64(2.0)})
+    {'a': [1, None], 'b': 2.0}
+    """
+    if value is None or isinstance(value, bool | str | int):
+        return value
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return [plain(item) for item in value.tolist()]
+    if isinstance(value, Iterable):
+        return [plain(item) for item in value]
+    raise TypeError(f"a report cannot hold a {type(value).__name__}")
+
+
+def rounded(values: Any, digits: int = 5) -> list[float | None]:
+    """Give a curve as plain numbers of so many significant digits, which is all that a figure shows."""
+    array = np.asarray(values, dtype=float)
+    return [float(f"{item:.{digits}g}") if math.isfinite(item) else None for item in array.tolist()]
+
+
+def column(
+    key: str, label: str, unit: str = "", *, align: str | None = None, format: str = "text"
+) -> dict[str, Any]:
+    """Describe a table's column.
+
+    Parameters
+    ----------
+    format : str
+        ``"text"``, ``"sig:3"`` (significant digits), ``"fix:1"`` (decimals) or ``"yesno"``.
+    """
+    side = align or ("left" if format in ("text", "yesno") else "right")
+    return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
+
+
+def table(
+    caption: str, columns: Sequence[dict[str, Any]], rows: Iterable[Mapping[str, Any]], note: str = ""
+) -> Block:
+    """Make a table; a row is a mapping by column key, with ``_status`` where it has one."""
+    return {
+        "kind": "table",
+        "caption": caption,
+        "columns": list(columns),
+        "rows": [plain(row) for row in rows],
+        "note": note,
+    }
+
+
+def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str) -> Block:
+    """Make a figure, drawn by the module registered under ``name`` from these data alone."""
+    return {"kind": "figure", "figure": name, "data": plain(data), "caption": caption, "alt": alt}
+
+
+def text(content: str) -> Block:
+    """Make a paragraph."""
+    return {"kind": "text", "text": content}
+
+
+def fact(label: str, value: Any, unit: str = "") -> dict[str, Any]:
+    """Make one item of `facts`."""
+    return {"label": label, "value": plain(value), "unit": unit}
+
+
+def facts(items: Iterable[Mapping[str, Any]]) -> Block:
+    """Make a list of labelled values."""
+    return {"kind": "facts", "items": [plain(item) for item in items]}
+
+
+def verdict(
+    id: str,
+    label: str,
+    *,
+    value: float | None,
+    limit: float | None,
+    unit: str,
+    distance: float | None,
+    passed: bool | None,
+    source: str = "",
+    reason: str = "",
+    comparison: str = "",
+) -> dict[str, Any]:
+    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` None if not judged."""
+    return plain(
+        {
+            "id": id,
+            "label": label,
+            "value": value,
+            "limit": limit,
+            "comparison": comparison,
+            "unit": unit,
+            "distance": distance,
+            "passed": passed,
+            "source": source,
+            "reason": reason,
+        }
+    )
+
+
+def verdicts(items: Iterable[Mapping[str, Any]]) -> Block:
+    """Make a list of verdicts."""
+    return {"kind": "verdicts", "items": [plain(item) for item in items]}
+
+
+def details(title: str, blocks: Sequence[Block]) -> Block:
+    """Make a part that opens on demand."""
+    return {"kind": "details", "title": title, "blocks": list(blocks)}
+
+
+def section(
+    id: str, title: str, blocks: Sequence[Block], *, intro: str = "", status: str = "info"
+) -> Section:
+    """Make a section; ``id`` is its anchor."""
+    return {"id": id, "title": title, "intro": intro, "status": status, "blocks": list(blocks)}
+
+
+def document(
+    *,
+    title: str,
+    subtitle: str,
+    design: Mapping[str, Any],
+    provenance: Mapping[str, Any],
+    sections: Sequence[Section],
+    kind: str = "report",
+) -> dict[str, Any]:
+    """Put a document together; its verdict counts every verdict in its sections."""
+    made = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "kind": kind,
+        "title": title,
+        "subtitle": subtitle,
+        "design": plain(design),
+        "provenance": plain(provenance),
+        "verdict": summary(sections),
+        "sections": list(sections),
+    }
+    check(made)
+    return made
+
+
+def summary(sections: Sequence[Section]) -> dict[str, Any]:
+    """Count the verdicts: passed only if none failed; those not judged are counted apart."""
+    outcomes = [item["passed"] for part in sections for block in walk(part) for item in _verdict_items(block)]
+    failed = sum(outcome is False for outcome in outcomes)
+    return {
+        "passed": failed == 0,
+        "failed": failed,
+        "not_judged": sum(outcome is None for outcome in outcomes),
+        "total": len(outcomes),
+    }
+
+
+def walk(part: Mapping[str, Any]) -> Iterable[Block]:
+    """Give every block of a section or block, those inside details too."""
+    for block in part.get("blocks", ()):
+        yield block
+        yield from walk(block)
+
+
+def figures(made: Mapping[str, Any]) -> list[Block]:
+    """Give every figure block of a document, in order."""
+    return [block for part in made["sections"] for block in walk(part) if block["kind"] == "figure"]
+
+
+def dumps(made: Mapping[str, Any]) -> str:
+    """Write a document as JSON, one section a line; the same document gives the same text."""
+    head = {key: value for key, value in made.items() if key != "sections"}
+    lines = ",\n".join(_compact(part) for part in made["sections"])
+    return f'{_compact(head)[:-1]},"sections":[\n{lines}\n]}}\n'
+
+
+def loads(content: str, origin: str = "report.json") -> dict[str, Any]:
+    """Read a document.
+
+    Raises
+    ------
+    InputError
+        If it is no JSON, of another schema or version, or malformed.
+    """
+    try:
+        made = json.loads(content, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not a report in JSON: {error}", where=origin) from error
+    check(made, origin)
+    return dict(made)
+
+
+def load(path: str | Path) -> dict[str, Any]:
+    """Read a document from a file; see `loads`."""
+    return loads(Path(path).read_text(encoding="utf-8"), str(path))
+
+
+def check(made: Any, origin: str | None = None) -> None:
+    """Refuse a document that a page could not be made of.
+
+    Raises
+    ------
+    InputError
+        Naming what is wrong with it.
+    """
+    if not isinstance(made, dict) or made.get("schema") != SCHEMA:
+        raise InputError(f"schema must be {SCHEMA!r}", where=origin)
+    if made.get("version") != VERSION:
+        raise InputError(
+            f"version = {made.get('version')!r}: this program reads version {VERSION}", where=origin
+        )
+    seen: set[str] = set()
+    for part in made.get("sections", ()):
+        if part["id"] in seen:
+            raise InputError(f"section {part['id']!r} occurs twice", where=origin)
+        seen.add(part["id"])
+        _check_blocks(part, origin)
+
+
+def _check_blocks(part: Mapping[str, Any], origin: str | None) -> None:
+    """Refuse unknown kinds, missing keys and unknown states."""
+    if part["status"] not in STATUSES:
+        raise InputError(f"section {part['id']!r}: status must be one of {', '.join(STATUSES)}", where=origin)
+    for block in walk(part):
+        kind = block.get("kind")
+        if kind not in BLOCK_KEYS:
+            raise InputError(f"section {part['id']!r}: unknown kind of block {kind!r}", where=origin)
+        missing = [key for key in BLOCK_KEYS[kind] if key not in block]
+        if missing:
+            raise InputError(f"section {part['id']!r}: a {kind} lacks {', '.join(missing)}", where=origin)
+
+
+def _verdict_items(block: Block) -> Sequence[Mapping[str, Any]]:
+    """Give the verdicts of a block, if it holds any."""
+    return block["items"] if block["kind"] == "verdicts" else ()
+
+
+def _compact(value: Any) -> str:
+    """Write JSON without needless blanks, and never with NaN."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
+def _refuse_constant(name: str) -> None:
+    """Refuse NaN and Infinity, which are not JSON."""
+    raise ValueError(f"{name} is not allowed")

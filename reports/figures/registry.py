@@ -1,0 +1,58 @@
+"""Every figure by its name; the module that draws it is imported when it is first drawn.
+
+A figure module has ``SIZE`` (width and height in inches) and ``draw(data, fig) -> None``.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from actuator_lti.errors import InputError
+
+MODULES: dict[str, str] = {
+    "bode": "reports.figures.bode",
+    "closed_bode": "reports.figures.closed_bode",
+    "nyquist": "reports.figures.nyquist",
+    "sensitivity": "reports.figures.sensitivity",
+    "step": "reports.figures.step",
+    "forms": "reports.figures.forms",
+    "onset": "reports.figures.onset",
+    "delay_budget": "reports.figures.delay_budget",
+    "curves": "reports.figures.curves",
+}
+
+
+def register(name: str, module: str) -> None:
+    """Add a figure: the dotted name of the module that draws it."""
+    MODULES[name] = module
+
+
+def figure_module(name: str) -> ModuleType:
+    """Import the module that draws a figure.
+
+    Raises
+    ------
+    InputError
+        If no figure has that name.
+    """
+    if name not in MODULES:
+        raise InputError(f"no figure is called {name!r}: known are {', '.join(sorted(MODULES))}")
+    return import_module(MODULES[name])
+
+
+def draw_svg(name: str, data: dict[str, Any], *, prefix: str = "f", page: bool = True) -> str:
+    """Draw a figure as SVG.
+
+    Parameters
+    ----------
+    prefix : str
+        Put in front of the ids inside, so that several figures can stand in one page.
+    page : bool
+        For a page, colours are CSS variables with the light ones as fallback; otherwise plain colours.
+    """
+    from reports.figures.style import render
+
+    module = figure_module(name)
+    return render(module.draw, data, size=module.SIZE, prefix=prefix, page=page)

@@ -1,0 +1,194 @@
+"""The one style of all figures, and how a figure becomes an SVG that follows the page's colours.
+
+Colours are those of Okabe and Ito (colour-blind safe); every series also has its own dash, so that a
+figure can be read without colour.  Text stays text in the page's own font.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+INK = "#1f2933"
+MUTED = "#66727f"
+GRID = "#dde2e7"
+PAPER = "#fefefe"
+BLUE, ORANGE, GREEN, RED, PURPLE, SKY, BROWN = (
+    "#0072b2",
+    "#c46200",
+    "#00805f",
+    "#c0392b",
+    "#8e4585",
+    "#3a8fc4",
+    "#7a5c1e",
+)
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN)
+DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (6, 2)),
+    (0, (2, 1.5)),
+    (0, (7, 2, 1.5, 2)),
+    (0, (1, 1.2)),
+    (0, (9, 3)),
+    (0, (4, 1)),
+)
+
+# What a page may recolour: the light colour stands in the SVG as the fallback of its variable.
+VARIABLES = {
+    INK: "--ink",
+    MUTED: "--muted",
+    GRID: "--grid",
+    PAPER: "--paper",
+    BLUE: "--c1",
+    ORANGE: "--c2",
+    GREEN: "--c3",
+    RED: "--c5",
+    PURPLE: "--c4",
+    SKY: "--c6",
+    BROWN: "--c7",
+}
+
+STYLE: dict[str, Any] = {
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.facecolor": "none",
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.unicode_minus": True,
+    "axes.formatter.use_mathtext": False,
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.minor.visible": False,
+    "lines.linewidth": 1.7,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 2.6,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "timezone": "UTC",
+}
+
+
+def render(
+    draw: Callable[[dict[str, Any], Figure], None],
+    data: dict[str, Any],
+    *,
+    size: tuple[float, float],
+    prefix: str,
+    page: bool,
+) -> str:
+    """Draw with the one style and give the SVG element; the same data give the same bytes."""
+    with matplotlib.rc_context({**STYLE, "svg.hashsalt": prefix}):
+        fig = Figure(figsize=size, layout="constrained")
+        draw(data, fig)
+        buffer = io.StringIO()
+        fig.savefig(
+            buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None}
+        )
+    return _tidy(buffer.getvalue(), prefix, page)
+
+
+def log_frequency(ax: Axes, label: str = "frequency, Hz") -> None:
+    """Make the x axis logarithmic with plain numbers."""
+    ax.set_xscale("log")
+    ax.xaxis.set_major_locator(LogLocator(base=10.0, numticks=12))
+    ax.xaxis.set_minor_locator(LogLocator(base=10.0, subs=(2.0, 5.0), numticks=12))
+    ax.xaxis.set_major_formatter(FuncFormatter(plain_decade))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    if label:
+        ax.set_xlabel(label)
+
+
+def plain_decade(value: float, _position: int | None = None) -> str:
+    """Write a tick such as 0.1, 10, 1k.
+
+    Examples
+    --------
+    >>> plain_decade(0.01), plain_decade(100.0), plain_decade(2e4)
+    ('0.01', '100', '20k')
+    """
+    for scale, letter in ((1e6, "M"), (1e3, "k")):
+        if value >= scale:
+            return f"{value / scale:g}{letter}"
+    return f"{value:g}"
+
+
+def phase_ticks(ax: Axes, low: float, high: float) -> None:
+    """Put the ticks of a phase axis at multiples of 45 degrees (or of 90, 180, ... where the span is large)."""
+    step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
+    first = step * int(low // step)
+    ticks = [first + step * k for k in range(int((high - first) // step) + 2)]
+    ax.set_yticks([tick for tick in ticks if low <= tick <= high])
+
+
+def label_box() -> dict[str, Any]:
+    """Give the background that keeps a label readable over curves."""
+    return {"boxstyle": "round,pad=0.2", "facecolor": PAPER, "edgecolor": "none", "alpha": 0.85}
+
+
+def _tidy(svg: str, prefix: str, page: bool) -> str:
+    """Keep only the element; drop needless ids, make the others unique, let the page choose font and colours."""
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.DOTALL)
+    svg = re.sub(r"<!--.*?-->\s*", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'<g id="[A-Za-z0-9.]+_\d+(?:_\d+)?"', "<g", svg)
+    svg = re.sub(r'<defs>\s*<style type="text/css">.*?</style>\s*</defs>\s*', "", svg, flags=re.DOTALL)
+    svg = re.sub(r'\bid="([mpch][0-9a-f]{6,})"', rf'id="{prefix}-\1"', svg)
+    svg = re.sub(r"(#)([mpch][0-9a-f]{6,})\b", rf"\1{prefix}-\2", svg)
+    svg = re.sub(r' transform="rotate\(-0 [^"]*"', "", svg)
+    svg = re.sub(r"<[^>]+>", _shorten, svg)
+    svg = re.sub(r"\n\s*", "\n", svg)
+    if not page:
+        return svg
+    svg = re.sub(r" font-family: [^;\"]*;", "", svg)
+    svg = re.sub(r"font: ((?:\d+ |bold |italic )*)([\d.]+)px [^;\"]*", _font, svg)
+    svg = re.sub(r'<svg ([^>]*?)width="([\d.]+)pt" height="([\d.]+)pt"|<svg ', _fluid, svg, count=1)
+    for colour, name in VARIABLES.items():
+        svg = re.sub(rf'{colour}(?=[;"])', f"var({name},{colour})", svg)
+    return svg
+
+
+def _shorten(tag: re.Match[str]) -> str:
+    """Keep two decimals of each coordinate: a hundredth of a point is more than a screen shows."""
+    return re.sub(r"(?<=[\s\"(])(-?\d+\.\d\d)\d+(?=[\s\")])", r"\1", tag.group())
+
+
+def _font(match: re.Match[str]) -> str:
+    """Keep weight and size; the family comes from the page."""
+    words = match.group(1).split()
+    weight = next((word for word in words if word == "bold" or word.isdigit()), "")
+    return f"font-size:{match.group(2)}px" + (f";font-weight:{weight}" if weight else "")
+
+
+def _fluid(match: re.Match[str]) -> str:
+    """Let the page set the width; the view box keeps the proportions."""
+    return "<svg " + (match.group(1) or "")

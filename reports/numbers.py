@@ -1,0 +1,51 @@
+"""Numbers as a reader wants them: few digits, no exponent where none is needed, a true minus sign."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+MISSING = "–"
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def show(value: Any, format: str = "text") -> str:
+    """Write a table's value in the column's format (see `reports.document.column`).
+
+    Examples
+    --------
+    >>> show(2737.31, "sig:3"), show(0.0000612, "sig:3"), show(-3.04, "fix:1"), show(None)
+    ('2737', '6.12×10⁻⁵', '−3.0', '–')
+    """
+    if value is None:
+        return MISSING
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    kind, _, digits = format.partition(":")
+    if kind == "fix":
+        return fixed(value, int(digits))
+    return significant(value, int(digits) if kind == "sig" else 4)
+
+
+def fixed(value: float, decimals: int) -> str:
+    """Write a number with so many decimals."""
+    text = f"{value:.{decimals}f}"
+    return _minus(text.lstrip("-") if float(text) == 0 else text)
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Write a number with so many significant digits (more where its whole part has more, up to six)."""
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if -4 <= exponent < 6:
+        return _minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return _minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
+
+
+def _minus(text: str) -> str:
+    """Use the minus sign of typography."""
+    return text.replace("-", "−")

@@ -1,0 +1,80 @@
+"""Where a report comes from: versions, commit, hash of the design, time."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from actuator_lti.errors import InputError
+
+LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "pint", "jinja2")
+
+
+def package_version() -> str:
+    """Give the version of the installed distribution."""
+    try:
+        return version("actuator-lti")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def provenance(design_hash: str | None = None) -> dict[str, Any]:
+    """Collect what is needed to build the same report again.
+
+    The time is that of ``SOURCE_DATE_EPOCH`` where it is set (seconds since 1970, UTC), so that the same
+    input gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        If ``SOURCE_DATE_EPOCH`` is no number.
+    """
+    return {
+        "version": package_version(),
+        "commit": commit(),
+        "design_hash": design_hash,
+        "time": build_time(),
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "libraries": {name: version(name) for name in LIBRARIES},
+    }
+
+
+def build_time() -> str:
+    """Give the time of the build in UTC, ISO 8601, whole seconds."""
+    text = os.environ.get("SOURCE_DATE_EPOCH")
+    if text is None:
+        return datetime.now(UTC).isoformat(timespec="seconds")
+    try:
+        return datetime.fromtimestamp(int(text), UTC).isoformat(timespec="seconds")
+    except (ValueError, OverflowError, OSError) as error:
+        raise InputError(f"SOURCE_DATE_EPOCH = {text!r}: must be whole seconds since 1970") from error
+
+
+@cache
+def commit() -> str | None:
+    """Give the git commit of the source tree, with ``+changes`` where it differs; ``None`` outside of git."""
+    root = Path(__file__).resolve().parent.parent
+    if not (root / ".git").exists():
+        return None
+    head = _git(root, "rev-parse", "HEAD")
+    if head is None:
+        return None
+    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
+    return head + ("+changes" if changed else "")
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    """Run git quietly; ``None`` where it is missing or fails."""
+    command = ["git", "-C", str(root), *arguments]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
