@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
-from types import MappingProxyType
+from math import inf, pi
 from typing import Literal
+
+from actuator_lti.design.parameters import FrozenMap
 
 Axis = Literal["rotary", "linear"]
 FrictionLaw = Literal["coulomb", "tanh"]
@@ -94,7 +95,11 @@ class Friction:
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
-    """The speed measurement: w itself, or a difference over m velocity periods of angle, filtered."""
+    """The speed measurement: w itself, or a difference over m velocity periods of angle, filtered.
+
+    ``counts_per_rev`` is per motor revolution after quadrature (linear axis: per metre); ``None`` is an
+    encoder without quantisation.
+    """
 
     counts_per_rev: int | None = None
     speed: SpeedSource = "ideal"
@@ -182,13 +187,18 @@ class Requirement:
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution."""
+    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution.
+
+    ``lower`` and ``upper`` are values of the parameter itself, not deviations.  ``text`` is the width as
+    written, kept so that a relative one ("50 %") follows a changed nominal.
+    """
 
     kind: Literal["uniform", "normal", "truncated-normal"]
     half_width: float | None = None
     std: float | None = None
     lower: float = -inf
     upper: float = inf
+    text: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,6 +225,16 @@ class Correlation:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fact:
+    """Something known of the drive that no equation needs, as text with its pedigree."""
+
+    label: str
+    value: str
+    source: str = ""
+    grade: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Design:
     """A drive: plant, controller, limits, requirements, and where each value came from."""
 
@@ -230,7 +250,8 @@ class Design:
     encoder: Encoder = field(default_factory=Encoder)
     requirements: tuple[Requirement, ...] = ()
     correlations: tuple[Correlation, ...] = ()
-    parameters: Mapping[str, Parameter] = field(default_factory=lambda: MappingProxyType({}))
+    facts: tuple[Fact, ...] = ()
+    parameters: Mapping[str, Parameter] = field(default_factory=FrozenMap)
     axis: Axis = "rotary"
     revision: str = ""
     description: str = ""
@@ -243,6 +264,14 @@ class Design:
         for gear in self.gears:
             ratio *= gear.ratio
         return ratio
+
+    @property
+    def angle_quantum_rad(self) -> float | None:
+        """One encoder count at the motor, in rad (linear axis: counts per metre, so in m); None without."""
+        counts = self.encoder.counts_per_rev
+        if counts is None:
+            return None
+        return (1.0 if self.axis == "linear" else 2.0 * pi) / counts
 
     @property
     def inertia_kgm2(self) -> float:

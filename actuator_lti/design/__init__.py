@@ -1,0 +1,31 @@
+"""The design file: one TOML text per drive, read into frozen dataclasses in SI units."""
+
+from actuator_lti.design.access import parameter_value, paths_of, pedigrees, with_values
+from actuator_lti.design.checks import check_design, no_load_speed
+from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.loader import load_design, read_design_text
+from actuator_lti.design.model import Design
+from actuator_lti.design.quantities import QUANTITIES
+from actuator_lti.design.shipped import shipped_designs
+from actuator_lti.design.tolerances import tolerances
+from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
+
+__all__ = [
+    "FIELDS",
+    "QUANTITIES",
+    "Design",
+    "check_design",
+    "design_hash",
+    "design_tree",
+    "load_design",
+    "no_load_speed",
+    "parameter_value",
+    "paths_of",
+    "pedigrees",
+    "read_design_text",
+    "shipped_designs",
+    "tolerances",
+    "with_overrides",
+    "with_values",
+    "write_design",
+]

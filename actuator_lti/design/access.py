@@ -1,0 +1,197 @@
+"""Values of a design by dotted path, and designs with some values changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any
+
+from actuator_lti.design.checks import check_design
+from actuator_lti.design.fields import Field, Structure, field_of, fields_in
+from actuator_lti.design.model import Design, Parameter
+from actuator_lti.design.parameters import FrozenMap
+from actuator_lti.design.reading import shown
+from actuator_lti.design.tolerances import rescaled
+from actuator_lti.errors import InputError
+
+SECTIONS = (
+    "motor", "load", "friction", "encoder", "limits", "control", "control.current", "control.velocity",
+    "control.position", "validation",
+)  # fmt: skip
+
+
+def section_of(design: Design, section: str) -> Any:
+    """The part of a design that a section of the file becomes; None if the design has none."""
+    if section.startswith("gear."):
+        name = section.removeprefix("gear.")
+        return next((gear for gear in design.gears if gear.name == name), None)
+    if section.startswith("control"):
+        _, _, loop = section.partition(".")
+        return getattr(design.controller, loop) if loop else design.controller
+    return getattr(design, section)
+
+
+def paths_of(design: Design) -> tuple[str, ...]:
+    """Dotted paths of all numeric keys that this design has a value for."""
+    sections = [(name, name) for name in SECTIONS]
+    sections[1:1] = [(f"gear.{gear.name}", "gear.*") for gear in design.gears]
+    found: list[str] = []
+    for section, template in sections:
+        part = section_of(design, section)
+        found += [
+            f"{section}.{field.key}"
+            for field in fields_in(template)
+            if field.kind in ("quantity", "integer") and getattr(part, field.attribute, None) is not None
+        ]
+    return tuple(found)
+
+
+def located(design: Design, path: str) -> tuple[Field, Any]:
+    """The field of a numeric path and the part of the design that holds it.
+
+    Raises
+    ------
+    InputError
+        If there is no such key, or the design has no such stage.
+    """
+    field = field_of(path)
+    if field is None or field.kind not in ("quantity", "integer"):
+        near = get_close_matches(path, paths_of(design), 1, 0.5)
+        hint = f' (nearest known: "{near[0]}")' if near else ""
+        raise InputError(f"{shown(path)}: unknown parameter{hint}; allowed: a numeric key of the design file")
+    part = section_of(design, path.rpartition(".")[0])
+    if part is None:
+        raise InputError(f"{path}: the design {design.name} has no {path.rpartition('.')[0]}")
+    return field, part
+
+
+def parameter_value(design: Design, path: str) -> float:
+    """The SI value of a numeric key by its dotted path, such as ``"gear.worm.ratio"``.
+
+    Raises
+    ------
+    InputError
+        If the key is unknown, or this design has no value for it.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> parameter_value(load_design("ilr33-amber"), "motor.resistance")
+    0.055
+    """
+    field, part = located(design, path)
+    value = getattr(part, field.attribute)
+    if value is None:
+        raise InputError(f"{path}: the design {design.name} has no value for it")
+    return float(value)
+
+
+def with_values(design: Design, values: Mapping[str, float], *, check: bool = True) -> Design:
+    """A copy of a design with some numeric keys changed to SI values.
+
+    Parameters
+    ----------
+    design : Design
+    values : mapping of dotted path to SI value
+    check : bool
+        Whether the relations between keys are checked too (kE against kM, speed against supply);
+        each value alone is always held to its allowed range.
+
+    Returns
+    -------
+    Design
+        Its parameters carry the new values; a tolerance in percent follows them.
+
+    Raises
+    ------
+    InputError
+        As :func:`actuator_lti.design.load_design`.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
+    0.06
+    """
+    structure = Structure.of(design)
+    changes: dict[str, dict[str, Any]] = {}
+    parameters: dict[str, Parameter] = {}
+    for path, value in values.items():
+        field, _ = located(design, path)
+        number = _allowed(field, path, value, structure)
+        changes.setdefault(path.rpartition(".")[0], {})[field.attribute] = number
+        parameters[path] = _changed(design.parameters.get(path), field, path, number, structure)
+    changed = _replaced(design, changes, parameters)
+    if check:
+        check_design(changed, design.origin or design.name)
+    return changed
+
+
+def _allowed(field: Field, path: str, value: float, structure: Structure) -> float | int:
+    if isinstance(value, bool) or (not isinstance(value, int | float) and not hasattr(value, "__float__")):
+        raise InputError(f"{path} = {shown(value)}: allowed: a number")
+    number = float(value)
+    if not field.accepts(number) or (field.kind == "integer" and number != int(number)):
+        whole = "a whole number, " if field.kind == "integer" else ""
+        raise InputError(f"{path} = {number!r}: allowed: {whole}{field.allowed(field.unit(structure))}")
+    return int(number) if field.kind == "integer" else number
+
+
+def _changed(old: Parameter | None, field: Field, path: str, value: float, structure: Structure) -> Parameter:
+    unit = field.unit(structure)
+    text = repr(value) if unit == "1" else f"{value!r} {unit}"
+    if old is None:
+        return Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
+    if old.value == value:
+        return old
+    tolerance = None if old.tolerance is None else rescaled(old.tolerance, value)
+    return Parameter(
+        path=path,
+        text=text,
+        value=value,
+        unit=unit,
+        symbol=field.symbol,
+        source=f"changed from {old.text}",
+        grade=old.grade if old.source.startswith("changed") else "",
+        tolerance=tolerance,
+    )
+
+
+def _replaced(
+    design: Design, changes: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, Parameter]
+) -> Design:
+    top: dict[str, Any] = {}
+    loops: dict[str, Any] = {}
+    gears = {gear.name: gear for gear in design.gears}
+    for section, attributes in changes.items():
+        part = replace(section_of(design, section), **attributes)
+        if section.startswith("gear."):
+            gears[part.name] = part
+        elif section.startswith("control."):
+            loops[section.removeprefix("control.")] = part
+        elif section == "control":
+            top["controller"] = part
+        else:
+            top[section] = part
+    if loops:
+        top["controller"] = replace(top.get("controller", design.controller), **loops)
+    merged = FrozenMap({**design.parameters, **parameters})
+    return replace(design, gears=tuple(gears.values()), parameters=merged, **top)
+
+
+def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Parameter, ...]:
+    """A :class:`Parameter` for every numeric key of a design, also those that its file left to defaults."""
+    structure = Structure.of(design)
+    found = []
+    for path in paths_of(design) if paths is None else paths:
+        known = design.parameters.get(path)
+        if known is None:
+            field, _ = located(design, path)
+            value, unit = parameter_value(design, path), field.unit(structure)
+            text = f"{value:g}" if unit == "1" else f"{value:g} {unit}"
+            known = Parameter(
+                path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="default"
+            )
+        found.append(known)
+    return tuple(found)

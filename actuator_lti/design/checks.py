@@ -1,0 +1,175 @@
+"""Physics across keys: what cannot be is refused, what is only suspicious is warned of."""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+
+_ELECTRICAL = {
+    "resistance": "resistance_ohm",
+    "inductance": "inductance_H",
+    "torque_constant": "torque_constant_Nm_A",
+    "back_emf_constant": "back_emf_constant_Vs_rad",
+}
+
+
+def check_design(design: Design, where: str) -> None:
+    """Refuse a design whose values contradict each other.
+
+    Raises
+    ------
+    InputError
+        One line: key, value and what is allowed.
+    """
+    for check in (_motor, _cascade, _sampling, _limits, _requirements, _correlations):
+        check(design, where)
+
+
+def _refuse(where: str, key: str, value: object, allowed: str) -> InputError:
+    return InputError(f"{key} = {value}: {allowed}", where=where)
+
+
+def _motor(design: Design, where: str) -> None:
+    motor = design.motor
+    given = {key: getattr(motor, attribute) for key, attribute in _ELECTRICAL.items()}
+    if motor.source_gain_Nm_V is not None:
+        for key, value in given.items():
+            if value is not None:
+                raise _refuse(where, f"motor.{key}", value, "not allowed beside motor.source_gain")
+        return
+    for key, value in given.items():
+        if value is None:
+            raise InputError(
+                f"motor.{key}: missing; allowed: R, L, kM and kE together, or motor.source_gain alone",
+                where=where,
+            )
+    kM, kE = given["torque_constant"], given["back_emf_constant"]
+    if abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
+        raise _refuse(
+            where,
+            "motor.back_emf_constant",
+            f"{kE:g}",
+            f"allowed: within 10 % of motor.torque_constant = {kM:g} (in SI the two are one constant)",
+        )
+
+
+def _cascade(design: Design, where: str) -> None:
+    if design.controller.current is not None and not design.motor.has_electrical_dynamics:
+        raise _refuse(
+            where, "control.current", "a table", "not allowed with motor.source_gain, which has no current"
+        )
+    position, velocity = design.controller.position, design.controller.velocity
+    if position.feedforward and velocity is None:
+        raise _refuse(
+            where, "control.position.feedforward", position.feedforward, "allowed: 0 without a velocity loop"
+        )
+
+
+def _sampling(design: Design, where: str) -> None:
+    control = design.controller
+    n_v = control.velocity.every if control.velocity else 1
+    n_p = control.position.every
+    if n_p % n_v:
+        raise _refuse(
+            where, "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
+        )
+    if control.computing_delay_s > 100 * control.period_s:
+        raise _refuse(
+            where,
+            "control.computing_delay",
+            f"{control.computing_delay_s:g} s",
+            f"allowed: at most 100 ticks of {control.period_s:g} s",
+        )
+
+
+def no_load_speed(design: Design) -> float:
+    """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
+    kE = design.motor.back_emf_constant_Vs_rad
+    return inf if kE is None else design.limits.voltage_V / kE
+
+
+def _limits(design: Design, where: str) -> None:
+    limits = design.limits
+    top = no_load_speed(design)
+    if isfinite(limits.speed_rad_s) and limits.speed_rad_s > top:
+        unit = "m/s" if design.axis == "linear" else "rad/s"
+        raise _refuse(
+            where,
+            "limits.speed",
+            f"{limits.speed_rad_s:.4g} {unit}",
+            f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}",
+        )
+    if limits.continuous_current_A > limits.peak_current_A and isfinite(limits.continuous_current_A):
+        raise _refuse(
+            where,
+            "limits.continuous_current",
+            f"{limits.continuous_current_A:g} A",
+            f"allowed: at most limits.peak_current = {limits.peak_current_A:g} A",
+        )
+
+
+def _requirements(design: Design, where: str) -> None:
+    from actuator_lti.design.quantities import QUANTITIES
+
+    seen: set[str] = set()
+    present = {"position", "every"}
+    present |= {name for name in ("velocity", "current") if getattr(design.controller, name) is not None}
+    for item in design.requirements:
+        path = f"requirement.{item.id}"
+        if item.id in seen:
+            raise _refuse(where, "requirement.id", f'"{item.id}"', "allowed: each id once")
+        seen.add(item.id)
+        if item.minimum is None and item.maximum is None:
+            raise InputError(f"{path}: missing limit; allowed: minimum, maximum or both", where=where)
+        if item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
+            raise _refuse(
+                where, f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
+            )
+        if QUANTITIES[item.quantity].scope == "loop":
+            if item.loop not in present:
+                shown = "missing" if item.loop is None else f'"{item.loop}"'
+                raise _refuse(where, f"{path}.loop", shown, f"allowed: {', '.join(sorted(present))}")
+        elif item.loop is not None:
+            raise _refuse(
+                where, f"{path}.loop", f'"{item.loop}"', f"{item.quantity} is of the drive, no loop"
+            )
+
+
+def _correlations(design: Design, where: str) -> None:
+    index = {path: i for i, path in enumerate(_toleranced(design))}
+    seen: set[frozenset[str]] = set()
+    for item in design.correlations:
+        pair = frozenset((item.first, item.second))
+        for path in (item.first, item.second):
+            if path not in index:
+                allowed = ", ".join(index) or "none, no value has a tolerance"
+                raise _refuse(
+                    where, "correlation", f'"{path}"', f"allowed: keys with a tolerance ({allowed})"
+                )
+        if len(pair) == 1 or pair in seen:
+            raise _refuse(where, "correlation", f'"{item.first}", "{item.second}"', "allowed: each pair once")
+        if not abs(item.coefficient) <= 1.0:
+            raise _refuse(where, "correlation.coefficient", item.coefficient, "allowed: -1 to 1")
+        seen.add(pair)
+    if design.correlations:
+        _check_definite(design, index, where)
+
+
+def _toleranced(design: Design) -> list[str]:
+    return [path for path, item in design.parameters.items() if item.tolerance is not None]
+
+
+def _check_definite(design: Design, index: dict[str, int], where: str) -> None:
+    import numpy as np
+
+    matrix = np.eye(len(index))
+    for item in design.correlations:
+        i, j = index[item.first], index[item.second]
+        matrix[i, j] = matrix[j, i] = item.coefficient
+    if np.linalg.eigvalsh(matrix)[0] < -1e-12:
+        raise InputError(
+            "correlation: the coefficients contradict each other; allowed: a positive semidefinite matrix",
+            where=where,
+        )

@@ -1,0 +1,84 @@
+"""Read a design by name or path, or from a text."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from functools import lru_cache
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from actuator_lti.design.checks import check_design
+from actuator_lti.design.model import Design
+from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
+from actuator_lti.design.shipped import shipped_designs, shipped_path
+from actuator_lti.errors import InputError
+
+
+def load_design(name_or_path: str | PathLike[str]) -> Design:
+    """Read a shipped design by name, or a design file by path.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A shipped name (see :func:`shipped_designs`), else the path of a TOML file of at most 1 MiB.
+
+    Returns
+    -------
+    Design
+        In SI units, checked.
+
+    Raises
+    ------
+    InputError
+        One line: file, key, value and what is allowed.
+
+    Examples
+    --------
+    >>> load_design("ilr33-amber").total_ratio
+    2376.0
+    """
+    name = fspath(name_or_path)
+    if name in shipped_designs():
+        return _shipped(name)
+    path = Path(name)
+    if not path.suffix and "/" not in name and "\\" not in name and not _exists(path):
+        near = get_close_matches(name, shipped_designs(), 1, 0.4)
+        hint = f' (nearest known: "{near[0]}")' if near else ""
+        names = ", ".join(shipped_designs())
+        raise InputError(f"{shown(name)}: no such design{hint}; allowed: {names}, or a design file")
+    where = shown(name)[1:-1]
+    return read_design_text(decode(read_bytes(path), where), where)
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+@lru_cache(maxsize=16)
+def _shipped(name: str) -> Design:
+    return read_design_text(shipped_path(name).read_text(encoding="utf-8"), name)
+
+
+def read_design_text(text: str, origin: str = "design") -> Design:
+    """Read a design from TOML text; ``origin`` is named in errors and kept in the design.
+
+    Raises
+    ------
+    InputError
+        As :func:`load_design`.
+    """
+    return design_from_tree(parse_toml(text, origin), origin)
+
+
+def design_from_tree(tree: dict[str, Any], origin: str) -> Design:
+    """Build and check a design from a parsed TOML tree."""
+    from actuator_lti.design.build import Builder
+    from actuator_lti.design.refusals import validated
+
+    design = Builder(validated(tree, origin), origin).design(origin)
+    check_design(design, origin)
+    return design

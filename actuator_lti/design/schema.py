@@ -1,0 +1,126 @@
+"""The shape of a design file, made from the registry of fields: known keys, tables, types, choices."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Annotated, Any, Literal, Optional
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, StrictFloat, StrictInt, StrictStr, create_model
+from pydantic import Field as Slot
+
+from actuator_lti.design.fields import Field, fields_in
+
+MAX_GEARS = 20
+MAX_LIST = 200
+_STRICT = ConfigDict(extra="forbid", frozen=True)
+
+Written = StrictStr | StrictInt | StrictFloat
+
+
+class RawTolerance(BaseModel):
+    """A tolerance written as a table."""
+
+    model_config = _STRICT
+    kind: Literal["uniform", "normal", "truncated-normal"] = "uniform"
+    half_width: Written | None = None
+    std: Written | None = None
+    lower: Written | None = None
+    upper: Written | None = None
+
+
+class Raw(BaseModel):
+    """A value as written, with its pedigree."""
+
+    model_config = _STRICT
+    value: Written
+    source: StrictStr = ""
+    grade: StrictStr = ""
+    tolerance: Written | RawTolerance | None = None
+
+
+class RawRequirement(BaseModel):
+    """One ``[[requirement]]``."""
+
+    model_config = _STRICT
+    id: StrictStr
+    quantity: StrictStr
+    loop: StrictStr | None = None
+    minimum: Written | None = None
+    maximum: Written | None = None
+    load: Written | None = None
+    source: StrictStr = ""
+    note: StrictStr = ""
+
+
+class RawCorrelation(BaseModel):
+    """One ``[[correlation]]``."""
+
+    model_config = _STRICT
+    first: StrictStr
+    second: StrictStr
+    coefficient: StrictFloat | StrictInt
+
+
+class RawFact(BaseModel):
+    """One ``[[fact]]``."""
+
+    model_config = _STRICT
+    label: StrictStr
+    value: StrictStr
+    source: StrictStr = ""
+    grade: StrictStr = ""
+
+
+def _as_raw(value: Any) -> Any:
+    return {"value": value} if isinstance(value, str | int | float) and not isinstance(value, bool) else value
+
+
+RawEntry = Annotated[Raw, BeforeValidator(_as_raw)]
+
+
+def _slot(field: Field) -> tuple[Any, Any]:
+    kinds: dict[str, Any] = {
+        "quantity": RawEntry,
+        "integer": RawEntry,
+        "quantities": Annotated[list[Written], Slot(min_length=1, max_length=MAX_LIST)],
+        "text": StrictStr,
+        "choice": Literal[field.choices] if field.choices else StrictStr,
+    }
+    kind = kinds[field.kind]
+    return (kind, ...) if field.required else (Optional[kind], None)  # noqa: UP045
+
+
+def _section(section: str, /, **more: Any) -> type[BaseModel]:
+    slots: dict[str, Any] = {field.key: _slot(field) for field in fields_in(section)}
+    return create_model(section, __config__=_STRICT, **slots, **more)
+
+
+@lru_cache(maxsize=1)
+def document_model() -> type[BaseModel]:
+    """The pydantic model of a whole design file."""
+    gear = _section("gear.*", name=(StrictStr, ...))
+    loops = {name: _section(f"control.{name}") for name in ("current", "velocity", "position")}
+    control = _section(
+        "control",
+        position=(loops["position"], ...),
+        velocity=(loops["velocity"] | None, None),
+        current=(loops["current"] | None, None),
+    )
+
+    def many(kind: Any, longest: int) -> Any:
+        return (Annotated[list[kind], Slot(max_length=longest)], Slot(default_factory=list))
+
+    optional = {name: (_section(name) | None, None) for name in ("load", "friction", "encoder", "validation")}
+    return create_model(
+        "DesignFile",
+        __config__=_STRICT,
+        design=(_section("design"), ...),
+        motor=(_section("motor"), ...),
+        limits=(_section("limits"), ...),
+        control=(control, ...),
+        gear=many(gear, MAX_GEARS),
+        requirement=many(RawRequirement, MAX_LIST),
+        correlation=many(RawCorrelation, MAX_LIST),
+        fact=many(RawFact, MAX_LIST),
+        **optional,  # type: ignore[call-overload]
+    )

@@ -1,0 +1,221 @@
+"""A design as a design file again, nothing lost but the comments; text overrides; the hash."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields as dataclass_fields
+from dataclasses import is_dataclass
+from math import inf, isfinite
+from typing import Any
+
+from actuator_lti.design.access import SECTIONS, section_of
+from actuator_lti.design.fields import Field, Structure, fields_in
+from actuator_lti.design.loader import design_from_tree
+from actuator_lti.design.model import Design, Parameter, Requirement, Tolerance
+from actuator_lti.design.quantities import write_limit
+from actuator_lti.errors import InputError
+
+
+def write_design(design: Design) -> str:
+    """The design as TOML that :func:`read_design_text` turns back into an equal design.
+
+    Values stay as they were written, with source, grade and tolerance; comments are not kept.
+    """
+    import tomli_w
+
+    return tomli_w.dumps(design_tree(design))
+
+
+def design_tree(design: Design) -> dict[str, Any]:
+    """The tree of plain values behind :func:`write_design`."""
+    structure = Structure.of(design)
+    head = {"name": design.name, "title": design.title, "axis": design.axis}
+    head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
+    tree: dict[str, Any] = {"design": head}
+    for name in SECTIONS:
+        part = section_of(design, name)
+        if name == "load":
+            tree["gear"] = [
+                {"name": gear.name, **_section(design, gear, f"gear.{gear.name}", "gear.*", structure)}
+                for gear in design.gears
+            ]
+        if part is not None:
+            _put(tree, name, _section(design, part, name, name, structure))
+    tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
+    tree["correlation"] = [_plain(item) for item in design.correlations]
+    tree["fact"] = [_plain(item) for item in design.facts]
+    return {key: value for key, value in tree.items() if value not in ({}, [])}
+
+
+def _put(tree: dict[str, Any], name: str, section: dict[str, Any]) -> None:
+    outer, _, inner = name.partition(".")
+    if inner:
+        tree[outer][inner] = section
+    else:
+        tree[outer] = section
+
+
+def _section(design: Design, part: Any, name: str, template: str, structure: Structure) -> dict[str, Any]:
+    defaults = {item.name: item.default for item in dataclass_fields(part)}
+    section: dict[str, Any] = {}
+    for field in fields_in(template):
+        value = getattr(part, field.attribute)
+        known = design.parameters.get(f"{name}.{field.key}")
+        if known is not None and known.value == value:
+            section[field.key] = _entry(known)
+        elif value is not None and value != inf and value != defaults[field.attribute]:
+            section[field.key] = _bare(field, value, field.unit(structure))
+    if name == "validation" and not any(path.startswith("validation.") for path in design.parameters):
+        fallback = 0.01 if design.axis == "linear" else 0.17453292519943295
+        if part.full_deflection_rad == fallback and len(section) == 1:
+            return {}
+    return section
+
+
+def _bare(field: Field, value: Any, unit: str) -> Any:
+    if isinstance(value, tuple):
+        return [_bare(field, item, unit) for item in value]
+    return value if isinstance(value, str) or unit == "1" else f"{value!r} {unit}"
+
+
+def _written(text: str) -> str | int | float:
+    """A number where the text is exactly the number's own spelling, else the text."""
+    for kind in (int, float):
+        try:
+            number = kind(text)
+        except ValueError:
+            continue
+        if repr(number) == text:
+            return number
+    return text
+
+
+def _entry(known: Parameter) -> Any:
+    value = _written(known.text)
+    more: dict[str, Any] = {key: getattr(known, key) for key in ("source", "grade") if getattr(known, key)}
+    if known.tolerance is not None:
+        more["tolerance"] = _tolerance(known.tolerance, known.unit)
+    return {"value": value, **more} if more else value
+
+
+def _tolerance(tolerance: Tolerance, unit: str) -> Any:
+    width = tolerance.half_width if tolerance.kind == "uniform" else tolerance.std
+    text = _written(tolerance.text) if tolerance.text else _si(width, unit)
+    if tolerance.kind == "uniform":
+        return text
+    bounds = {key: getattr(tolerance, key) for key in ("lower", "upper") if isfinite(getattr(tolerance, key))}
+    return {"kind": tolerance.kind, "std": text, **{key: _si(value, unit) for key, value in bounds.items()}}
+
+
+def _si(value: float | None, unit: str) -> Any:
+    return value if unit == "1" else f"{value!r} {unit}"
+
+
+def _requirement(item: Requirement, structure: Structure) -> dict[str, Any]:
+    tree: dict[str, Any] = {"id": item.id, "quantity": item.quantity}
+    tree |= {"loop": item.loop} if item.loop is not None else {}
+    for key in ("minimum", "maximum"):
+        value = getattr(item, key)
+        if value is not None:
+            tree[key] = write_limit(value, item.unit)
+    if item.load_Nm is not None:
+        tree["load"] = f"{item.load_Nm!r} {'N' if structure.axis == 'linear' else 'N*m'}"
+    return tree | {key: getattr(item, key) for key in ("source", "note") if getattr(item, key)}
+
+
+def _plain(item: Any) -> dict[str, Any]:
+    return {
+        part.name: getattr(item, part.name)
+        for part in dataclass_fields(item)
+        if getattr(item, part.name) != ""
+    }
+
+
+def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
+    """A copy of a design with keys changed as a design file would write them.
+
+    Parameters
+    ----------
+    design : Design
+    overrides : mapping
+        Dotted path to text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
+        "gear.worm.ratio": 40, "design.name": "variant"}``.  A number replaces the value and drops its
+        source; a table replaces the whole entry.
+
+    Raises
+    ------
+    InputError
+        As :func:`load_design`, also for an unknown key.
+    """
+    tree = design_tree(design)
+    for path, value in overrides.items():
+        _override(tree, path, value, design)
+    return design_from_tree(tree, design.origin or design.name)
+
+
+def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> None:
+    parts = path.split(".")
+    here: Any = tree
+    for depth, part in enumerate(parts[:-1]):
+        if depth == 0 and part in ("gear", "requirement"):
+            here = here.get(part, [])
+        elif isinstance(here, list):
+            label = "id" if parts[0] == "requirement" else "name"
+            here = next((item for item in here if item[label] == part), None)
+        elif isinstance(here, dict):
+            here = here.setdefault(part, {})
+        if here is None:
+            raise InputError(f"{path}: the design {design.name} has no {'.'.join(parts[: depth + 1])}")
+    if not isinstance(here, dict):
+        raise InputError(f"{path}: unknown key; allowed: a key of the design file")
+    old = here.get(parts[-1])
+    if isinstance(old, dict) and not isinstance(value, Mapping):
+        kept = {"tolerance": old["tolerance"]} if "tolerance" in old else {}
+        value = (
+            {"value": value, "source": f"changed from {old['value']}", **kept} if "value" in old else value
+        )
+    here[parts[-1]] = value
+
+
+def design_hash(design: Design) -> str:
+    """SHA-256 (hex) of what a design is: all values in SI to 12 digits, tolerances and requirements.
+
+    It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
+    """
+    content = {
+        key: _canonical(getattr(design, key))
+        for key in (
+            "axis",
+            "motor",
+            "gears",
+            "load",
+            "friction",
+            "encoder",
+            "limits",
+            "controller",
+            "validation",
+        )
+    }
+    content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
+    content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
+    content["tolerances"] = {
+        path: _canonical(item.tolerance)
+        for path, item in sorted(design.parameters.items())
+        if item.tolerance is not None
+    }
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _canonical(value: Any) -> Any:
+    if is_dataclass(value):
+        skipped = ("source", "note", "text", "name")
+        names = [item.name for item in dataclass_fields(value) if item.name not in skipped]
+        return {name: _canonical(getattr(value, name)) for name in names}
+    if isinstance(value, tuple):
+        return [_canonical(item) for item in value]
+    if isinstance(value, bool | str) or value is None:
+        return value
+    return format(float(value), ".12g")
