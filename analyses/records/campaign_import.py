@@ -1,0 +1,149 @@
+"""A campaign's records: each run read and joined; a bad run set aside and named, the others go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from analyses.records.campaign_file import Campaign, RunEntry
+from analyses.records.clocks import ClockJoin, Method, join_records
+from analyses.records.csv_stream import MAX_ROWS, read_csv_record
+from analyses.records.mat_reader import read_mat_record
+from analyses.records.record import Record, RowCounts
+from analyses.records.spec import RecordSpec
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedRun:
+    """One run, on one clock, with the account of its files.
+
+    ``load_is_zero`` is true for a disconnected clutch: the hinge moment is then exactly zero, and no torque
+    is needed.
+    """
+
+    id: str
+    record: Record
+    join: ClockJoin | None
+    load_is_zero: bool
+    speed_rad_s: float | None
+    load_Nm: float | None
+    sensor_counts: RowCounts | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetAside:
+    """A run that could not be used, and why."""
+
+    id: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedCampaign:
+    """All runs of a campaign; ``len(runs) + len(set_aside)`` is the number of runs listed."""
+
+    campaign: Campaign
+    runs: tuple[ImportedRun, ...]
+    set_aside: tuple[SetAside, ...]
+
+    @property
+    def rows_in(self) -> int:
+        """Data rows in the files of the runs that are used."""
+        return sum(c.rows_in for c in self._counts())
+
+    @property
+    def rows_out(self) -> int:
+        """Rows that were kept of them."""
+        return sum(c.rows_out for c in self._counts())
+
+    def _counts(self) -> list[RowCounts]:
+        drive = [run.record.counts for run in self.runs]
+        return drive + [run.sensor_counts for run in self.runs if run.sensor_counts is not None]
+
+
+def import_campaign(
+    campaign: Campaign, *, max_rows: int = MAX_ROWS, progress: Callable[[int, int], None] | None = None
+) -> ImportedCampaign:
+    """Read every run that the campaign lists.
+
+    A run whose file is missing, broken, or cannot be joined is set aside with its reason.
+
+    Raises
+    ------
+    InputError
+        If no run at all can be used.
+    """
+    runs, aside = [], []
+    for k, entry in enumerate(campaign.runs):
+        try:
+            runs.append(import_run(campaign, entry, max_rows))
+        except InputError as error:
+            aside.append(SetAside(id=entry.id, reason=str(error)))
+        if progress is not None:
+            progress(k + 1, len(campaign.runs))
+    if not runs:
+        raise InputError(
+            f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}", where=campaign.origin
+        )
+    return ImportedCampaign(campaign=campaign, runs=tuple(runs), set_aside=tuple(aside))
+
+
+def import_run(campaign: Campaign, entry: RunEntry, max_rows: int = MAX_ROWS) -> ImportedRun:
+    """Read one run's files and put them on the drive's clock."""
+    drive = read_record(entry.drive, campaign.drive, max_rows)
+    sensor = None
+    if entry.sensor is not None:
+        if campaign.sensor is None:
+            raise InputError(
+                f"run {entry.id} has a sensor file, but there is no [sensor]", where=campaign.origin
+            )
+        sensor = read_record(entry.sensor, campaign.sensor, max_rows)
+    return assemble_run(campaign, entry, drive, sensor)
+
+
+def read_record(path: Path, spec: RecordSpec, max_rows: int = MAX_ROWS) -> Record:
+    """A record of either kind, by the file's ending."""
+    if path.suffix.lower() == ".mat":
+        return read_mat_record(path, spec)
+    return read_csv_record(path, spec, max_rows=max_rows)
+
+
+def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Record | None) -> ImportedRun:
+    """One run of records that are read already: joined, or with its load known to be zero."""
+    zero = entry.load_Nm == 0.0
+    join = None
+    if zero:
+        note = "clutch disconnected: the hinge moment is zero, the torque record is not needed"
+        record = replace(drive, notes=(*drive.notes, note))
+    elif "torque" in drive.signals:
+        record = drive
+    elif sensor is None:
+        raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
+    else:
+        record, join = join_records(
+            drive,
+            sensor,
+            first_signal=campaign.join_drive_signal,
+            second_signal=campaign.join_sensor_signal,
+            method=_method(campaign.join_method),
+            offset_s=entry.offset_s,
+        )
+    if not np.any(record["speed"]):
+        raise InputError("the speed is zero throughout", where=drive.name)
+    return ImportedRun(
+        id=entry.id,
+        record=record,
+        join=join,
+        load_is_zero=zero,
+        speed_rad_s=entry.speed_rad_s,
+        load_Nm=entry.load_Nm,
+        sensor_counts=None if sensor is None else sensor.counts,
+    )
+
+
+def _method(name: str) -> Method:
+    return "event" if name == "event" else "given" if name == "given" else "correlation"

@@ -1,0 +1,158 @@
+"""Two recorders with clocks of their own, put on one: by a shared event, or by correlation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from analyses.records.correlate_clocks import Fit, fit_by_correlation
+from analyses.records.events import motion_events
+from analyses.records.record import FloatArray, Record
+
+Method = Literal["event", "correlation", "given"]
+
+RATE_SPREAD = 0.01
+"""Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockJoin:
+    """How the second recorder's time was put on the first one's: ``t_first = offset_s + rate * t_second``.
+
+    ``rate`` is 1 and ``rate_std`` None where the records do not tell it (a single event).
+    ``offset_std_s`` is that of the offset at the middle of the second record.
+    ``quality`` is the correlation coefficient of the two signals after the joining.
+    """
+
+    method: str
+    first_signal: str
+    second_signal: str
+    offset_s: float
+    offset_std_s: float
+    rate: float
+    rate_std: float | None
+    quality: float
+
+    def __str__(self) -> str:
+        if self.method == "given":
+            return f"second clock by the given offset {self.offset_s:.6g} s"
+        if self.rate_std is None:
+            rate = "rate not estimable, taken as 1"
+        else:
+            rate = f"rate {(self.rate - 1.0) * 1e6:+.1f} ppm (std {self.rate_std * 1e6:.1f})"
+        return (
+            f"second clock by {self.method} of {self.first_signal} and {self.second_signal}: offset "
+            f"{self.offset_s:.6f} s (std {self.offset_std_s:.1g}), {rate}, correlation {self.quality:.4f}"
+        )
+
+
+def join_records(
+    first: Record,
+    second: Record,
+    *,
+    first_signal: str,
+    second_signal: str,
+    method: Method = "correlation",
+    offset_s: float | None = None,
+) -> tuple[Record, ClockJoin]:
+    """Put the signals of a second recorder on the time of the first.
+
+    Parameters
+    ----------
+    first, second : Record
+        The master (its times are kept) and the other one.
+    first_signal, second_signal : str
+        The signals that show the shared happening, such as the motor's speed and the clutch's torque. Only
+        their magnitude is used, and their scale does not matter.
+    method : {"correlation", "event", "given"}
+        ``event``: the moment when the magnitude first passes half of its plateau, and the last moment when it
+        falls below again, which gives the ratio of the clock rates too. ``correlation``: the offset at which
+        the magnitudes fit best (FFT), refined together with the rate by least squares. ``given``:
+        ``offset_s``.
+    offset_s : float, optional
+        For ``given``: the first clock's time at the second clock's zero.
+
+    Returns
+    -------
+    Record, ClockJoin
+        The first record with the second one's signals added (linear interpolation), cut to the time both
+        cover; and how it was done.
+
+    Raises
+    ------
+    InputError
+        No shared event is found, the correlation is below 0.5, or the records do not overlap.
+    """
+    if method == "given":
+        if offset_s is None:
+            raise InputError('join method "given": needs an offset', where=second.name)
+        fit = Fit(offset_s, 0.0, 1.0, None, 1.0)
+    elif method in ("event", "correlation"):
+        a, b = np.abs(first[first_signal]), np.abs(second[second_signal])
+        find = _by_event if method == "event" else fit_by_correlation
+        fit = find(first.time_s, a, second.time_s, b, f"{first.name} with {second.name}")
+    else:
+        raise InputError(f'join method "{method}": "event", "correlation" or "given"')
+    join = ClockJoin(
+        method=method,
+        first_signal=first_signal,
+        second_signal=second_signal,
+        offset_s=fit.offset_s,
+        offset_std_s=fit.offset_std_s,
+        rate=fit.rate,
+        rate_std=fit.rate_std,
+        quality=fit.quality,
+    )
+    return _joined(first, second, join), join
+
+
+def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
+    time = join.offset_s + join.rate * second.time_s
+    start, stop = np.searchsorted(first.time_s, [time[0], time[-1]], side="left")
+    stop = (
+        min(int(stop) + 1, len(first)) if stop < len(first) and first.time_s[stop] == time[-1] else int(stop)
+    )
+    if stop - int(start) < 2:
+        raise InputError(f"the two records do not overlap in time ({join})", where=second.name)
+    clash = set(first.signals) & set(second.signals)
+    if clash:
+        raise InputError(f'both records hold a signal "{min(clash)}"', where=second.name)
+    cut = first.slice(int(start), stop)
+    added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
+    return Record(
+        name=first.name,
+        time_s=cut.time_s,
+        signals=MappingProxyType({**cut.signals, **added}),
+        units=MappingProxyType({**first.units, **second.units}),
+        counts=first.counts,
+        averaged=first.averaged,
+        sha256=first.sha256,
+        constants=first.constants,
+        notes=(*first.notes, *second.notes, str(join)),
+    )
+
+
+def _by_event(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> Fit:
+    events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
+    if events_a is None or events_b is None:
+        raise InputError(
+            "no event: neither signal may be flat, and each must start below half of its plateau", where=where
+        )
+    step = np.hypot(np.median(np.diff(t_a)), np.median(np.diff(t_b))) / np.sqrt(12.0)
+    rate, rate_std, std = 1.0, None, float(step)
+    if events_a.stop_s is not None and events_b.stop_s is not None:
+        span = events_b.stop_s - events_b.start_s
+        estimate = (events_a.stop_s - events_a.start_s) / span
+        if abs(estimate - 1.0) > RATE_SPREAD:
+            raise InputError(
+                f"the events last {estimate:.4f} times as long in one record as in the other", where=where
+            )
+        if step / span < RATE_SPREAD / 10.0:
+            rate, rate_std = estimate, float(np.sqrt(2.0) * step / span)
+    offset = events_a.start_s - rate * events_b.start_s
+    moved = np.interp(t_a, offset + rate * t_b, b)
+    return Fit(offset, std, rate, rate_std, float(np.corrcoef(a, moved)[0, 1]))

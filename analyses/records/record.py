@@ -1,0 +1,94 @@
+"""A record: signals in SI over time, with an account of every row of the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowCounts:
+    """Rows in and out; ``rows_in == rows_out + sum(dropped.values())`` always holds.
+
+    ``first_dropped`` names for each reason the first place where it happened.
+    """
+
+    lines: int = 0
+    comments: int = 0
+    blanks: int = 0
+    header: int = 0
+    rows_in: int = 0
+    rows_out: int = 0
+    dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    first_dropped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __str__(self) -> str:
+        text = f"{self.rows_in} rows in, {self.rows_out} out"
+        if self.dropped:
+            parts = (
+                f"{count} {reason} (first: {self.first_dropped[reason]})"
+                for reason, count in self.dropped.items()
+            )
+            text += "; dropped: " + ", ".join(parts)
+        return text
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Signals of one run, one row a sample.
+
+    ``time_s`` increases strictly and may be irregular; ``signals`` hold arrays of the same length in SI,
+    ``units`` their SI units. ``averaged`` tells how many rows of the file were averaged into one where the
+    file was too long to be held (1: none).
+    """
+
+    name: str
+    time_s: FloatArray
+    signals: Mapping[str, FloatArray]
+    units: Mapping[str, str]
+    counts: RowCounts
+    averaged: int = 1
+    sha256: str = ""
+    constants: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """The named signal; an unknown name is an InputError that lists those there are."""
+        if name not in self.signals:
+            raise InputError(f'no signal "{name}"; there are: {", ".join(self.signals)}', where=self.name)
+        return self.signals[name]
+
+    @property
+    def period_s(self) -> float:
+        """The median sampling period."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether every period is within 1 % of the median."""
+        steps = np.diff(self.time_s)
+        return bool(np.all(np.abs(steps - np.median(steps)) <= 0.01 * np.median(steps)))
+
+    def slice(self, start: int, stop: int) -> Record:
+        """Rows ``start:stop``."""
+        cut = {name: values[start:stop] for name, values in self.signals.items()}
+        return replace(self, time_s=self.time_s[start:stop], signals=MappingProxyType(cut))
+
+    def resampled(self, period_s: float | None = None) -> Record:
+        """The record on a regular grid by linear interpolation, with the fact noted."""
+        period = self.period_s if period_s is None else period_s
+        grid = np.arange(self.time_s[0], self.time_s[-1] + 0.5 * period, period)
+        cut = {name: np.interp(grid, self.time_s, values) for name, values in self.signals.items()}
+        note = f"resampled to a period of {period:.6g} s by linear interpolation"
+        return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))

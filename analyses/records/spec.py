@@ -1,0 +1,152 @@
+"""How a recorder writes its files: separators, columns, units, and what to do with a bad row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from actuator_lti.errors import InputError
+
+Policy = Literal["error", "drop"]
+
+MISSING_TEXTS = ("", "nan", "NaN", "NAN", "na", "NA", "N/A", "null", "NULL", "-")
+KNOWN_UNITS = {
+    "time": "s",
+    "current": "A",
+    "voltage": "V",
+    "speed": "rad/s",
+    "angle": "rad",
+    "torque": "N*m",
+    "output_angle": "rad",
+    "reference": "rad",
+    "position": "m",
+    "velocity": "m/s",
+    "position_reference": "m",
+    "force": "N",
+}
+"""SI units of the signals that the analyses know by name; any other name is kept in its own SI unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CsvFormat:
+    """The text layout of a file.
+
+    Parameters
+    ----------
+    separator : str
+        One character, or ``"whitespace"`` for any run of blanks and tabs.
+    decimal : str
+        ``"."`` or ``","``.
+    comment : str
+        Lines that begin with it are counted and passed over; empty for none.
+    row_end : str
+        Text that closes each row before the line end, such as ``";"``; empty for none.
+    header : bool or None
+        Whether the first line that is no comment holds the column names; None: it does
+        when no ``names`` are given.
+    names : tuple of str
+        The column names of a file without a header.
+    skip_lines : int
+        Lines to pass over at the start.
+    encoding : str
+        Of the header only; the numbers are plain ASCII.
+    """
+
+    separator: str = ","
+    decimal: str = "."
+    comment: str = "#"
+    row_end: str = ""
+    header: bool | None = None
+    names: tuple[str, ...] = ()
+    skip_lines: int = 0
+    encoding: str = "utf-8"
+
+    def __post_init__(self) -> None:
+        if self.separator != "whitespace" and (len(self.separator) != 1 or self.separator in "\r\n\"'"):
+            raise InputError(f'separator = "{self.separator}": one character, or "whitespace"')
+        if self.decimal not in (".", ","):
+            raise InputError(f'decimal = "{self.decimal}": "." or ","')
+        if self.separator == self.decimal:
+            raise InputError(f'separator and decimal are both "{self.decimal}": they must differ')
+        try:
+            ascii_like = "a,1\n".encode(self.encoding) == b"a,1\n"
+        except LookupError:
+            ascii_like = False
+        if not ascii_like:
+            raise InputError(f'encoding = "{self.encoding}": must be one that extends ASCII, such as utf-8')
+        if self.skip_lines < 0:
+            raise InputError(f"skip_lines = {self.skip_lines}: 0 or more")
+        if self.header is False and not self.names:
+            raise InputError("header = false: then names are needed")
+
+    @property
+    def has_header(self) -> bool:
+        """Whether a line of column names is expected."""
+        return not self.names if self.header is None else self.header
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeColumn:
+    """Where the time comes from.
+
+    Either a column in a unit of time, or a column of ticks with the period of one tick, which may
+    wrap around at ``wrap`` ticks; or, with ``column`` None, a constant period.
+    Rows whose raw value is below ``minimum`` are dropped, and counted.
+    """
+
+    column: str | int | None = None
+    unit: str = "s"
+    tick_s: float | None = None
+    wrap: float | None = None
+    minimum: float | None = None
+    period_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if (self.column is None) == (self.period_s is None):
+            raise InputError("time: give either a column or a period")
+        for name, value in (("tick", self.tick_s), ("period", self.period_s), ("wrap", self.wrap)):
+            if value is not None and not 0.0 < value < 1e30:
+                raise InputError(f"time.{name} = {value}: must be positive")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalColumn:
+    """One signal: its name in the analyses, its column (name, or number from 1), its unit.
+
+    The value in SI is ``(raw + offset) * scale`` converted from ``unit``.
+    """
+
+    name: str
+    column: str | int
+    unit: str = "1"
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordSpec:
+    """Everything needed to read the files of one recorder.
+
+    ``bad_rows``: what to do with a row that is no row of numbers (default: refuse the file, with line,
+    column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row).
+    ``disorder``: what to do when the time does not increase (default: refuse). Dropped rows are counted
+    by reason.
+    """
+
+    time: TimeColumn
+    signals: tuple[SignalColumn, ...]
+    format: CsvFormat = CsvFormat()
+    bad_rows: Policy = "error"
+    missing: Policy = "drop"
+    disorder: Policy = "error"
+
+    def __post_init__(self) -> None:
+        if not self.signals:
+            raise InputError("signals: at least one is needed")
+        names = [signal.name for signal in self.signals]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"signals.{twice[0]}: given twice")
+        for policy in ("bad_rows", "missing", "disorder"):
+            if getattr(self, policy) not in ("error", "drop"):
+                raise InputError(f'{policy} = "{getattr(self, policy)}": "error" or "drop"')

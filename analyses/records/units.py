@@ -1,0 +1,49 @@
+"""From a recorder's unit to SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from actuator_lti.design.units import compatible, parse_unit
+from actuator_lti.errors import InputError
+from analyses.records.record import FloatArray
+from analyses.records.spec import KNOWN_UNITS, SignalColumn
+
+
+@dataclass(frozen=True)
+class Converter:
+    """``(raw + offset) * factor``, and the SI unit of the result."""
+
+    offset: float
+    factor: float
+    si_unit: str
+
+    def __call__(self, raw: FloatArray) -> FloatArray:
+        return (raw + self.offset) * self.factor
+
+
+def unit_factor(unit: str, known: str | None, what: str) -> float:
+    """Factor from ``unit`` to SI; refused where its dimension is not that of ``known``."""
+    try:
+        found = parse_unit(unit)
+        wanted = parse_unit(known) if known is not None else None
+    except ValueError as error:
+        raise InputError(f'{what}.unit = "{unit}": {error}') from None
+    if wanted is not None and not compatible(found, wanted):
+        raise InputError(f'{what}.unit = "{unit}": must be a unit like {known}')
+    return found.factor
+
+
+def converter(signal: SignalColumn) -> Converter:
+    """The conversion of one signal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rpm = converter(SignalColumn(name="speed", column="n", unit="rpm"))
+    >>> rpm(np.array([9000.0])).round(3).tolist(), rpm.si_unit
+    ([942.478], 'rad/s')
+    """
+    known = KNOWN_UNITS.get(signal.name)
+    factor = unit_factor(signal.unit, known, f"signals.{signal.name}")
+    return Converter(signal.offset, signal.scale * factor, known or f"SI of {signal.unit}")
