@@ -1,0 +1,69 @@
+"""Derivatives of a measured position, and decimation without phase: the usual recipe of IDIM-LS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Filtered position with its first two derivatives, all at the record's own period."""
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+def central_difference(values: FloatArray, period_s: float) -> FloatArray:
+    """First derivative: central inside, one-sided at the two ends."""
+    return np.asarray(np.gradient(values, period_s), dtype=np.float64)
+
+
+def filtered_motion(position: FloatArray, period_s: float, *, cutoff_hz: float, order: int) -> Motion:
+    """Butterworth forward and backward, then central differences twice.
+
+    The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a
+    filter of this order.
+
+    Raises
+    ------
+    InputError
+        If the cut-off is not between zero and half the sampling frequency, or the record is too short.
+    """
+    from scipy.signal import butter, filtfilt
+
+    if not 0.0 < cutoff_hz < 0.5 / period_s:
+        raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
+    padding = 3 * order
+    if len(position) <= max(padding, 3):
+        raise InputError(f"{len(position)} samples: more than {padding} are needed")
+    b, a = butter(order, 2.0 * cutoff_hz * period_s)
+    smooth = np.asarray(filtfilt(b, a, position, padlen=padding), dtype=np.float64)
+    velocity = central_difference(smooth, period_s)
+    return Motion(position=smooth, velocity=velocity, acceleration=central_difference(velocity, period_s))
+
+
+def decimated(columns: FloatArray, factor: int) -> FloatArray:
+    """Every ``factor``-th row after a low-pass without phase, so that the last row is kept.
+
+    Chebyshev type I of 8th order, 0.05 dB ripple, cut at 0.8 of the new Nyquist frequency, forward and
+    backward with 24 samples of padding. For n rows the result has ceil(n / factor).
+    """
+    from scipy.signal import cheby1, filtfilt
+
+    if factor == 1:
+        return columns
+    b, a = cheby1(8, 0.05, 0.8 / factor)
+    if len(columns) <= 24:
+        raise InputError(f"{len(columns)} samples are too few to decimate by {factor}")
+    smooth = np.asarray(filtfilt(b, a, columns, axis=0, padlen=24), dtype=np.float64)
+    kept = -(-len(columns) // factor)
+    first = len(columns) - factor * (kept - 1) - 1
+    return smooth[first::factor]
