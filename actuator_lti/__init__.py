@@ -1,1 +1,48 @@
-"""Under construction."""
+"""Servo drives as data, and their linear loops, margins and bandwidths.
+
+The public names are loaded on first use, so that ``import actuator_lti`` costs nothing.
+
+Examples
+--------
+>>> import actuator_lti
+>>> "assemble_loops" in dir(actuator_lti)
+True
+"""
+
+from importlib import import_module
+from typing import Any
+
+_PUBLIC = {
+    "InputError": "actuator_lti.errors",
+    "NumericalError": "actuator_lti.errors",
+    "Design": "actuator_lti.design.model",
+    "load_design": "actuator_lti.design",
+    "read_design_text": "actuator_lti.design",
+    "write_design": "actuator_lti.design",
+    "assemble_loops": "actuator_lti.loops",
+    "Loop": "actuator_lti.loops",
+    "Loops": "actuator_lti.loops",
+    "DelaySystem": "actuator_lti.delay_system",
+    "onset": "actuator_lti.limiters",
+    "delay_budget": "actuator_lti.delay_budget",
+    "stability_margins": "actuator_lti.margins",
+    "StabilityMargins": "actuator_lti.margins",
+    "closed_loop_bandwidth": "actuator_lti.bandwidth",
+    "step_figures": "actuator_lti.step",
+    "unwrapped_phase_deg": "actuator_lti.phase",
+}
+
+__all__ = sorted(_PUBLIC)
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name on first use (PEP 562)."""
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'actuator_lti' has no attribute {name!r}")
+    value = getattr(import_module(_PUBLIC[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_PUBLIC})

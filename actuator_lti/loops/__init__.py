@@ -1,0 +1,10 @@
+"""Linear loops of a design: nesting, break points, and what each limiter sees.
+
+Light to import; python-control is loaded when loops are assembled.
+"""
+
+from actuator_lti.loops.assemble import assemble_loops
+from actuator_lti.loops.periodic import ExactMargins, exact_margins
+from actuator_lti.loops.result import Form, Loop, Loops
+
+__all__ = ["ExactMargins", "Form", "Loop", "Loops", "assemble_loops", "exact_margins"]

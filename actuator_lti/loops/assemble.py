@@ -1,0 +1,112 @@
+"""From a design to all of its loops, in the form and at the operating point asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, get_args
+
+from actuator_lti.errors import InputError
+from actuator_lti.loops.cascade import Cascade, cascade
+from actuator_lti.loops.result import Form, Loop, Loops
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.plant import OperatingPoint, RotorState
+
+
+def assemble_loops(
+    design: Design,
+    form: Form = "sampled",
+    operating_point: OperatingPoint = "sliding",
+    load_Nm: float = 0.0,
+    speed_amplitude_rad_s: float | None = None,
+    direction: int = 1,
+    rotor: RotorState = "free",
+) -> Loops:
+    """All loops of a design as named python-control systems (model.md section 3).
+
+    Parameters
+    ----------
+    design : Design
+    form : {"sampled", "continuous", "ideal"}
+        ``sampled``: exact hold, exact computing delay, PI in z, slower loops held (state spaces with dt).
+        ``continuous``: PI in s and exact delays (`DelaySystem`, no Pade; see `actuator_lti.loops.flow` for
+        which loop carries which delay). ``ideal``: continuous without any delay, the paper's own model.
+    operating_point : {"sliding", "rest", "describing-function"}
+        Slope of the friction, see `actuator_lti.plant.friction_slope`.
+    load_Nm : float
+        Hinge moment at the output shaft in N m: more dry friction.
+    speed_amplitude_rad_s : float, optional
+        Amplitude (peak, motor side) for the describing function.
+    direction : {1, -1}
+        Direction of motion for asymmetric friction.
+    rotor : {"free", "locked"}
+        Locked: only the current loop, without back-EMF, so that its closed loop starts at 0 dB.
+
+    Returns
+    -------
+    Loops
+
+    Raises
+    ------
+    InputError
+        For an unknown form or operating point, or a design without the stage asked for.
+
+    Notes
+    -----
+    With the rotor free, back-EMF gives the current loop a finite gain at DC although its controller
+    integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them.
+    A hinge moment proportional to the angle acts through a back-drivable path as a stiffness.
+    """
+    if form not in get_args(Form):
+        raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
+    wired = cascade(design, operating_point, load_Nm, speed_amplitude_rad_s, direction, rotor)
+    if not wired.stages:
+        raise InputError("rotor = 'locked': the design has no current loop")
+    parts = (
+        _sampled(wired)
+        if form == "sampled"
+        else _continuous(wired, "all" if form == "continuous" else "none")
+    )
+    stages: dict[str, Loop] = parts.pop("stages")
+    return Loops(
+        design=design,
+        form=form,
+        operating_point=operating_point,
+        load_Nm=load_Nm,
+        speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction,
+        rotor=rotor,
+        current=stages.get("current"),
+        velocity=stages.get("velocity"),
+        position=stages.get("position"),
+        period_s=wired.tick_s if form == "sampled" else None,
+        **parts,
+    )
+
+
+def _sampled(wired: Cascade) -> dict[str, Any]:
+    from actuator_lti.loops import sampled
+    from actuator_lti.loops.limiter_responses import sampled_limiters
+
+    whole = "position" in wired.stages
+    return {
+        "stages": {stage: sampled.stage_loop(wired, stage) for stage in wired.stages},
+        "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
+        "limiters": sampled_limiters(wired) if whole else {},
+        "reference_to_output": sampled.reference_to_output(wired) if whole else None,
+        "tick_system": sampled.tick_system(wired) if whole else None,
+    }
+
+
+def _continuous(wired: Cascade, delays: str) -> dict[str, Any]:
+    from actuator_lti.loops import continuous
+    from actuator_lti.loops.limiter_responses import continuous_limiters
+
+    whole = "position" in wired.stages
+    return {
+        "stages": {stage: continuous.stage_loop(wired, stage, delays) for stage in wired.stages},
+        "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
+        "limiters": continuous_limiters(wired, delays) if whole else {},
+        "reference_to_output": continuous.reference_to_output(wired, delays) if whole else None,
+        "tick_system": None,
+    }

@@ -1,0 +1,63 @@
+"""Closed-loop responses from the command to what stands in front of each limiter, sampled and continuous."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from actuator_lti.limiters import LimiterPath, limiter_paths
+from actuator_lti.loops.blocks import compose
+from actuator_lti.loops.cascade import Cascade
+from actuator_lti.loops.continuous import delay_system
+from actuator_lti.loops.flow import FlowProgram
+from actuator_lti.loops.tick import TickProgram
+
+Response = Callable[[np.ndarray], np.ndarray]
+
+
+def sampled_limiters(wired: Cascade) -> dict[str, LimiterPath]:
+    """Exact: the quantity at every tick where it is updated, a row each.
+
+    A sinusoid passes every phase of the samples, so the peak of the samples is the magnitude of the row.
+    """
+    program = TickProgram(wired, "position")
+    ticks = [program.tick(k) for k in range(program.ticks)]
+    n, period = len(program.states), wired.period_s("position")
+    A, B = compose(ticks)
+
+    def evaluate(signal: str, kind: str) -> Response:
+        every = wired.interval[wired.producer(signal)]
+        rows = []
+        for j in range(0, program.ticks, every):
+            before = compose(ticks[:j]) if j else (np.eye(n), np.zeros_like(B))
+            row = ticks[j].signals[signal]
+            rows.append(np.concatenate([row[:n] @ before[0], [row[:n] @ before[1][:, 0] + row[n]]]))
+        table = np.array(rows)
+
+        def response(omega: np.ndarray) -> np.ndarray:
+            z = np.exp(1j * omega * period)
+            x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, [0]], (len(z), n, 1)))
+            values = table[:, :n] @ x[:, :, 0].T + table[:, [n]]
+            return values * (-np.expm1(-1j * omega * period) / period) if kind == "rate" else values
+
+        return response
+
+    return limiter_paths(wired, evaluate, np.pi / period)
+
+
+def continuous_limiters(wired: Cascade, delays: str) -> dict[str, LimiterPath]:
+    """With exact delays, or ideal; the feed-forward acts on j w times the command."""
+    flow = FlowProgram(wired, "position", None, delays).flow()
+
+    def evaluate(signal: str, kind: str) -> Response:
+        direct, rate = delay_system(flow, "ref", signal), delay_system(flow, "ref_rate", signal)
+
+        def response(omega: np.ndarray) -> np.ndarray:
+            s = 1j * omega
+            values = direct(s) + s * rate(s)
+            return np.atleast_2d(s * values if kind == "rate" else values)
+
+        return response
+
+    return limiter_paths(wired, evaluate, np.inf)

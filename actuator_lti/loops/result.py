@@ -1,0 +1,98 @@
+"""What `assemble_loops` returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+Form = Literal["sampled", "continuous", "ideal"]
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.limiters import LimiterPath
+    from actuator_lti.loops.simulation import TickSystem
+    from actuator_lti.plant import OperatingPoint, RotorState
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop seen at one place, as python-control systems.
+
+    With e the error there, y what comes back: ``y = L e``, ``e = r - y``.
+
+    Attributes
+    ----------
+    name : str
+        ``"current"``, ``"velocity"``, ``"position"``, or the break point with all other loops closed.
+    break_point : str
+        Where it is cut: ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``. Cutting a loop at its own error
+        gives the same L, as all is in series.
+    open_loop, closed_loop, sensitivity : python-control systems
+        L, T = L/(1 + L) and S = 1/(1 + L). ``control.StateSpace`` (sampled with dt, ideal without) or
+        `actuator_lti.delay_system.DelaySystem` (continuous). T and S do not contain the feed-forward.
+    period_s : float or None
+        Sampling period of this loop; ``None`` where not sampled.
+    unit_in, unit_out : str
+        Units of e and y (the same).
+    periodic : bool
+        True where faster ticks inside slower loops make the loop periodically time-varying: then S and T are
+        the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
+    """
+
+    name: str
+    break_point: str
+    open_loop: Any
+    closed_loop: Any
+    sensitivity: Any
+    period_s: float | None
+    unit_in: str
+    unit_out: str
+    periodic: bool = False
+
+
+@dataclass(frozen=True)
+class Loops:
+    """All loops of a design in one form at one operating point.
+
+    Attributes
+    ----------
+    current, velocity, position : Loop or None
+        Each broken at its own error, with the loops inside it closed and those outside it open; motor side;
+        ``None`` where the design has no such loop.
+    break_points : mapping of str to Loop
+        ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``, as far as they exist: the loop seen there, all other
+        loops closed. ``"output"`` is the angle fed back to the position controller (output shaft); a speed
+        estimated from the angle stays closed.
+    limiters : mapping of str to LimiterPath
+        ``"speed"``, ``"acceleration"``, ``"current"``, ``"voltage"``: from the command at the output shaft to
+        what each limiter sees.
+    reference_to_output : python-control system or None
+        Command at the output shaft to output angle, feed-forward included.
+    tick_system : TickSystem or None
+        The whole sampled closed loop, tick by tick (form ``"sampled"``).
+    period_s : float or None
+        Base period Ts; ``None`` where not sampled.
+    """
+
+    design: Design
+    form: Form
+    operating_point: OperatingPoint
+    load_Nm: float
+    speed_amplitude_rad_s: float | None
+    direction: int
+    rotor: RotorState
+    current: Loop | None
+    velocity: Loop | None
+    position: Loop | None
+    break_points: Mapping[str, Loop]
+    limiters: Mapping[str, LimiterPath]
+    reference_to_output: Any | None
+    tick_system: TickSystem | None
+    period_s: float | None
+
+    @property
+    def present(self) -> dict[str, Loop]:
+        """The loops that exist, innermost first, by name."""
+        named = {"current": self.current, "velocity": self.velocity, "position": self.position}
+        return {name: loop for name, loop in named.items() if loop is not None}

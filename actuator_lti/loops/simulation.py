@@ -1,0 +1,127 @@
+"""The whole sampled closed loop as exact matrices, tick by tick: the linear side of model.md section 4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.loops.tick import Tick, TickProgram
+
+if TYPE_CHECKING:
+    import control
+
+OUTPUTS = ("th", "w", "i", "u", "i_ref", "w_ref")
+
+
+@dataclass(frozen=True)
+class TickSystem:
+    """``x_{k+1} = A_j x_k + B_j [th_ref, T], y_k = C_j x_k + D_j [th_ref, T]``, j = k mod `ticks`.
+
+    th_ref is the command at the output shaft in rad at t_k, T a torque in N m at the motor shaft that
+    accelerates it, held over the tick (dry friction while w > 0: T = -Tc).  With the feed-forward the command
+    before t_0 counts as 0 unless `initial_state` says otherwise (``ref_prev``, motor side).
+
+    Attributes
+    ----------
+    program : TickProgram
+    outputs : tuple of str
+        Those of ``th, w, i, u, i_ref, w_ref`` that the drive has; motor side, at t_k.
+    """
+
+    program: TickProgram
+    outputs: tuple[str, ...]
+
+    @property
+    def ticks(self) -> int:
+        """n_p: ticks after which the matrices repeat."""
+        return self.program.ticks
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, see `actuator_lti.loops.tick`."""
+        return self.program.states
+
+    @cached_property
+    def _phases(self) -> list[Tick]:
+        return [self.program.tick(k) for k in range(self.ticks)]
+
+    def matrices(self, phase: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """A, B, C, D of tick ``phase`` (inputs: th_ref, T)."""
+        tick, n = self._phases[phase % self.ticks], len(self.states)
+        rows = np.array([tick.signals[name] for name in self.outputs])
+        return tick.A, tick.B[:, :2], rows[:, :n], rows[:, n : n + 2]
+
+    def initial_state(self, values: Mapping[str, float] | None = None) -> np.ndarray:
+        """State vector with some states set by name (the others 0)."""
+        x = np.zeros(len(self.states))
+        for name, value in (values or {}).items():
+            if name not in self.states:
+                raise InputError(f"state {name!r}: one of {', '.join(self.states)}")
+            x[self.states.index(name)] = value
+        return x
+
+    def respond(
+        self,
+        reference_rad: np.ndarray,
+        torque_Nm: np.ndarray | float = 0.0,
+        initial: np.ndarray | None = None,
+    ) -> dict[str, np.ndarray]:
+        """Run the recursion from t_0.
+
+        Parameters
+        ----------
+        reference_rad : ndarray, shape (K,)
+            Command at the output shaft at t_k (read only where the position loop updates).
+        torque_Nm : float or ndarray, shape (K,)
+            Torque at the motor shaft, accelerating.
+        initial : ndarray, optional
+            State at t_0, see `initial_state`.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (K,)
+            `outputs` at t_k.
+        """
+        reference = np.asarray(reference_rad, dtype=float)
+        v = np.column_stack([reference, np.broadcast_to(torque_Nm, reference.shape)])
+        phases = [self.matrices(j) for j in range(self.ticks)]
+        x = self.initial_state() if initial is None else np.array(initial, dtype=float)
+        y = np.empty((len(reference), len(self.outputs)))
+        for k in range(len(reference)):
+            A, B, C, D = phases[k % self.ticks]
+            y[k] = C @ x + D @ v[k]
+            x = A @ x + B @ v[k]
+        return {name: y[:, r] for r, name in enumerate(self.outputs)}
+
+    def lifted(self) -> control.StateSpace:
+        """The same over a whole position period n_p Ts, with th_ref and T held over it.
+
+        Outputs are those of every tick in the period, named ``th[0] .. th[n_p-1], w[0], ...``; for n_p = 1
+        plain ``th``, ``w``, ...  Good for `control.forced_response`.
+        """
+        import control
+
+        A, B = np.eye(len(self.states)), np.zeros((len(self.states), 2))
+        C, D, labels = [], [], []
+        for j in range(self.ticks):
+            A_j, B_j, C_j, D_j = self.matrices(j)
+            C.append(C_j @ A)
+            D.append(C_j @ B + D_j)
+            A, B = A_j @ A, A_j @ B + B_j
+            labels += [f"{name}[{j}]" if self.ticks > 1 else name for name in self.outputs]
+        period = self.ticks * self.program.cascade.tick_s
+        return control.ss(
+            A,
+            B,
+            np.vstack(C),
+            np.vstack(D),
+            period,
+            inputs=["th_ref", "torque"],
+            outputs=labels,
+            states=list(self.states),
+        )
