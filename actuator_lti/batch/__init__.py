@@ -4,15 +4,18 @@
 sampled loops; `drive_figures` the static figures that requirements may ask for.
 """
 
+from actuator_lti.batch.drive import DRIVE_QUANTITIES, drive_figures
 from actuator_lti.batch.figures import QUANTITIES, UNITS, Crossovers, LinearFigures, linear_figures
 from actuator_lti.batch.parameters import Population, variable_paths
 
 __all__ = [
+    "DRIVE_QUANTITIES",
     "QUANTITIES",
     "UNITS",
     "Crossovers",
     "LinearFigures",
     "Population",
+    "drive_figures",
     "linear_figures",
     "variable_paths",
 ]
