@@ -1,0 +1,168 @@
+"""Frequencies at which L meets a circle or the real axis, as eigenvalues (no grid, no polynomial).
+
+With L~(s) = L(-s) (sampled: L(1/z)) every circle about the real axis is the zero set on the border of
+stability of q(s) = a L L~ + b (L + L~) + e: (a, b, e) = (1, 0, -1) is \\|L\\| = 1, (1, 1, 1 - m^2) is
+\\|1 + L\\| = m; the real axis is L - L~ = 0. The zeros of q are the eigenvalues of a Hamiltonian matrix (Boyd,
+Balakrishnan, Kabamba 1989; Bruinsma, Steinbuch 1990), or of a pencil where q vanishes at infinity, and for a
+sampled loop of a symplectic pencil. All of these are brought to one plain eigenvalue problem by the real
+Moebius map sigma = 1/(s - s0), s = (z - 1)/(z + 1) for a sampled loop: s0 is chosen so that q(s0) is not zero,
+A may be singular (delays z^-q) and may have an eigenvalue at z = -1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dgeev
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.loop import Complex, Real, RationalLoop
+
+NEAR_AXIS = 0.1
+_DEGENERATE = 1e-9
+_MULTIPLIERS = np.array([1.0, 0.61, 1.57, 0.35, 2.9, 0.19, 5.3])
+
+
+def warped(x: Real, sampled: bool) -> Real:
+    """Frequency in the s-plane of the bilinear map: x itself, or tan(x/2) for a sampled loop."""
+    return np.tan(0.5 * x) if sampled else x
+
+
+def unwarped(w: Real, sampled: bool) -> Real:
+    """Inverse of `warped`."""
+    return 2.0 * np.arctan(w) if sampled else w
+
+
+@dataclass(frozen=True)
+class ShiftedLoop:
+    """L(s) = l_plus - c_plus (sigma - W_plus)^-1 b_plus and L(-s) = l_minus + c_minus (sigma + W_minus)^-1 b_minus."""
+
+    shift: float
+    l_plus: float
+    l_minus: float
+    W_plus: Real
+    W_minus: Real
+    b_plus: Real
+    b_minus: Real
+    c_plus: Real
+    c_minus: Real
+
+    def circle(self, a: float, b: float, e: float) -> Complex | None:
+        """All s with a L L~ + b (L + L~) + e = 0; ``None`` where the shift does not allow it."""
+        product, total = self.l_plus * self.l_minus, self.l_plus + self.l_minus
+        D = a * product + b * total + e
+        if abs(D) <= _DEGENERATE * (abs(a * product) + abs(b) * (abs(self.l_plus) + abs(self.l_minus)) + abs(e)):
+            return None
+        n = self.b_plus.size
+        H = np.zeros((2 * n, 2 * n))
+        B, C = np.empty(2 * n), np.empty(2 * n)
+        B[:n], B[n:] = self.b_plus, self.b_minus * (a * self.l_plus + b)
+        C[:n], C[n:] = self.c_plus * (-(a * self.l_minus + b)), self.c_minus
+        H[:n, :n], H[n:, n:] = self.W_plus, -self.W_minus
+        if a:
+            H[n:, :n] = (-a * self.b_minus)[:, None] * self.c_plus
+        return self._zeros(H, B, C, D)
+
+    def real_axis(self) -> Complex | None:
+        """All s with L(s) = L(-s), but for s = 0 and infinity."""
+        D = self.l_plus - self.l_minus
+        if abs(D) <= _DEGENERATE * (abs(self.l_plus) + abs(self.l_minus)):
+            return None
+        n = self.b_plus.size
+        H = np.zeros((2 * n, 2 * n))
+        H[:n, :n], H[n:, n:] = self.W_plus, -self.W_minus
+        B = np.concatenate((self.b_plus, self.b_minus))
+        C = np.concatenate((self.c_plus, self.c_minus))
+        return self._zeros(H, B, -C, D)
+
+    def _zeros(self, H: Real, B: Real, C: Real, D: float) -> Complex:
+        H -= (B / D)[:, None] * C
+        re, im, _, _, info = dgeev(H, compute_vl=0, compute_vr=0, overwrite_a=1)
+        if info:
+            raise NumericalError("the eigenvalues of the Hamiltonian matrix did not converge: rescale the loop")
+        sigma = re[im <= 0.0] + 1j * im[im <= 0.0]  # the upper half plane of s
+        return self.shift + 1.0 / sigma[sigma != 0.0]
+
+
+def shifted(loop: RationalLoop, shift: float) -> ShiftedLoop:
+    """Apply sigma = 1/(s - shift) to L(s) and L(-s)."""
+    A, b, c, d = loop.A, loop.b, loop.c, loop.d
+    eye = np.eye(loop.order)
+    if loop.sampled:
+        plus = np.linalg.inv((1.0 - shift) * A - (1.0 + shift) * eye)
+        minus = np.linalg.inv((1.0 + shift) * A - (1.0 - shift) * eye)
+        gain, scale_plus, scale_minus = np.sqrt(2.0), 1.0 - shift, 1.0 + shift
+        W_plus, W_minus = plus + A @ plus, minus + A @ minus
+    else:
+        W_plus = plus = np.linalg.inv(A - shift * eye)
+        W_minus = minus = np.linalg.inv(A + shift * eye)
+        gain = scale_plus = scale_minus = 1.0
+    plus_b, minus_b = plus @ b, minus @ b
+    return ShiftedLoop(
+        shift=shift,
+        l_plus=d - scale_plus * float(c @ plus_b),
+        l_minus=d - scale_minus * float(c @ minus_b),
+        W_plus=W_plus,
+        W_minus=W_minus,
+        b_plus=gain * plus_b,
+        b_minus=gain * minus_b,
+        c_plus=gain * (c @ plus),
+        c_minus=gain * (c @ minus),
+    )
+
+
+class Circles:
+    """Candidates for the crossings of one loop; changes the shift where the first one does not do.
+
+    Parameters
+    ----------
+    loop : RationalLoop
+        At least one state.
+    poles : array (n,), complex
+        Eigenvalues of A, to keep the shift away from them.
+    """
+
+    def __init__(self, loop: RationalLoop, poles: Complex) -> None:
+        self._loop = loop
+        self._shifts = _shifts(poles, loop.sampled)
+        self._tried: list[ShiftedLoop] = []
+
+    def _system(self, k: int) -> ShiftedLoop:
+        while len(self._tried) <= k:
+            self._tried.append(shifted(self._loop, float(self._shifts[len(self._tried)])))
+        return self._tried[k]
+
+    def circle(self, a: float, b: float, e: float) -> Complex | None:
+        """All s on the circle (see module); ``None`` if every frequency is on it."""
+        for k in range(len(self._shifts)):
+            zeros = self._system(k).circle(a, b, e)
+            if zeros is not None:
+                return zeros
+        return None
+
+    def real_axis(self) -> Complex | None:
+        """All s at which L is real, but for 0 and infinity; ``None`` if L is real at every frequency."""
+        for k in range(len(self._shifts)):
+            zeros = self._system(k).real_axis()
+            if zeros is not None:
+                return zeros
+        return None
+
+
+def on_axis(zeros: Complex) -> Complex:
+    """Those zeros near the border of stability, sorted by frequency; the caller verifies each."""
+    w = zeros.imag
+    near = zeros[(np.abs(zeros.real) <= NEAR_AXIS * w) & (w > 0.0) & (w < np.inf)]
+    return near[near.imag.argsort()]
+
+
+def _shifts(poles: Complex, sampled: bool) -> Real:
+    if sampled:
+        poles = (poles - 1.0) / np.where(poles == -1.0, 1e-300, poles + 1.0)
+    size = np.abs(poles)
+    usable = size[(size > 1e-12 * min(size.max(), 1e12)) & (size < 1e12)] if size.size else size
+    centre = float(np.exp(np.log(usable).mean())) if usable.size else 1.0
+    shifts = centre * _MULTIPLIERS
+    distance = np.abs(np.abs(poles.real)[:, None] + 1j * poles.imag[:, None] - shifts).min(axis=0) / shifts
+    return shifts[np.argsort(-np.minimum(distance, 0.25), kind="stable")]

@@ -1,0 +1,20 @@
+"""`stability_margins`: one entry for every kind of loop."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.loop import rational_loop
+from actuator_lti.margins.rational import rational_margins
+from actuator_lti.margins.results import StabilityMargins
+
+
+def stability_margins(
+    system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None
+) -> StabilityMargins:
+    """Find all margins of a loop L with negative unit feedback."""
+    if not (math.isfinite(delay_s) and delay_s >= 0.0):
+        raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
+    return rational_margins(rational_loop(system))

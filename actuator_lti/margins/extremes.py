@@ -1,0 +1,110 @@
+"""Smallest distance of the curve to -1, plain (modulus margin) or by the balanced disk, over the whole axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.circles import Circles, on_axis, unwarped
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
+
+_BELOW = 1e-8  # relative: how much lower a second place may be without being found
+_ROUNDS = 30
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A distance \\|G(L)\\| that is to be smallest, and the circle on which it has a given value."""
+
+    distance: Callable[[Complex], Real]
+    derivatives: Callable[[Complex], tuple[Complex, Complex, Complex]]
+    circle: Callable[[float], tuple[float, float, float]]
+
+
+def _modulus_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+    return 1.0 + L, np.ones_like(L), np.zeros_like(L)
+
+
+def _disk_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+    below = 1.0 - L
+    return 2.0 * (1.0 + L) / below, 4.0 / below**2, 8.0 / below**3
+
+
+def _disk_distance(L: Complex) -> Real:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(L == 1.0, np.inf, np.abs(2.0 * (1.0 + L) / (1.0 - L)))
+
+
+def _disk_circle(alpha: float) -> tuple[float, float, float]:
+    k = 0.25 * alpha * alpha
+    return 1.0 - k, 1.0 + k, 1.0 - k
+
+
+MODULUS = Criterion(lambda L: np.abs(1.0 + L), _modulus_derivatives, lambda m: (1.0, 1.0, 1.0 - m * m))
+DISK = Criterion(_disk_distance, _disk_derivatives, _disk_circle)
+
+
+def smallest(
+    loop: RationalLoop, circles: Circles, criterion: Criterion, x: Real, L: Complex, top: float
+) -> tuple[float, float]:
+    """Smallest value of a criterion over the axis and where: a local search that an eigenvalue problem confirms.
+
+    Parameters
+    ----------
+    x, L : arrays
+        Points to start from, ends of the axis (x = 0, infinity or pi) included where L is finite there.
+    top : float
+        End of the axis: infinity or pi.
+
+    Raises
+    ------
+    NumericalError
+        No agreement after 30 rounds.
+    """
+    value, best = _refined(loop, criterion, x, L, top)
+    for _ in range(_ROUNDS):
+        if value <= _BELOW:
+            return value, best
+        zeros = circles.circle(*criterion.circle(value * (1.0 - _BELOW)))
+        if zeros is None:
+            return value, best
+        w = on_axis(zeros).imag
+        if not w.size:
+            return value, best
+        w = np.concatenate((w, np.sqrt(w[1:] * w[:-1])))
+        at = unwarped(w, loop.sampled)
+        lower, place = _refined(loop, criterion, at, loop.response(at), top)
+        if lower >= value * (1.0 - _BELOW):
+            return value, best
+        value, best = lower, place
+    raise NumericalError("the smallest distance to -1 was not settled: rescale the states of the loop")
+
+
+def _refined(
+    loop: RationalLoop, criterion: Criterion, x: Real, L: Complex, top: float
+) -> tuple[float, float]:
+    """Newton on the slope of the squared distance from the best of the points given."""
+    distance = criterion.distance(L)
+    k = int(distance.argmin())
+    value, best = float(distance[k]), float(x[k])
+    if not 0.0 < best < top or not loop.order:
+        return value, best
+    at = np.array([best])
+    for _ in range(12):
+        L0, L1, L2 = loop.jet(at)
+        G, G_L, G_LL = criterion.derivatives(L0)
+        G1, G2 = G_L * L1, G_L * L2 + G_LL * L1 * L1
+        here = float(np.abs(G[0]))
+        if here <= value:
+            value, best = here, float(at[0])
+        slope = float((G.conj() * G1).real[0])
+        curvature = float((np.abs(G1) ** 2 + (G.conj() * G2).real)[0])
+        step = -slope / curvature if curvature > 0.0 else -np.sign(slope) * 0.2 * float(at[0])
+        step = float(np.clip(step, -0.5 * at[0], min(float(at[0]), 0.5 * (top - float(at[0])))))
+        at = at + step
+        if abs(step) <= 1e-10 * at[0]:
+            break
+    return value, best

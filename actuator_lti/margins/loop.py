@@ -1,0 +1,180 @@
+"""The rational loop in the form in which all margins are found: a balanced state space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgebal
+
+from actuator_lti.errors import InputError
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class RationalLoop:
+    """L = d + c (x I - A)^-1 b with x = s or z, real and balanced.
+
+    The argument of every response is ``x``: for a continuous loop the angular frequency in rad/s
+    (s = j x), for a sampled loop the angle in rad, 0 to pi (z = exp(j x)).
+
+    Attributes
+    ----------
+    A, b, c, d : arrays (n, n), (n,), (n,) and float
+        State space, scaled by a diagonal similarity so that rows and columns weigh the same.
+    period_s : float or None
+        Sampling period, ``None`` for a continuous loop.
+    numerator, denominator : array or None
+        Coefficients, where the loop was given by them: they are then evaluated directly.
+    """
+
+    A: Real
+    b: Real
+    c: Real
+    d: float
+    period_s: float | None
+    numerator: Real | None = None
+    denominator: Real | None = None
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return self.b.size
+
+    @property
+    def sampled(self) -> bool:
+        """Whether x is the angle of z."""
+        return self.period_s is not None
+
+    def point(self, x: Real) -> Complex:
+        """Point of the border of stability: j x, or exp(j x)."""
+        return np.exp(1j * x) if self.sampled else 1j * x
+
+    def at(self, points: Complex) -> Complex:
+        """L at any complex points s or z, shape kept (1-D)."""
+        if self.numerator is not None and self.denominator is not None:
+            return np.polyval(self.numerator, points) / np.polyval(self.denominator, points)
+        if self.order == 0:
+            return np.full(points.shape, self.d, dtype=complex)
+        return self.d + np.linalg.solve(self._resolvent(points), self.b[:, None])[..., 0] @ self.c
+
+    def response(self, x: Real) -> Complex:
+        """L on the border of stability."""
+        return self.at(self.point(x))
+
+    def response_and_slope(self, x: Real) -> tuple[Complex, Complex]:
+        """L and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), from c (x I - A)^-2 b."""
+        points = self.point(x)
+        turn = 1j * points if self.sampled else 1j
+        if self.numerator is not None and self.denominator is not None:
+            num, den = self.numerator, self.denominator
+            below = np.polyval(den, points)
+            L = np.polyval(num, points) / below
+            d_num = np.polyval(num[:-1] * np.arange(num.size - 1, 0, -1), points)
+            d_den = np.polyval(den[:-1] * np.arange(den.size - 1, 0, -1), points)
+            return L, turn * (d_num / below - L * (d_den / below))
+        if self.order == 0:
+            return np.full(points.shape, self.d, dtype=complex), np.zeros(points.shape, dtype=complex)
+        matrix = self._resolvent(points)
+        first = np.linalg.solve(matrix, self.b[:, None])
+        second = np.linalg.solve(matrix, first)
+        return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
+
+    def jet(self, x: Real) -> tuple[Complex, Complex, Complex]:
+        """L and its first two derivatives by x."""
+        points = self.point(x)
+        if self.order == 0:
+            zero = np.zeros(points.shape, dtype=complex)
+            return zero + self.d, zero, zero
+        matrix = self._resolvent(points)
+        first = np.linalg.solve(matrix, self.b[:, None])
+        second = np.linalg.solve(matrix, first)
+        third = np.linalg.solve(matrix, second)
+        d_point, dd_point = -(second[..., 0] @ self.c), 2.0 * (third[..., 0] @ self.c)
+        L = self.d + first[..., 0] @ self.c
+        if self.sampled:
+            return L, 1j * points * d_point, -points * (d_point + points * dd_point)
+        return L, 1j * d_point, -dd_point
+
+    def _resolvent(self, points: Complex) -> Complex:
+        n = self.order
+        matrix = np.empty((points.size, n, n), dtype=complex)
+        matrix[:] = -self.A
+        index = np.arange(n)
+        matrix[:, index, index] += points[:, None]
+        return matrix
+
+
+def rational_loop(system: Any) -> RationalLoop:
+    """Bring a SISO python-control state space or transfer function into the form of the engine.
+
+    Raises
+    ------
+    InputError
+        More than one input or output, an improper transfer function, or a value that is not finite.
+    """
+    if system.ninputs != 1 or system.noutputs != 1:
+        raise InputError(f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}")
+    period_s = _period(system.dt)
+    if hasattr(system, "num"):
+        num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
+        den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
+        return from_coefficients(num, den, period_s)
+    A = np.asarray(system.A, dtype=float)
+    b = np.asarray(system.B, dtype=float)[:, 0]
+    c = np.asarray(system.C, dtype=float)[0]
+    return from_matrices(A, b, c, float(system.D[0, 0]), period_s)
+
+
+def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -> RationalLoop:
+    """Balance a state space; shapes (n, n), (n,), (n,)."""
+    n = b.size
+    whole = np.empty((n + 1, n + 1))
+    whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = A, b, c, d
+    if not np.isfinite(whole).all():
+        raise InputError("the loop holds a value that is not finite")
+    if n:
+        whole = _balanced(whole)
+    return RationalLoop(whole[:n, :n], whole[:n, n], whole[n, :n], d, period_s)
+
+
+def from_coefficients(num: Real, den: Real, period_s: float | None) -> RationalLoop:
+    """Companion form of num/den (highest power first), which is exact, then balanced."""
+    if not den.size:
+        raise InputError("the denominator of the loop is zero")
+    if num.size > den.size:
+        raise InputError(
+            f"the loop is improper (numerator of degree {num.size - 1} over {den.size - 1}): "
+            "it needs at least as many poles as zeros"
+        )
+    n = den.size - 1
+    above = np.zeros(n + 1)
+    above[n + 1 - num.size :] = num / den[0]
+    below = den / den[0]
+    A = np.zeros((n, n))
+    if n:
+        A[0] = -below[1:]
+        A[np.arange(1, n), np.arange(n - 1)] = 1.0
+    b = np.zeros(n)
+    b[:1] = 1.0
+    d = float(above[0])
+    loop = from_matrices(A, b, above[1:] - d * below[1:], d, period_s)
+    return RationalLoop(loop.A, loop.b, loop.c, d, period_s, above, below)
+
+
+def _balanced(whole: Real) -> Real:
+    scaled, _, _, scale, _ = dgebal(whole, scale=1, permute=0)
+    n = scale.size - 1
+    scaled[n, n] = whole[n, n]
+    return scaled
+
+
+def _period(dt: Any) -> float | None:
+    if dt is None or (dt == 0 and dt is not True):
+        return None
+    return 1.0 if dt is True else float(dt)

@@ -1,0 +1,109 @@
+"""Unstable closed-loop poles from the Nyquist curve alone: no grid, no closed-loop poles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.crossings import Crossings
+from actuator_lti.margins.loop import RationalLoop
+from actuator_lti.margins.poles import BorderPole, SortedPoles
+
+_FAR = 1e3
+_SMALLEST = 1e-13
+
+
+def nyquist_count(
+    loop: RationalLoop, found: Crossings, poles: SortedPoles, visible_at_dc: int, L_dc: complex, L_end: complex
+) -> int:
+    """Number of unstable closed-loop poles: open-loop ones less the turns of 1 + L about the origin.
+
+    Between two neighbours among the crossings of the real axis and the poles on the border, 1 + L stays in
+    one half plane: the change of its angle follows from the two ends. A pole on the border is passed on the
+    unstable side, by a half turn of L for each of its multiplicity (a quarter at both ends of the axis).
+
+    Parameters
+    ----------
+    visible_at_dc : int
+        Multiplicity of the pole at s = 0 (z = 1) in L itself.
+    L_dc, L_end : complex
+        L at the ends of the axis, where it has no pole there.
+    """
+    end = np.pi if loop.sampled else np.inf
+    inner = [pole for pole in poles.border if 0.0 < pole.x < end]
+    stops: list[tuple[float, complex, BorderPole | None]] = [
+        (float(x), 1.0 + complex(L), None) for x, L in zip(found.between_x, found.between_L, strict=True)
+    ]
+    stops += [
+        (float(x), 1.0 + complex(L).real, None)
+        for x, L, touch in zip(found.real_x, found.real_L, found.real_touch, strict=True)
+        if not touch
+    ]
+    stops += [(pole.x, 0j, pole) for pole in inner]
+    stops.sort(key=lambda stop: stop[0])
+    angle, last = _start(loop, stops[0], visible_at_dc, L_dc)
+    for k, (x, F, pole) in enumerate(stops):
+        if pole is None:
+            angle += _turn(last, F)
+            last = F
+            continue
+        room = min(x - stops[k - 1][0], (stops[k + 1][0] if k + 1 < len(stops) else 2.0 * x) - x)
+        before, after = _beside(loop, x, room)
+        angle += _turn(last, before) + _arc(before, after, -np.pi * pole.multiplicity)
+        last = after
+    at_end = sum(pole.multiplicity for pole in poles.border if pole.x == end)
+    angle += _finish(loop, last, stops[-1][0], at_end, L_end)
+    return poles.unstable - round(angle / np.pi)
+
+
+def _turn(start: complex, stop: complex) -> float:
+    """Angle from one point to another of the same closed half plane, rad."""
+    return float(np.angle(stop * np.conj(start)))
+
+
+def _arc(start: complex, stop: complex, about: float) -> float:
+    """The angle from start to stop that is nearest to ``about``."""
+    turn = _turn(start, stop)
+    return turn + 2.0 * np.pi * round((about - turn) / (2.0 * np.pi))
+
+
+def _start(
+    loop: RationalLoop, first: tuple[float, complex, BorderPole | None], order: int, L_dc: complex
+) -> tuple[float, complex]:
+    if not order:
+        return 0.0, 1.0 + L_dc.real
+    r = 1e-2 * first[0]
+    while r > _SMALLEST * first[0]:
+        real_point = np.array([np.exp(r) if loop.sampled else r + 0j], dtype=complex)
+        on_real, on_axis = complex(loop.at(real_point)[0]), complex(loop.response(np.array([r]))[0])
+        if min(abs(on_real), abs(on_axis)) > _FAR:
+            return _arc(1.0 + on_real.real, 1.0 + on_axis, -0.5 * np.pi * order), 1.0 + on_axis
+        r *= 0.1
+    raise InputError("a pole at zero frequency is cancelled, all but completely: cancel it in the loop first")
+
+
+def _finish(loop: RationalLoop, last: complex, last_x: float, order: int, L_end: complex) -> float:
+    if not order:
+        return _turn(last, 1.0 + L_end.real)
+    r = 1e-2 * (np.pi - last_x)
+    while r > _SMALLEST:
+        on_real = complex(loop.at(np.array([-np.exp(r) + 0j]))[0])
+        on_circle = complex(loop.response(np.array([np.pi - r]))[0])
+        if min(abs(on_real), abs(on_circle)) > _FAR:
+            arc = _arc(1.0 + on_circle, 1.0 + on_real.real, -0.5 * np.pi * order)
+            return _turn(last, 1.0 + on_circle) + arc
+        r *= 0.1
+    raise InputError("a pole at z = -1 is cancelled, all but completely: cancel it in the loop first")
+
+
+def _beside(loop: RationalLoop, x: float, room: float) -> tuple[complex, complex]:
+    r = 1e-2 * room
+    while r > _SMALLEST * x:
+        before, after = 1.0 + loop.response(np.array([x - r, x + r]))
+        if min(abs(before), abs(after)) > _FAR:
+            return complex(before), complex(after)
+        r *= 0.1
+    raise InputError(
+        f"a pole on the border of stability ({x:.6g}) is cancelled by a zero: the loop says nothing "
+        "about it; cancel it in the loop first, or change the design"
+    )

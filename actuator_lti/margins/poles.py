@@ -1,0 +1,123 @@
+"""Poles sorted by the border of stability, each with the accuracy that its eigenvalue has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg.lapack import dgeev
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.loop import Complex, Mask, Real
+
+_EPS = float(np.finfo(float).eps)
+_SUSPICIOUS = 1e-5
+
+
+@dataclass(frozen=True)
+class BorderPole:
+    """A pole on the border of stability, with its multiplicity; x >= 0 as in `RationalLoop`."""
+
+    x: float
+    multiplicity: int
+
+
+@dataclass(frozen=True)
+class SortedPoles:
+    """Poles of a system by the border of stability.
+
+    Attributes
+    ----------
+    values : array (n,), complex
+        All of them.
+    unstable : int
+        How many lie strictly outside the stable region.
+    border : tuple of BorderPole
+        Those on the border as far as double precision can tell, x >= 0 (conjugates left out).
+    border_count : int
+        How many these are, conjugates counted.
+    """
+
+    values: Complex
+    unstable: int
+    border: tuple[BorderPole, ...]
+    border_count: int = 0
+
+
+def eigenvalues(A: Real) -> Complex:
+    """Eigenvalues of a real matrix."""
+    if not A.size:
+        return np.empty(0, dtype=complex)
+    re, im, _, _, info = dgeev(A, compute_vl=0, compute_vr=0)
+    if info:
+        raise NumericalError("the poles did not converge: rescale the states of the loop")
+    return re + 1j * im
+
+
+def sorted_poles(A: Real, sampled: bool) -> SortedPoles:
+    """Sort the eigenvalues of A (balanced) by the border of stability.
+
+    An eigenvalue is on the border where its distance is below its own error bound,
+    10 n eps norm(A) / |v* w| with the left and right eigenvectors v and w.
+    """
+    values = eigenvalues(A)
+    if not values.size:
+        return SortedPoles(values, 0, ())
+    distance = np.abs(values) - 1.0 if sampled else values.real
+    scale = max(float(np.abs(A).max()), _EPS) if not sampled else 1.0
+    suspicious = np.abs(distance) <= _SUSPICIOUS * scale
+    if not suspicious.any():
+        return SortedPoles(values, int(np.count_nonzero(distance > 0.0)), ())
+    exact = (values == 1.0) if sampled else (values == 0.0)
+    if (exact == suspicious).all():
+        on_border, radius = exact, np.zeros(values.size)
+    else:
+        values, radius = _with_error_bounds(A)
+        distance = np.abs(values) - 1.0 if sampled else values.real
+        on_border = np.abs(distance) <= radius
+    unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
+    return SortedPoles(
+        values, unstable, _clusters(values, radius, on_border, sampled), int(np.count_nonzero(on_border))
+    )
+
+
+def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
+    re, im, vl, vr, info = dgeev(A, compute_vl=1, compute_vr=1)
+    if info:
+        raise NumericalError("the poles did not converge: rescale the states of the loop")
+    n = re.size
+    overlap = np.empty(n)
+    for k in range(n):
+        if im[k] > 0.0:
+            left, right = vl[:, k] + 1j * vl[:, k + 1], vr[:, k] + 1j * vr[:, k + 1]
+            overlap[k] = overlap[k + 1] = abs(np.vdot(left, right))
+        elif im[k] == 0.0:
+            overlap[k] = abs(float(vl[:, k] @ vr[:, k]))
+    values = re + 1j * im
+    norm = float(np.abs(A).sum(axis=1).max())
+    with np.errstate(divide="ignore"):
+        radius = 10.0 * n * _EPS * norm / overlap
+    return values, np.minimum(radius, 1e-4 * norm)
+
+
+def _clusters(values: Complex, radius: Real, on_border: Mask, sampled: bool) -> tuple[BorderPole, ...]:
+    """Group the border poles of the upper half plane; a group at 0 or pi keeps all of its members."""
+    x = np.abs(np.angle(values[on_border])) if sampled else np.abs(values[on_border].imag)
+    r = radius[on_border]
+    order = np.argsort(x)
+    groups: list[list[int]] = []
+    for k in order:
+        if groups and x[k] - x[groups[-1][-1]] <= 2.0 * (r[k] + r[groups[-1][-1]]):
+            groups[-1].append(int(k))
+        else:
+            groups.append([int(k)])
+    out = []
+    for group in groups:
+        centre, width = float(np.mean(x[group])), float(np.max(r[group]))
+        if centre <= 2.0 * width:
+            out.append(BorderPole(0.0, len(group)))
+        elif sampled and np.pi - centre <= 2.0 * width + 4.0 * _EPS:
+            out.append(BorderPole(float(np.pi), len(group)))
+        else:
+            out.append(BorderPole(centre, max(len(group) // 2, 1)))
+    return tuple(out)

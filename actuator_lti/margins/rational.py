@@ -1,0 +1,227 @@
+"""Margins of a rational loop without delay."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.circles import Circles
+from actuator_lti.margins.crossings import Crossings, find_crossings
+from actuator_lti.margins.extremes import DISK, MODULUS, smallest
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.nyquist import nyquist_count
+from actuator_lti.margins.poles import SortedPoles, sorted_poles
+from actuator_lti.margins.results import (
+    Agreement,
+    DelayMargin,
+    DiskMargin,
+    GainMargin,
+    PhaseMargin,
+    StabilityMargins,
+    Verdict,
+)
+
+_HIDDEN = "one mode at zero frequency that the loop neither drives nor sees is left out (it is no instability)"
+
+
+@dataclass(frozen=True)
+class Ends:
+    """L at both ends of the axis; ``None`` where it has a pole there.
+
+    Attributes
+    ----------
+    dc, end : complex or None
+        L(0) or L(z = 1); L(infinity) or L(z = -1).
+    dc_order, end_order : int
+        Multiplicity of the pole there in L.
+    hidden : int
+        Modes at zero frequency that L does not show.
+    """
+
+    dc: complex | None
+    end: complex | None
+    dc_order: int
+    end_order: int
+    hidden: int
+
+
+def rational_margins(loop: RationalLoop) -> StabilityMargins:
+    """All margins of a rational loop, see `stability_margins`."""
+    if abs(1.0 + loop.d) <= 1e-12:
+        raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
+    if not loop.order or not loop.b.any() or not loop.c.any():
+        return _constant(loop)
+    poles = sorted_poles(loop.A, loop.sampled)
+    closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.sampled)
+    end_x = math.pi if loop.sampled else math.inf
+    inner = np.array([pole.x for pole in poles.border if 0.0 < pole.x < end_x])
+    circles = Circles(loop, poles.values)
+    found = find_crossings(loop, circles, inner, _typical(poles, loop.sampled))
+    ends = _ends(loop, poles, found)
+    count = nyquist_count(loop, found, poles, ends.dc_order, ends.dc or 0j, ends.end or 0j)
+    border = closed.border_count - ends.hidden
+    agreement = Agreement(closed.unstable, count, border)
+    x, L = _starts(loop, found, closed, ends)
+    modulus, modulus_x = smallest(loop, circles, MODULUS, x, L, end_x)
+    alpha, alpha_x = smallest(loop, circles, DISK, x, L, end_x)
+    return _assembled(
+        loop,
+        agreement,
+        gain_margins=_gain_margins(loop, found, ends),
+        phase_margins=_phase_margins(loop, found),
+        modulus=(modulus, modulus_x),
+        disk=(alpha, alpha_x),
+        notes=(_HIDDEN,) if ends.hidden else (),
+    )
+
+
+def _constant(loop: RationalLoop) -> StabilityMargins:
+    poles = sorted_poles(loop.A, loop.sampled)
+    stable = not poles.unstable and not poles.border_count
+    agreement = Agreement(poles.unstable, poles.unstable, poles.border_count)
+    gains = (GainMargin(-1.0 / loop.d, 0.0),) if loop.d < 0.0 else ()
+    distance = abs(1.0 + loop.d)
+    alpha = math.inf if loop.d == 1.0 else 2.0 * distance / abs(1.0 - loop.d)
+    notes = () if stable else ("the loop has states that it neither drives nor sees",)
+    return _assembled(loop, agreement, gains, (), (distance, 0.0), (alpha, 0.0), notes)
+
+
+def _assembled(
+    loop: RationalLoop,
+    agreement: Agreement,
+    gain_margins: tuple[GainMargin, ...],
+    phase_margins: tuple[PhaseMargin, ...],
+    modulus: tuple[float, float],
+    disk: tuple[float, float],
+    notes: tuple[str, ...],
+) -> StabilityMargins:
+    T = loop.period_s
+    unit = 1.0 if T is None else 1.0 / T
+    band = (0.0, math.inf if T is None else math.pi / T)
+    way = "Hamiltonian matrix" if T is None else "symplectic pencil"
+    method = f"eigenvalues of a {way}, polished by Newton; no grid"
+    stable, verdict = verdict_of(agreement)
+    if stable is None:
+        return StabilityMargins(
+            None, verdict, (), (), (), None, None, None, T, 0.0, band, method, agreement,
+            (*notes, "poles and Nyquist count disagree: no figure is given; the loop is too badly "
+             "conditioned for double precision, or a pole is cancelled"),
+        )  # fmt: skip
+    return StabilityMargins(
+        stable=stable,
+        verdict=verdict,
+        gain_margins=gain_margins,
+        phase_margins=phase_margins,
+        delay_margins=delay_margins(phase_margins, T),
+        modulus_margin=modulus[0],
+        modulus_frequency_rad_s=modulus[1] * unit,
+        disk_margin=DiskMargin(disk[0], disk[1] * unit),
+        period_s=T,
+        delay_s=0.0,
+        band_rad_s=band,
+        method=method,
+        agreement=agreement,
+        notes=notes,
+    )
+
+
+def verdict_of(agreement: Agreement) -> tuple[bool | None, Verdict]:
+    """Verdict from the two ways; both are asked only where no pole is on the border."""
+    if not agreement.agree:
+        return None, "undecided"
+    counts = (agreement.unstable_poles, agreement.unstable_nyquist)
+    count = next((c for c in counts if c is not None), None)
+    if count is None:
+        return None, "undecided"
+    if count:
+        return False, "unstable"
+    return (False, "on the border") if agreement.border_poles else (True, "stable")
+
+
+def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None) -> tuple[DelayMargin, ...]:
+    """The delay that uses up each phase margin; a negative margin by way of a full turn."""
+    out = []
+    for margin in phase_margins:
+        lag = math.radians(margin.deg if margin.deg >= 0.0 else margin.deg + 360.0)
+        seconds = lag / margin.frequency_rad_s
+        samples = None if period_s is None else seconds / period_s
+        out.append(DelayMargin(seconds, samples, margin.frequency_rad_s))
+    return tuple(out)
+
+
+def _gain_margins(loop: RationalLoop, found: Crossings, ends: Ends) -> tuple[GainMargin, ...]:
+    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+    out = []
+    if ends.dc is not None and ends.dc.real < 0.0:
+        out.append(GainMargin(-1.0 / ends.dc.real, 0.0))
+    for x, L, touch in zip(found.real_x, found.real_L, found.real_touch, strict=True):
+        if L.real < 0.0:
+            out.append(GainMargin(float(1.0 / abs(L)), float(x) * unit, bool(touch)))
+    if ends.end is not None and ends.end.real < 0.0:
+        out.append(GainMargin(-1.0 / ends.end.real, math.pi * unit if loop.sampled else math.inf))
+    return tuple(out)
+
+
+def _phase_margins(loop: RationalLoop, found: Crossings) -> tuple[PhaseMargin, ...]:
+    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+    margins = np.degrees(np.angle(-found.gain_L))
+    return tuple(
+        PhaseMargin(float(deg) if deg > -180.0 else 180.0, float(x) * unit, bool(touch))
+        for deg, x, touch in zip(margins, found.gain_x, found.gain_touch, strict=True)
+    )
+
+
+def _typical(poles: SortedPoles, sampled: bool) -> float:
+    if sampled:
+        return 0.5
+    size = np.abs(poles.values)
+    size = size[size > 0.0]
+    return float(np.exp(np.log(size).mean())) if size.size else 1.0
+
+
+def _ends(loop: RationalLoop, poles: SortedPoles, found: Crossings) -> Ends:
+    at_dc = sum(pole.multiplicity for pole in poles.border if pole.x == 0.0)
+    at_pi = sum(pole.multiplicity for pole in poles.border if loop.sampled and pole.x == math.pi)
+    dc, order = None, 0
+    if at_dc:
+        order, value = _order_at_dc(loop, poles, float(found.between_x[0]))
+        dc = None if order else value
+    else:
+        dc = complex(loop.response(np.zeros(1))[0])
+    if at_dc - order > 1:
+        raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
+    end = None
+    if not at_pi:
+        end = complex(loop.response(np.array([math.pi]))[0].real) if loop.sampled else complex(loop.d)
+    return Ends(dc, end, order, at_pi, at_dc - order)
+
+
+def _order_at_dc(loop: RationalLoop, poles: SortedPoles, first_x: float) -> tuple[int, complex]:
+    """Multiplicity of the pole at zero frequency that L shows, from the slope of its gain."""
+    distance = np.abs(poles.values - 1.0) if loop.sampled else np.abs(poles.values)
+    away = distance[distance > 1e-4 * distance.max()]
+    r = 1e-3 * min(first_x, float(away.min()) if away.size else first_x)
+    for _ in range(12):
+        L = loop.response(np.array([r, 0.1 * r]))
+        slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
+        if abs(slope - round(slope)) < 0.02:
+            return max(round(slope), 0), complex(L[1])
+        r *= 0.1
+    raise InputError("the loop has a pole at zero frequency that is almost cancelled: cancel it first")
+
+
+def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: Ends) -> tuple[Real, Complex]:
+    """Where to look for the smallest distance first: crossings, and the resonances of the closed loop."""
+    values = closed.values
+    own = np.abs(np.angle(values)) if loop.sampled else np.abs(values)
+    own = own[(values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.sampled else own > 0.0)]
+    x = np.concatenate((found.gain_x, found.real_x, found.between_x, own))
+    L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own)))
+    if ends.dc is not None:
+        x, L = np.append(x, 0.0), np.append(L, ends.dc)
+    if ends.end is not None:
+        x, L = np.append(x, math.pi if loop.sampled else math.inf), np.append(L, ends.end)
+    return x, L
