@@ -108,9 +108,7 @@ class Sampler:
 
     def __post_init__(self) -> None:
         if not self.paths:
-            raise InputError(
-                "no parameter has a tolerance: give one in the design file, or a file of samples"
-            )
+            raise InputError("no parameter has a tolerance: give one in the design, or a file of samples")
         if isinstance(self.seed, bool) or self.seed < 0:
             raise InputError(f"seed = {self.seed}: an integer from 0 on")
 
@@ -157,9 +155,7 @@ class Sampler:
         try:
             return np.linalg.cholesky(self.correlation)
         except np.linalg.LinAlgError as error:
-            raise InputError(
-                "correlations contradict each other: no such joint distribution exists"
-            ) from error
+            raise InputError("the correlations contradict each other: no such distribution exists") from error
 
     def _correlated(self, points: np.ndarray) -> np.ndarray:
         """Uniform coordinates whose normal scores have the wanted correlation."""
@@ -233,7 +229,7 @@ def _check_reach(factor: Factor, where: str | None) -> None:
     ends = factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))
     if allowed is not None and not all(allowed.accepts(float(end)) for end in ends):
         raise InputError(
-            f"{factor.path}: its {factor.tolerance.kind} tolerance reaches {ends[0]:g}, which is not allowed; "
+            f"{factor.path}: its {factor.tolerance.kind} tolerance reaches {ends[0]:g}, not allowed; "
             'take kind "truncated-normal" with lower and upper',
             where=where,
         )

@@ -143,11 +143,18 @@ def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def ends(response_dc, response_nyquist, row):
-    """A loop that is negative real at DC or at Nyquist crosses the negative axis there."""
+def ends(response_dc, response_nyquist, count, xs, rs, row):
+    """A loop that is negative real at DC or at Nyquist crosses the negative axis there.
+
+    A zero at Nyquist (a two-sample mean) leaves rounding there, no crossing.
+    """
+    size = 0.0
+    for k in range(count):
+        if xs[k] > 0.3:
+            size = max(size, abs(rs[k]))
     if np.isfinite(response_dc) and response_dc < 0.0:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, 0.0, -1.0 / response_dc)
-    if response_nyquist < 0.0:
+    if response_nyquist < -1e-12 * size:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, np.pi, -1.0 / response_nyquist)
 
 

@@ -139,7 +139,7 @@ def _one_loop(n, a, b, c, time_figures, arrays, row):
     nyquist, _ = evaluate(n, a, b, c, np.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    ends(open_dc, nyquist.real, row)
+    ends(open_dc, nyquist.real, count, xs, rs, row)
     modulus(count, xs, rs, ss, nyquist, row, n, a, b, c, work, state, exchanged)
     resonance(count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     bandwidths(count, xs, rs, ss, dc, row, n, a, b, c, work, state, exchanged)

@@ -1,0 +1,106 @@
+"""The compiled figures of many designs against assemble_loops and the margin engine, and their own bits."""
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti.design import parameter_value, with_values
+from actuator_lti.errors import InputError
+
+NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
+
+
+def scattered(name: str, count: int, seed: int) -> Population:
+    """Designs around a shipped one: plant by 30 %, gains by a factor of 5, any delay up to 2.7 ticks."""
+    rng = np.random.default_rng(seed)
+    design = load_design(name)
+    values = {}
+    for path in variable_paths(design):
+        if path not in design.parameters or path.startswith(("gear", "limits", "encoder")):
+            continue
+        value = parameter_value(design, path)
+        if path == "control.period":
+            continue
+        if path == "control.computing_delay":
+            values[path] = design.controller.period_s * rng.choice([0, 0.25, 0.5, 1, 1.5, 2.7], count)
+        elif path.startswith("control"):
+            values[path] = value * 10 ** rng.uniform(-0.7, 0.7, count)
+        else:
+            values[path] = value * rng.uniform(0.7, 1.3, count)
+    if "motor.back_emf_constant" in values:
+        values["motor.back_emf_constant"] = values["motor.torque_constant"]
+    return Population(design, values, count)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_crossover_is_that_of_the_margin_engine(name):
+    population = scattered(name, 12, seed=5)
+    figures = linear_figures(population, time_figures=False)
+    for k in range(population.count):
+        changed = {path: float(array[k]) for path, array in population.values.items()}
+        loops = assemble_loops(with_values(population.design, changed))
+        for loop in figures.loops:
+            truth = stability_margins(getattr(loops, loop).open_loop)
+            gain, phase = figures.gain_crossovers(loop), figures.phase_crossovers(loop)
+            assert figures.stable(loop)[k] == truth.stable
+            assert gain.found[k] == len(truth.phase_margins)
+            assert phase.found[k] == len(truth.gain_margins)
+            for j, margin in enumerate(truth.phase_margins):
+                assert gain.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
+                assert gain.margin[k, j] == pytest.approx(margin.deg, rel=1e-6, abs=1e-6)
+            for j, margin in enumerate(truth.gain_margins):
+                assert phase.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
+                assert phase.margin[k, j] == pytest.approx(margin.ratio, rel=1e-6)
+            for quantity in ("gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin"):
+                mine = figures.quantity(
+                    quantity.removesuffix("_db").removesuffix("_deg").removesuffix("_s"), loop
+                )
+                assert mine[k] == pytest.approx(getattr(truth, quantity), rel=1e-6)
+
+
+def test_an_unstable_loop_is_called_so_and_takes_no_delay():
+    design = load_design("ilr33-amber")
+    population = Population(design, {"control.current.gain": np.array([0.02, 0.2])}, 2)
+    figures = linear_figures(population)
+    assert figures.stable("current").tolist() == [True, False]
+    assert figures.quantity("delay_margin", "current")[1] == 0.0
+    assert figures.quantity("gain_margin", "current")[1] < 0.0
+    assert np.isnan(figures.quantity("bandwidth", "current")[1])
+
+
+def test_bits_do_not_depend_on_threads_neighbours_or_order():
+    population = scattered("ilr33-amber-multirate", 600, seed=1)
+    whole = linear_figures(population, threads=2).raw
+    order = np.random.default_rng(2).permutation(population.count)
+    shuffled = Population(population.design, {p: v[order] for p, v in population.values.items()}, 600)
+    assert np.array_equal(linear_figures(shuffled).raw, whole[order], equal_nan=True)
+    alone = Population(population.design, {p: v[7:8] for p, v in population.values.items()}, 1)
+    assert np.array_equal(linear_figures(alone).raw[0], whole[7], equal_nan=True)
+
+
+def test_rest_and_describing_function_change_the_slope_as_the_loops_do():
+    design = load_design("ilr33-amber")
+    for point, extra in (("rest", {}), ("describing-function", {"speed_amplitude_rad_s": 30.0})):
+        figures = linear_figures(Population(design, {}, 1), operating_point=point, load_Nm=8.0, **extra)
+        loops = assemble_loops(design, operating_point=point, load_Nm=8.0, **extra)
+        truth = stability_margins(loops.velocity.open_loop)
+        assert figures.quantity("phase_margin", "velocity")[0] == pytest.approx(
+            truth.phase_margin_deg, rel=1e-6
+        )
+
+
+def test_drive_figures_of_the_paper():
+    """The speed limit is 22.7 deg/s at the canard (paper); at 8 N m friction takes 17.9 mN m, 3.04 A."""
+    population = Population(load_design("ilr33-amber"), {}, 1)
+    assert drive_figures(population, "output_rate", 8.0)[0] == pytest.approx(22.73, abs=0.01)
+    torque = 2.25e-3 + 1.34e-3 * 8 + 5.25e-6 * 942.5
+    assert drive_figures(population, "motor_current", 8.0)[0] == pytest.approx(torque / 5.9e-3)
+
+
+def test_what_cannot_vary_is_refused():
+    design = load_design("ilr33-amber")
+    with pytest.raises(InputError, match=r"motor\.color"):
+        Population(design, {"motor.color": np.ones(2)}, 2)
+    with pytest.raises(InputError, match="finite"):
+        Population(design, {"motor.resistance": np.array([np.nan])}, 1)
