@@ -44,9 +44,9 @@ class FlowProgram:
 
     Attributes
     ----------
-    delays : {"all", "none", "no computing", "no measurement"}
-        Which delays are kept: all of them; none (form ``ideal``); all but the computing delay; all but the
-        computing delay and that of the speed measurement (for the delay budget).
+    delays : {"all", "none", "no computing", "no computing, no measurement"}
+        Which delays are kept: all of them; none (form ``ideal``); all but the computing delay; the holds only
+        (for the delay budget).
     """
 
     cascade: Cascade
@@ -73,7 +73,11 @@ class FlowProgram:
         table["u"] = table.get("u", 0.0) + cascade.tick_s / 2
         if self.delays == "all":
             table["u"] += control.computing_delay_s
-        if "velocity" in self.stages and encoder.speed == "difference" and self.delays != "no measurement":
+        if (
+            "velocity" in self.stages
+            and encoder.speed == "difference"
+            and "no measurement" not in self.delays
+        ):
             table["speed"] = encoder.difference_samples * cascade.period_s("velocity") / 2
         return {name: delay for name, delay in table.items() if delay > 0}
 

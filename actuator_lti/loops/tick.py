@@ -84,9 +84,7 @@ class TickProgram:
         names = [s for s in cascade.plant.states if s != "th" or needs_angle]
         names += [f"u{j}" for j in range(1, self.hold.memory + 1)]
         names += [f"I_{stage}" for stage in self.stages if cascade.pi(stage).integral_time_s is not None]
-        for inner, stage in zip((None, *self.stages), self.stages, strict=False):
-            if cascade.interval[stage] > (cascade.interval[inner] if inner else 1):
-                names.append(f"hold_{cascade.target[stage]}")
+        names += [f"hold_{cascade.target[stage]}" for stage in self.stages if cascade.interval[stage] > 1]
         if "velocity" in self.stages:
             if encoder.speed == "difference":
                 names += ["acc", *(f"D{j}" for j in range(1, encoder.difference_samples))]
