@@ -159,7 +159,7 @@ def _least_squares(
         )
     values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
     residual = y - w @ values
-    covariance = float(np.var(residual, ddof=1)) * np.linalg.inv(w.T @ w)
+    covariance = np.asarray(np.var(residual, ddof=1) * np.linalg.inv(w.T @ w))
     return DynamicModel(
         form=form,
         names=NAMES[form],

@@ -115,7 +115,7 @@ def _gauss_newton(pair: _Pair, parameters: int) -> tuple[FloatArray, FloatArray]
             break
     rest = pair.residual(p)
     variance = float(rest @ rest) / max(len(rest) - 2 - parameters, 1)
-    return p, variance * np.linalg.pinv(jac.T @ jac)
+    return p, np.asarray(variance * np.linalg.pinv(jac.T @ jac))
 
 
 def _refined(

@@ -32,11 +32,11 @@ class TimeAxis:
         """Time in s, shape (n,), and the values of the signals, shape (n, signals)."""
         values, lines = self._without_missing(block.values, block.lines)
         if self._spec.time.period_s is not None:
-            time = (self._row + np.arange(len(values))) * self._spec.time.period_s
+            time = np.asarray((self._row + np.arange(len(values))) * self._spec.time.period_s)
             self._row += len(values)
             return time, values
         if self._spec.time.minimum is not None:
-            keep = values[:, 0] >= self._spec.time.minimum
+            keep = np.asarray(values[:, 0] >= self._spec.time.minimum)
             reason = f"time below {self._spec.time.minimum:g}"
             values, lines = self._keep(keep, values, lines, reason)
         time = self._unwrapped(values[:, 0]) * self._factor

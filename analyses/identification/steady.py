@@ -1,0 +1,134 @@
+"""The steady part of a run, by a stated criterion on the acceleration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyCriterion:
+    """When a motion counts as steady.
+
+    The acceleration is the slope of a least-squares line through the speed over ``window_s``. It must not
+    exceed the larger of ``relative_per_s`` times the plateau of the speed (its 95 % point) and
+    ``noise_factor`` times the standard deviation which white noise of the speed gives such a slope. Samples
+    below ``least_share`` of the plateau are standstill. Of the stretches that qualify the longest is taken,
+    ``trim_s`` is cut off at both ends, and at least ``least_duration_s`` must remain.
+    """
+
+    window_s: float = 0.25
+    relative_per_s: float = 0.02
+    noise_factor: float = 5.0
+    least_share: float = 0.5
+    trim_s: float = 0.1
+    least_duration_s: float = 0.5
+
+    def __str__(self) -> str:
+        return (
+            f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
+            f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), longest stretch, "
+            f"{self.trim_s:g} s cut off at both ends"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyWindow:
+    """The part of a record that counts as steady: rows ``start:stop``, and the limit that was applied."""
+
+    start: int
+    stop: int
+    start_s: float
+    stop_s: float
+    limit_rad_s2: float
+    largest_acceleration_rad_s2: float
+
+
+def find_steady_window(
+    time_s: FloatArray, speed_rad_s: FloatArray, criterion: SteadyCriterion | None = None
+) -> SteadyWindow:
+    """Find the steady part of a run.
+
+    Parameters
+    ----------
+    time_s, speed_rad_s : array, shape (n,)
+        May be sampled irregularly.
+    criterion : SteadyCriterion, optional
+
+    Raises
+    ------
+    InputError
+        If no part of the run satisfies the criterion for long enough.
+    """
+    criterion = SteadyCriterion() if criterion is None else criterion
+    period = float(np.median(np.diff(time_s)))
+    samples = max(round(criterion.window_s / period), 4)
+    if len(time_s) < 2 * samples:
+        raise InputError(f"no steady part: the record of {len(time_s)} samples is shorter than two windows")
+    slope = moving_slope(time_s, speed_rad_s, samples)
+    plateau = float(np.quantile(np.abs(speed_rad_s), 0.95))
+    noise = _noise(speed_rad_s) * np.sqrt(12.0 / (samples * (samples**2 - 1.0))) / period
+    limit = max(criterion.relative_per_s * plateau, criterion.noise_factor * noise)
+    half = samples // 2
+    moving = np.abs(speed_rad_s[half : half + len(slope)]) >= criterion.least_share * plateau
+    start, stop = _longest((np.abs(slope) <= limit) & moving)
+    trim = round(criterion.trim_s / period)
+    start, stop = start + half + trim, stop + half - trim
+    if stop - start < max(criterion.least_duration_s / period, 8.0):
+        calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
+        raise InputError(
+            f"no steady part of {criterion.least_duration_s:g} s: the smallest acceleration is "
+            f"{calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
+        )
+    return SteadyWindow(
+        start=start,
+        stop=stop,
+        start_s=float(time_s[start]),
+        stop_s=float(time_s[stop - 1]),
+        limit_rad_s2=float(limit),
+        largest_acceleration_rad_s2=float(np.max(np.abs(slope[start - half : stop - half]))),
+    )
+
+
+def moving_slope(time_s: FloatArray, values: FloatArray, samples: int) -> FloatArray:
+    """Slope of the least-squares line over every ``samples`` neighbours, shape (n - samples + 1,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.array([0.0, 0.1, 0.25, 0.3, 0.45, 0.5])
+    >>> moving_slope(t, 3.0 * t + 1.0, 4).round(12).tolist()
+    [3.0, 3.0, 3.0]
+    """
+    t = time_s - time_s.mean()
+    x = values - values.mean()
+    st, sx, stx, stt = (_moving_sum(part, samples) for part in (t, x, t * x, t * t))
+    slope: FloatArray = (samples * stx - st * sx) / (samples * stt - st * st)
+    return slope
+
+
+def _moving_sum(values: FloatArray, samples: int) -> FloatArray:
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return total[samples:] - total[:-samples]
+
+
+def _noise(speed: FloatArray) -> float:
+    """Standard deviation of white noise, from the differences of neighbours without the largest 1 %."""
+    steps = np.abs(np.diff(speed))
+    calm = steps[steps <= np.quantile(steps, 0.99)]
+    return float(np.sqrt(np.mean(calm**2) / 2.0))
+
+
+def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
+    if not len(edges):
+        return 0, 0
+    starts, stops = edges[::2], edges[1::2]
+    k = int(np.argmax(stops - starts))
+    return int(starts[k]), int(stops[k])

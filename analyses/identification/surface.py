@@ -1,0 +1,223 @@
+"""The friction surface M = C0 + Cv w + CM |M_ext| through the points of a campaign (paper, equation 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.outliers import find_outliers
+from analyses.identification.points import SteadyPoint
+from analyses.identification.systematic import ErrorDraws, SharedError, draw_errors, shared_errors
+from analyses.records.campaign_file import Instruments
+
+FloatArray = NDArray[np.float64]
+
+NAMES = ("C0", "Cv", "CM")
+UNITS = ("N*m", "N*m*s/rad", "N*m/(N*m)")
+PATHS = ("friction.dry_torque", "friction.viscous", "friction.load_coefficient")
+MIN_RUNS = 5
+ITERATIONS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outlier:
+    """A run whose residual is too large: in units of its standard deviation, with the limit."""
+
+    run: str
+    standardised: float
+    limit: float
+    set_aside: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceFit:
+    """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are.
+
+    ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
+    errors, whose bounds move the coefficients by ``shared_shifts[name]``. ``half_widths`` are those of the 95
+    % intervals, from propagated distributions.
+    ``residuals_Nm`` and ``residual_stds_Nm`` are those of the runs used, in the order of ``points``.
+    ``run_scatter_Nm`` is the scatter between runs that their own noise does not explain, ``birge_ratio`` the
+    ratio of the two (1: explained).
+    """
+
+    points: tuple[SteadyPoint, ...]
+    values: FloatArray
+    covariance: FloatArray
+    random_covariance: FloatArray
+    shared_shifts: dict[str, FloatArray]
+    half_widths: FloatArray
+    draws: ErrorDraws
+    residuals_Nm: FloatArray
+    residual_stds_Nm: FloatArray
+    run_scatter_Nm: float
+    birge_ratio: float
+    outliers: tuple[Outlier, ...]
+    freedom: int
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors with the shared errors in them."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def intervals(self) -> FloatArray:
+        """95 % intervals, shape (3, 2)."""
+        return np.column_stack([self.values - self.half_widths, self.values + self.half_widths])
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix of the coefficients."""
+        std = self.standard_errors
+        return self.covariance / np.outer(std, std)
+
+    def predict_Nm(self, speed_rad_s: FloatArray, load_Nm: FloatArray) -> FloatArray:
+        """Friction torque at speeds and loads."""
+        return np.asarray(self.values[0] + self.values[1] * speed_rad_s + self.values[2] * np.abs(load_Nm))
+
+
+def fit_surface(
+    points: Sequence[SteadyPoint],
+    instruments: Instruments,
+    torque_constant_Nm_A: float,
+    *,
+    outliers: str = "keep",
+) -> SurfaceFit:
+    """Fit the surface by generalised least squares with errors in all variables.
+
+    The weight of a run comes from the covariance of its means of torque, speed and load, moved to the torque
+    by the slopes of the surface (effective variance, iterated), plus the scatter between runs where they do
+    not agree within their noise (Mandel and Paule). The shared errors of the instruments enter the covariance
+    as they act: on all runs together.
+
+    Parameters
+    ----------
+    points : sequence of SteadyPoint
+        At least five.
+    instruments : Instruments
+        Bounds of the shared errors.
+    torque_constant_Nm_A : float
+        The kM that made the torques.
+    outliers : {"keep", "set-aside"}
+        Whether runs that are named as outliers stay in the fit.
+
+    Raises
+    ------
+    InputError
+        Too few runs.
+    NumericalError
+        The runs do not tell the coefficients apart.
+    """
+    used = tuple(points)
+    _check_excited(used)
+    names = tuple(point.run for point in used)
+    x, y = _table(used)
+    found = find_outliers(x, y, _own_variance(used, _ordinary(x, y)))
+    named = tuple(
+        Outlier(run=names[k], standardised=float(value), limit=found.limit, set_aside=outliers == "set-aside")
+        for k, value in zip(found.rows, found.standardised, strict=True)
+    )
+    if outliers == "set-aside" and named:
+        used = tuple(point for k, point in enumerate(used) if k not in set(found.rows))
+        _check_excited(used)
+    return _fitted(used, instruments, torque_constant_Nm_A, named)
+
+
+def _fitted(
+    points: tuple[SteadyPoint, ...],
+    instruments: Instruments,
+    torque_constant: float,
+    named: tuple[Outlier, ...],
+) -> SurfaceFit:
+    x, y = _table(points)
+    theta, scatter, birge = _ordinary(x, y), 0.0, 1.0
+    shared: tuple[SharedError, ...] = ()
+    for _ in range(ITERATIONS):
+        own = _own_variance(points, theta)
+        shared = shared_errors(points, instruments, theta[2], torque_constant)
+        scatter, birge = _run_scatter(x, y, own)
+        gain = _gain(x, own + scatter, shared)
+        change = gain @ y - theta
+        theta = theta + change
+        if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
+            break
+    variance = own + scatter
+    freedom = len(y) - len(theta)
+    random_covariance = (gain * variance) @ gain.T
+    shifts = {error.name: gain @ error.effect for error in shared}
+    moved = np.array(list(shifts.values())).reshape(len(shifts), len(theta))
+    draws = draw_errors(random_covariance, moved, freedom)
+    return SurfaceFit(
+        points=points,
+        values=theta,
+        covariance=random_covariance + moved.T @ moved / 3.0,
+        random_covariance=random_covariance,
+        shared_shifts=shifts,
+        half_widths=draws.half_width(),
+        draws=draws,
+        residuals_Nm=y - x @ theta,
+        residual_stds_Nm=np.sqrt(variance),
+        run_scatter_Nm=float(np.sqrt(scatter)),
+        birge_ratio=birge,
+        outliers=named,
+        freedom=freedom,
+    )
+
+
+def _table(points: tuple[SteadyPoint, ...]) -> tuple[FloatArray, FloatArray]:
+    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
+    return x, np.array([p.torque_Nm for p in points])
+
+
+def _check_excited(points: tuple[SteadyPoint, ...]) -> None:
+    if len(points) < MIN_RUNS:
+        raise InputError(f"{len(points)} usable runs: at least {MIN_RUNS} are needed for three coefficients")
+    x, _ = _table(points)
+    if not np.linalg.cond(x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)) < 1e4:
+        raise NumericalError(
+            "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
+        )
+
+
+def _ordinary(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(x, y, rcond=None)[0])
+
+
+def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatArray:
+    """Variance of each run's residual from its own noise: the covariance of its means along (1, -Cv, -CM)."""
+    along = np.array([1.0, -theta[1], -theta[2]])
+    own = np.array([along @ p.covariance @ along for p in points])
+    return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
+
+
+def _gain(x: FloatArray, variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
+    """The matrix that makes the coefficients of the torques: (X' V^-1 X)^-1 X' V^-1."""
+    covariance = np.diag(variance)
+    for error in shared:
+        covariance += np.outer(error.effect, error.effect) / 3.0
+    whitened = np.linalg.solve(covariance, x)
+    return np.asarray(np.linalg.solve(x.T @ whitened, whitened.T))
+
+
+def _run_scatter(x: FloatArray, y: FloatArray, own: FloatArray) -> tuple[float, float]:
+    """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
+    freedom = len(y) - x.shape[1]
+
+    def chi_square(extra: float) -> float:
+        variance = own + extra
+        rest = y - x @ (_gain(x, variance, ()) @ y)
+        return float(np.sum(rest**2 / variance))
+
+    first = chi_square(0.0)
+    birge = float(np.sqrt(first / freedom))
+    if first <= freedom:
+        return 0.0, birge
+    low, high = 0.0, 10.0 * float(np.var(y - x @ _ordinary(x, y))) + float(np.max(own))
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if chi_square(middle) > freedom else (low, middle)
+    return 0.5 * (low + high), birge
