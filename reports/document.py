@@ -126,7 +126,7 @@ def verdict(
     reason: str = "",
     comparison: str = "",
 ) -> dict[str, Any]:
-    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` None if not judged."""
+    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` may be None."""
     return plain(
         {
             "id": id,

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def print_json(data: Any) -> None:
-    """Print a JSON value (numpy numbers and arrays too; NaN and infinity become null), one line end after it."""
+    """Print a JSON value, numpy included; NaN and infinity become null."""
     import json
 
     from reports.document import plain

@@ -7,14 +7,15 @@ figure can be read without colour.  Text stays text in the page's own font.
 from __future__ import annotations
 
 import io
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter
 
 INK = "#1f2933"
 MUTED = "#66727f"
@@ -143,11 +144,81 @@ def plain_decade(value: float, _position: int | None = None) -> str:
 
 
 def phase_ticks(ax: Axes, low: float, high: float) -> None:
-    """Put the ticks of a phase axis at multiples of 45 degrees (or of 90, 180, ... where the span is large)."""
+    """Put the ticks of a phase axis at multiples of 15, 45, 90, ... degrees."""
     step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
     first = step * int(low // step)
     ticks = [first + step * k for k in range(int((high - first) // step) + 2)]
     ax.set_yticks([tick for tick in ticks if low <= tick <= high])
+
+
+HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "||||", "----")
+
+
+def gaps(values: Sequence[float | None]) -> list[float]:
+    """Turn the nulls of JSON into gaps of a curve."""
+    return [math.nan if value is None else value for value in values]
+
+
+def bound(ax: Axes, values: Sequence[float | None], *, span: float, top_room: float) -> None:
+    """Set the y limits to the values, at most so much below the highest, with some room above."""
+    known = [value for value in values if value is not None]
+    high, low = max(known, default=1.0), min(known, default=0.0)
+    low = max(low, high - span)
+    height = max(high - low, 1.0)
+    ax.set_ylim(low - 0.04 * height, high + top_room * height)
+
+
+def multiples(step: float) -> MultipleLocator:
+    """Put ticks at multiples of a step."""
+    return MultipleLocator(step)
+
+
+def tag(ax: Axes, words: str, at: tuple[float, float], data: dict[str, Any], *, below: bool | None) -> None:
+    """Label a point, on the side where the frame has room."""
+    first, last = data["frequency_hz"][0], data["frequency_hz"][-1]
+    left = math.log(at[0] / first) > 0.72 * math.log(last / first)
+    dy, va = {None: (0, "center"), True: (-3, "top"), False: (4, "bottom")}[below]
+    place: dict[str, Any] = {"ha": "right" if left else "left", "va": va, "linespacing": 1.25}
+    ax.annotate(
+        words,
+        at,
+        xytext=(-8 if left else 8, dy),
+        textcoords="offset points",
+        fontsize=8.5,
+        bbox=label_box(),
+        zorder=5,
+        **place,
+    )
+
+
+def hertz(value: float) -> str:
+    """Write a frequency with its unit.
+
+    Examples
+    --------
+    >>> hertz(88.457), hertz(1909.4)
+    ('88.5 Hz', '1.91 kHz')
+    """
+    return f"{value / 1e3:.3g} kHz" if value >= 1e3 else f"{value:.3g} Hz"
+
+
+def seconds(value: float) -> str:
+    """Write a duration with the unit that suits it.
+
+    Examples
+    --------
+    >>> seconds(0.01234), seconds(3.2e-4)
+    ('12.3 ms', '320 µs')
+    """
+    scale, unit = time_unit(value)
+    return f"{value * scale:.3g} {unit}"
+
+
+def time_unit(span_s: float) -> tuple[float, str]:
+    """Choose s, ms or µs for a span, with the factor from seconds."""
+    if span_s >= 1.0:
+        return 1.0, "s"
+    return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
 
 
 def label_box() -> dict[str, Any]:
@@ -156,7 +227,7 @@ def label_box() -> dict[str, Any]:
 
 
 def _tidy(svg: str, prefix: str, page: bool) -> str:
-    """Keep only the element; drop needless ids, make the others unique, let the page choose font and colours."""
+    """Keep only the element: needless ids go, the others become unique, font and colours are the page's."""
     svg = svg[svg.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.DOTALL)
     svg = re.sub(r"<!--.*?-->\s*", "", svg, flags=re.DOTALL)
