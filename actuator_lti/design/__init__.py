@@ -7,6 +7,7 @@ from actuator_lti.design.loader import load_design, read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.quantities import QUANTITIES
 from actuator_lti.design.shipped import shipped_designs
+from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
 
@@ -25,6 +26,7 @@ __all__ = [
     "read_design_text",
     "shipped_designs",
     "tolerances",
+    "warnings_of",
     "with_overrides",
     "with_values",
     "write_design",

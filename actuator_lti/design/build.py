@@ -11,6 +11,7 @@ from actuator_lti.design.fields import Field, Structure, fields_in
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
 from actuator_lti.design.reading import shown
+from actuator_lti.design.refusals import nearest
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
@@ -128,7 +129,9 @@ class Builder:
         path = f"requirement.{self.name('requirement.id', raw.id)}"
         quantity = QUANTITIES.get(raw.quantity)
         if quantity is None:
-            raise self.refuse(f"{path}.quantity", raw.quantity, f"allowed: {', '.join(QUANTITIES)}")
+            hint = nearest(raw.quantity, tuple(QUANTITIES)).strip()
+            allowed = f"{hint + '; ' if hint else ''}allowed: {', '.join(QUANTITIES)}"
+            raise self.refuse(f"{path}.quantity", raw.quantity, allowed)
         unit = quantity.unit_for(self.structure.axis)
         torque = "N" if self.structure.axis == "linear" else "N*m"
         return model.Requirement(
@@ -157,6 +160,19 @@ class Builder:
         if self.document.validation is None:
             return model.Validation(full_deflection_rad=default)
         return self.section(model.Validation, "validation", self.document.validation)
+
+    def objects(self) -> model.ControllerObjects:
+        """The settings that the design was imported from."""
+        from actuator_lti.design.objects import check_objects
+        from actuator_lti.design.settings_file import checked_factor, object_from
+
+        raw = self.document.objects
+        if raw is None:
+            return model.ControllerObjects()
+        values = tuple(object_from(label, entry, self.where) for label, entry in raw.values.items())
+        check_objects(values, self.where)
+        factor = checked_factor(raw.velocity_gain_factor, self.where)
+        return model.ControllerObjects(velocity_gain_factor=factor, values=values)
 
     def design(self, origin: str) -> model.Design:
         """The whole design."""
@@ -187,6 +203,7 @@ class Builder:
                 model.Fact(label=f.label, value=f.value, source=f.source, grade=f.grade)
                 for f in self.document.fact
             ),
+            objects=self.objects(),
             parameters=FrozenMap(self.parameters),
             **parts,
         )

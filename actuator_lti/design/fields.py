@@ -10,6 +10,8 @@ from actuator_lti.design.model import Axis, Design
 
 Kind = Literal["quantity", "integer", "quantities", "choice", "text"]
 
+_BIG = 1e12
+_SMALL = 1e-18
 _AXES: dict[str, dict[str, str]] = {
     "rotary": {"angle": "rad", "torque": "N*m", "inertia": "kg*m^2"},
     "linear": {"angle": "m", "torque": "N", "inertia": "kg"},
@@ -76,6 +78,8 @@ class Field:
         if self.choices:
             return " or ".join(f'"{choice}"' for choice in self.choices)
         shown = "" if unit == "1" else f" {unit}"
+        if self.low == _SMALL:
+            return f"above 0, {self.low:g} to {self.high:g}{shown}"
         low = "" if self.low == -inf else f"{'above' if self.low_open else 'at least'} {self.low:g}{shown}"
         high = "" if self.high == inf else f"at most {self.high:g}{shown}"
         return " and ".join(part for part in (low, high) if part) or "any finite number"
@@ -83,10 +87,6 @@ class Field:
     def accepts(self, value: float) -> bool:
         """Whether an SI value lies in the allowed range; NaN does not."""
         return (self.low < value if self.low_open else self.low <= value) and value <= self.high
-
-
-_BIG = 1e12
-_SMALL = 1e-18
 
 
 def _positive(path: str, attribute: str, unit: str, symbol: str, text: str, **more: object) -> Field:

@@ -235,6 +235,34 @@ class Fact:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ControllerObject:
+    """One entry of the motion controller's object dictionary, as an integer in the object's own unit."""
+
+    index: int
+    subindex: int
+    value: int
+    name: str = ""
+    data_type: str = ""
+
+    @property
+    def label(self) -> str:
+        """The usual spelling, such as ``0x2344.01``."""
+        return f"0x{self.index:04X}.{self.subindex:02X}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerObjects:
+    """The controller's own settings that a design was imported from, also those that no key holds.
+
+    ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
+    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.
+    """
+
+    velocity_gain_factor: float = 1.0
+    values: tuple[ControllerObject, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Design:
     """A drive: plant, controller, limits, requirements, and where each value came from."""
 
@@ -251,6 +279,7 @@ class Design:
     requirements: tuple[Requirement, ...] = ()
     correlations: tuple[Correlation, ...] = ()
     facts: tuple[Fact, ...] = ()
+    objects: ControllerObjects = field(default_factory=ControllerObjects)
     parameters: Mapping[str, Parameter] = field(default_factory=FrozenMap)
     axis: Axis = "rotary"
     revision: str = ""

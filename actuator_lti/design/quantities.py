@@ -68,7 +68,10 @@ def parse_limit(text: str | float | int, unit: str) -> float:
     if written == unit:
         return number
     if "[angle]" in dict(parse_unit(unit).dimension):
-        return convert(parse_quantity(text, _si(unit)), _si(unit), unit)
+        try:
+            return convert(parse_quantity(text, _si(unit)), _si(unit), unit)
+        except InputError:
+            raise InputError(f"wrong unit; allowed: a number with a unit like {unit}") from None
     return parse_quantity(text, unit)
 
 

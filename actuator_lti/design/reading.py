@@ -16,11 +16,13 @@ MAX_VALUES = 20_000
 MAX_KEY_DOTS = 64
 
 
-def shown(value: object) -> str:
+def shown(value: object, longest: int = 60) -> str:
     """A value as it may be printed: short, one line, no control characters."""
+    if isinstance(value, dict | list):
+        return "a table" if isinstance(value, dict) else "a list"
     text = value if isinstance(value, str) else repr(value)
-    text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[:80])
-    text = text if len(text) <= 60 else text[:57] + "..."
+    text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[: longest + 1])
+    text = text if len(text) <= longest else text[: longest - 3] + "..."
     return f'"{text}"' if isinstance(value, str) else text
 
 
@@ -36,6 +38,8 @@ def read_bytes(path: Path, what: str = "design file") -> bytes:
             data = stream.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise InputError(f"no such file; allowed: a {what}", where=where) from None
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"cannot be read: {reason}", where=where) from None
@@ -60,11 +64,11 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {shown(str(error))[1:-1]}", where=where) from None
+        raise InputError(f"not TOML: {shown(str(error), 200)[1:-1]}", where=where) from None
     except RecursionError:
         raise InputError(f"nested too deeply; allowed: {MAX_DEPTH} levels", where=where) from None
     except (ValueError, OverflowError) as error:
-        raise InputError(f"not TOML: {shown(str(error))[1:-1]}", where=where) from None
+        raise InputError(f"not TOML: {shown(str(error), 200)[1:-1]}", where=where) from None
     _walk(tree, where)
     return tree
 

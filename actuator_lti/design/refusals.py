@@ -9,17 +9,18 @@ from pydantic import ValidationError
 
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.reading import shown
-from actuator_lti.design.schema import document_model
+from actuator_lti.design.schema import MAX_GEARS, MAX_LIST, document_model
 from actuator_lti.errors import InputError
 
 _SECTIONS = (
     "design", "motor", "gear", "load", "friction", "encoder", "limits", "control", "validation",
-    "requirement", "correlation", "fact",
+    "requirement", "correlation", "fact", "objects",
 )  # fmt: skip
 _KEYS = {
     "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),
     "correlation": ("first", "second", "coefficient"),
     "fact": ("label", "value", "source", "grade"),
+    "objects": ("velocity_gain_factor", "values"),
     "tolerance": ("kind", "half_width", "std", "lower", "upper"),
 }
 _VALUE = ("value", "source", "grade", "tolerance")
@@ -31,8 +32,8 @@ def validated(tree: dict[str, Any], where: str) -> Any:
         return document_model().model_validate(tree)
     except ValidationError as error:
         findings = error.errors(include_url=False)
-        unknown = [item for item in findings if item["type"] == "extra_forbidden"]
-        raise InputError(_line((unknown or findings)[0], tree), where=where) from None
+        telling = [item for item in findings if item["type"] in ("extra_forbidden", "literal_error")]
+        raise InputError(_line((telling or findings)[0], tree), where=where) from None
     except RecursionError:
         raise InputError("nested too deeply", where=where) from None
 
@@ -60,7 +61,11 @@ def _line(finding: Any, tree: dict[str, Any]) -> str:
         many = f"[[{path}]] tables" if path in _KEYS or path == "gear" else "a list"
         return f"{path} = {given}: allowed: {many}"
     if kind in ("too_long", "too_short"):
-        return f"{path}: {finding['msg']}"
+        return f"{path}: allowed: 1 to {MAX_GEARS if path == 'gear' else MAX_LIST} items"
+    if location and location[-1] == "tolerance":
+        return f'{path} = {given}: allowed: a half width such as "50 %", or a table'
+    if location and location[-1] == "value" and len(location) > 1 and location[0] != "fact":
+        return f"{path} = {given}: allowed: a number, with its unit as text"
     if kind.startswith("string") or (len(location) and location[-1] in ("source", "grade", "note")):
         return f"{path} = {given}: allowed: text"
     return f"{path} = {given}: allowed: a number with its unit, as text{_example(path)}"

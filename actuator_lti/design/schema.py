@@ -12,6 +12,7 @@ from actuator_lti.design.fields import Field, fields_in
 
 MAX_GEARS = 20
 MAX_LIST = 200
+MAX_OBJECTS = 5000
 _STRICT = ConfigDict(extra="forbid", frozen=True)
 
 Written = StrictStr | StrictInt | StrictFloat
@@ -71,6 +72,14 @@ class RawFact(BaseModel):
     grade: StrictStr = ""
 
 
+class RawObjects(BaseModel):
+    """The motion controller's own objects, ``[objects]``."""
+
+    model_config = _STRICT
+    velocity_gain_factor: StrictFloat | StrictInt = 1.0
+    values: Annotated[dict[str, Any], Slot(max_length=MAX_OBJECTS)] = Slot(default_factory=dict)
+
+
 def _as_raw(value: Any) -> Any:
     return {"value": value} if isinstance(value, str | int | float) and not isinstance(value, bool) else value
 
@@ -122,5 +131,6 @@ def document_model() -> type[BaseModel]:
         requirement=many(RawRequirement, MAX_LIST),
         correlation=many(RawCorrelation, MAX_LIST),
         fact=many(RawFact, MAX_LIST),
+        objects=(RawObjects | None, None),
         **optional,  # type: ignore[call-overload]
     )

@@ -13,8 +13,9 @@ from typing import Any
 from actuator_lti.design.access import SECTIONS, section_of
 from actuator_lti.design.fields import Field, Structure, fields_in
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.model import Design, Parameter, Requirement, Tolerance
+from actuator_lti.design.model import ControllerObjects, Design, Parameter, Requirement, Tolerance
 from actuator_lti.design.quantities import write_limit
+from actuator_lti.design.settings_file import object_entry
 from actuator_lti.errors import InputError
 
 
@@ -46,6 +47,11 @@ def design_tree(design: Design) -> dict[str, Any]:
     tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
     tree["correlation"] = [_plain(item) for item in design.correlations]
     tree["fact"] = [_plain(item) for item in design.facts]
+    if design.objects != ControllerObjects():
+        tree["objects"] = {
+            "velocity_gain_factor": design.objects.velocity_gain_factor,
+            "values": {item.label: object_entry(item) for item in design.objects.values},
+        }
     return {key: value for key, value in tree.items() if value not in ({}, [])}
 
 

@@ -1,0 +1,259 @@
+"""Settings of the motion controller: from its own objects to a design and back, without loss."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from actuator_lti.design.access import with_values
+from actuator_lti.design.checks import check_design
+from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
+from actuator_lti.design.object_dictionary import (
+    OBJECTS,
+    PER_RPM,
+    KnownObject,
+    in_range,
+    model_value,
+    rounded_value,
+    step_of,
+)
+from actuator_lti.design.parameters import FrozenMap
+from actuator_lti.errors import InputError
+
+__all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "import_objects"]
+
+_TOLERATED = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rounding:
+    """A value that the controller's resolution cannot hold exactly: in steps of its object."""
+
+    label: str
+    path: str
+    exact: float
+    written: int
+    unit: str
+
+    def __str__(self) -> str:
+        return f"{self.label} ({self.path}): {self.exact:.9g} rounded to {self.written} {self.unit}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imported:
+    """A design with a controller's settings, and what the import did."""
+
+    design: Design
+    changed: tuple[str, ...]
+    kept: tuple[ControllerObject, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exported:
+    """A controller's settings from a design, and which values its resolution rounded."""
+
+    objects: ControllerObjects
+    rounded: tuple[Rounding, ...]
+    notes: tuple[str, ...]
+
+
+def import_objects(objects: ControllerObjects, base: Design, where: str = "settings") -> Imported:
+    """Put a controller's settings into a design.
+
+    Values that the design already holds, to the resolution of the object, stay as they are written there.
+    Objects that no key of a design holds are kept in ``design.objects`` and written back by
+    :func:`export_objects`.
+
+    Parameters
+    ----------
+    objects : ControllerObjects
+        The settings, with the calibration of the velocity gain that is to be used.
+    base : Design
+        A rotary drive with all three loops.
+    where : str
+        The file, for errors.
+
+    Raises
+    ------
+    InputError
+        If a value leaves its object's range, an object appears twice, or the design cannot hold it.
+    """
+    _check_cascade(base)
+    check_objects(objects.values, where)
+    factor = objects.velocity_gain_factor
+    changes: dict[str, float] = {}
+    kept: list[ControllerObject] = []
+    given = {(item.index, item.subindex): item.value for item in objects.values}
+    for item in objects.values:
+        known = OBJECTS.get((item.index, item.subindex))
+        if known is None or not known.paths:
+            kept += [] if known is not None and _follows(known, item.value, given) else [item]
+            continue
+        step = step_of(known, factor)
+        current = model_value(base, known)
+        if current is None or round(current / step) != item.value:
+            changes.update(dict.fromkeys(known.paths, item.value * step))
+    design = with_values(base, changes, check=False) if changes else base
+    if changes:
+        design = _sourced(design, changes, where)
+    design = replace(design, objects=objects)
+    check_design(design, where)
+    return Imported(
+        design=design, changed=tuple(changes), kept=tuple(kept), notes=_import_notes(objects, given, design)
+    )
+
+
+def _follows(known: KnownObject, value: int, given: dict[tuple[int, int], int]) -> bool:
+    """Whether an object only repeats another one (deceleration and acceleration)."""
+    return known.alias_of is not None and given.get(known.alias_of) == value
+
+
+def _sourced(design: Design, changes: Iterable[str], where: str) -> Design:
+    named = {
+        path: replace(design.parameters[path], source=f"controller settings {where}", grade="B")
+        for path in changes
+    }
+    return replace(design, parameters=FrozenMap({**design.parameters, **named}))
+
+
+def _check_cascade(design: Design) -> None:
+    control = design.controller
+    if design.axis != "rotary" or control.velocity is None or control.current is None:
+        raise InputError(
+            f"the design {design.name} cannot hold a motion controller's settings; "
+            "allowed: a rotary drive with current, velocity and position loop"
+        )
+
+
+def check_objects(values: tuple[ControllerObject, ...], where: str) -> None:
+    """Refuse duplicates and values out of their object's range."""
+    seen: set[tuple[int, int]] = set()
+    for item in values:
+        key = (item.index, item.subindex)
+        if key in seen:
+            raise InputError(f"{item.label} = {item.value}: allowed: each object once", where=where)
+        seen.add(key)
+        known = OBJECTS.get(key)
+        if known is not None and not in_range(known, item.value):
+            raise InputError(
+                f"{item.label} = {item.value}: allowed: {known.low} to {known.high} {known.unit}, "
+                f"the {known.meaning}",
+                where=where,
+            )
+        if (
+            not -(2**63) <= item.value < 2**64
+            or not 0 <= item.index <= 0xFFFF
+            or not 0 <= item.subindex <= 0xFF
+        ):
+            raise InputError(
+                f"{item.label} = {item.value}: allowed: an integer of at most 64 bits", where=where
+            )
+
+
+def _import_notes(
+    objects: ControllerObjects, given: dict[tuple[int, int], int], design: Design
+) -> tuple[str, ...]:
+    notes = []
+    if (0x2344, 1) in given:
+        per = "per rad/s" if objects.velocity_gain_factor == 1.0 else "per rpm"
+        notes.append(
+            f"velocity gain 0x2344.01 read as A s {per} "
+            f"(calibration factor {objects.velocity_gain_factor:.4g})"
+        )
+    if (0x232A, 2) in given or (0x232A, 3) in given:
+        notes.append(
+            "friction of 0x232A read as that of the whole drive at the motor; "
+            "check that it is not the motor's alone"
+        )
+    rated = given.get((0x2329, 1))
+    for key in ((0x60E0, 0), (0x60E1, 0)):
+        if rated is not None and key in given:
+            limit = given[key] * 1e-3 * rated * 1e-3
+            if limit < design.limits.peak_current_A:
+                notes.append(
+                    f"{OBJECTS[key].label} limits the torque to that of {limit:.4g} A, below the peak current"
+                )
+    first, second = given.get((0x6083, 0)), given.get((0x6084, 0))
+    if first is not None and second is not None and first != second:
+        notes.append(
+            f"deceleration 0x6084 = {second} differs from acceleration 0x6083 = {first}, "
+            "which the model uses for both"
+        )
+    if given.get((0x2347, 1), 128) != 128:
+        notes.append("0x2347.01 changes the velocity gain at target; the model leaves it out")
+    return tuple(notes)
+
+
+def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
+    """A controller's settings from a design.
+
+    Parameters
+    ----------
+    design : Design
+        A rotary drive with all three loops.
+    complete : bool, optional
+        Whether to add the objects that the imported settings did not have.  By default only a design
+        that was never imported gets all of them.
+
+    Returns
+    -------
+    Exported
+        Objects in the order in which they were imported, unknown ones as they were.
+
+    Raises
+    ------
+    InputError
+        If a value does not fit the range of its object.
+    """
+    _check_cascade(design)
+    before = design.objects
+    complete = not before.values if complete is None else complete
+    original = {(item.index, item.subindex): item.value for item in before.values}
+    written: list[ControllerObject] = []
+    rounded: list[Rounding] = []
+    for item in before.values:
+        known = OBJECTS.get((item.index, item.subindex))
+        follows = known is not None and (known.paths or _follows(known, item.value, original))
+        value = _encode(design, known, rounded) if known is not None and follows else None
+        written.append(item if value is None else replace(item, value=value))
+    missing = [known for key, known in OBJECTS.items() if key not in original]
+    for known in missing if complete else []:
+        value = _encode(design, known, rounded)
+        if value is not None:
+            written.append(ControllerObject(index=known.index, subindex=known.subindex, value=value))
+    notes = [f"velocity gain 0x2344.01 written with calibration factor {before.velocity_gain_factor:.4g}"]
+    if not complete and missing:
+        left = ", ".join(known.label for known in missing if known.paths)
+        notes += [f"not in the imported settings, so not written: {left}"] if left else []
+    return Exported(
+        objects=replace(before, values=tuple(written)), rounded=tuple(rounded), notes=tuple(notes)
+    )
+
+
+def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int | None:
+    """The integer of an object for this design; None where the design says nothing."""
+    value = model_value(design, known)
+    path = known.paths[0] if known.paths else known.meaning
+    if value is None:
+        if path in ("control.current.integral_time", "control.velocity.integral_time"):
+            raise InputError(f"{path}: missing; {known.label} needs {known.low} to {known.high} {known.unit}")
+        return None
+    step = step_of(known, design.objects.velocity_gain_factor)
+    exact = value / step
+
+    def refuse(allowed: str) -> InputError:
+        return InputError(f"{path} = {exact:.6g} {known.unit}: object {known.label}: {allowed}")
+
+    number = rounded_value(known, value, step, refuse)
+    if abs(exact - number) > _TOLERATED * max(1.0, abs(exact)):
+        rounded.append(Rounding(label=known.label, path=path, exact=exact, written=number, unit=known.unit))
+    return number
+
+
+def calibration(per: str) -> float:
+    """The calibration factor of the velocity gain: ``"rad/s"`` gives 1, ``"rpm"`` gives 9.549."""
+    factors = {"rad/s": 1.0, "rpm": PER_RPM}
+    if per not in factors:
+        raise InputError(f'velocity gain per "{per}": allowed: "rad/s" or "rpm"')
+    return factors[per]

@@ -1,0 +1,130 @@
+"""What is not wrong in a design but suspicious: one line each, for the report and the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite, pi
+
+from actuator_lti.design.model import Design
+
+
+def warnings_of(design: Design) -> tuple[str, ...]:
+    """Everything suspicious in a design, each as one line that begins with the key.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> warnings_of(load_design("ilr33-amber"))
+    ()
+    """
+    found: list[str] = []
+    for check in (_sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder):
+        found.extend(check(design))
+    return tuple(found)
+
+
+def _loops(design: Design) -> Iterator[tuple[str, object, float]]:
+    """Name, settings and period in s of each loop that the design has."""
+    control = design.controller
+    for name in ("current", "velocity", "position"):
+        loop = getattr(control, name)
+        if loop is not None:
+            yield name, loop, getattr(loop, "every", 1) * control.period_s
+
+
+def _sampling(design: Design) -> Iterator[str]:
+    control = design.controller
+    for name, loop, period in _loops(design):
+        integral = getattr(loop, "integral_time_s", None)
+        if integral is not None and integral < period:
+            yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
+    if control.computing_delay_s > 2 * control.period_s:
+        ticks = control.computing_delay_s / control.period_s
+        yield f"control.computing_delay: {ticks:.3g} ticks is unusually long (1 to 2 are common)"
+
+
+def estimated_crossovers(design: Design) -> dict[str, float]:
+    """First estimates of the loops' crossovers in rad/s, from the asymptotes; only for warnings."""
+    control, motor = design.controller, design.motor
+    found: dict[str, float] = {}
+    if control.current is not None and motor.inductance_H is not None:
+        found["current"] = control.current.gain_V_A / motor.inductance_H
+    if control.velocity is not None:
+        torque = motor.source_gain_Nm_V
+        if torque is None and motor.torque_constant_Nm_A is not None and motor.resistance_ohm is not None:
+            divisor = 1.0 if control.current is not None else motor.resistance_ohm
+            torque = motor.torque_constant_Nm_A / divisor
+        found["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
+        found["position"] = control.position.gain
+    return found
+
+
+def _crossovers(design: Design) -> Iterator[str]:
+    found = estimated_crossovers(design)
+    for name, _, period in _loops(design):
+        nyquist = pi / period
+        if found.get(name, 0.0) > 0.4 * nyquist:
+            yield (
+                f"control.{name}.gain: crossover near {found[name]:.3g} rad/s, too close to the loop's "
+                f"Nyquist frequency of {nyquist:.3g} rad/s"
+            )
+    for inner, outer in (("current", "velocity"), ("velocity", "position")):
+        if inner in found and outer in found and found[outer] > found[inner]:
+            yield (
+                f"control.{outer}.gain: crossover near {found[outer]:.3g} rad/s lies above that of the "
+                f"{inner} loop inside it, {found[inner]:.3g} rad/s"
+            )
+
+
+def _limits(design: Design) -> Iterator[str]:
+    limits, resistance = design.limits, design.motor.resistance_ohm
+    if resistance is not None:
+        stall = limits.voltage_V / resistance
+        if isfinite(limits.peak_current_A) and limits.peak_current_A > stall:
+            peak = limits.peak_current_A
+            yield f"limits.peak_current: {peak:g} A, but the supply gives only {stall:.3g} A at stall"
+
+
+def _unused(design: Design) -> Iterator[str]:
+    limits, control = design.limits, design.controller
+    if isfinite(limits.peak_current_A) and control.current is None:
+        yield "limits.peak_current: clamps nothing, the design has no current loop"
+    if control.velocity is None:
+        for key, value in (("speed", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
+            if isfinite(value):
+                yield f"limits.{key}: clamps nothing, the design has no velocity loop"
+    if design.friction.law == "tanh" and design.friction.breakaway_ratio != 1.0:
+        yield "friction.breakaway_ratio: not used by the tanh law"
+
+
+def _loads(design: Design) -> Iterator[str]:
+    largest = design.load.moment_max_Nm
+    unit = "N" if design.axis == "linear" else "N*m"
+    for load in design.validation.loads_Nm:
+        if abs(load) > largest:
+            yield f"validation.loads: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+    for item in design.requirements:
+        if abs(item.load_Nm or 0.0) > largest:
+            key = f"requirement.{item.id}.load"
+            yield f"{key}: {item.load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+
+
+def _pedigree(design: Design) -> Iterator[str]:
+    if "validation.full_deflection" not in design.parameters:
+        yield "validation.full_deflection: not given, 10 deg (linear axis: 0.01 m) assumed"
+    plant = ("motor.", "gear.", "load.", "friction.")
+    for path, item in design.parameters.items():
+        if item.grade == "X" and item.tolerance is None and path.startswith(plant):
+            yield f"{path}: an assumed value (grade X) without a tolerance"
+
+
+def _encoder(design: Design) -> Iterator[str]:
+    quantum, encoder, top = design.angle_quantum_rad, design.encoder, design.limits.speed_rad_s
+    if encoder.speed != "difference" or quantum is None or design.controller.velocity is None:
+        return
+    step = quantum / (
+        encoder.difference_samples * design.controller.velocity.every * design.controller.period_s
+    )
+    if isfinite(top) and step > 0.05 * top:
+        unit = "m/s" if design.axis == "linear" else "rad/s"
+        yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"
