@@ -1,1 +1,30 @@
-"""Under construction."""
+"""The same drive, moving: the nonlinear time-domain model that checks the linear predictions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nonlinear import commands, loads
+    from nonlinear.probe import Probe
+    from nonlinear.simulation import simulate
+    from nonlinear.trajectory import State, Trajectory
+
+__all__ = ["Probe", "State", "Trajectory", "commands", "loads", "simulate"]
+
+_WHERE = {
+    "Probe": "nonlinear.probe",
+    "State": "nonlinear.trajectory",
+    "Trajectory": "nonlinear.trajectory",
+    "simulate": "nonlinear.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
+    if name in ("commands", "loads"):
+        return import_module(f"nonlinear.{name}")
+    if name in _WHERE:
+        return getattr(import_module(_WHERE[name]), name)
+    raise AttributeError(f"module 'nonlinear' has no attribute {name!r}")

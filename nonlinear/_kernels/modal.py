@@ -1,0 +1,137 @@
+"""The slipping plant at any time, in closed form, and the instant at which its speed reaches zero.
+
+With held voltage and torque, (i, w) obeys x' = A x + b.  Written with the derivative at the start,
+w(t) = w0 + a(t) w0' + b(t) q0, where q0 = (B x0')_w, B = A - m I, B^2 = d I, and a, b are integrals of
+exp(m t) cosh(s t) and exp(m t) sinh(s t)/s, s^2 = d: the same lines hold for real and complex eigenvalues,
+and nothing large cancels.  Nearly double eigenvalues go through the matrix exponential.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.expm import exponential, plant
+
+REAL, COMPLEX, SINGLE = range(3)
+# numbers that describe one direction of slip
+KIND, CLOSE, MEAN, ROOT, M11, M12, M21, M22, MODAL = range(9)
+NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
+
+
+@kernel
+def describe(p, reverse, out, at):  # type: ignore[no-untyped-def]
+    """Write kind, mean and half difference of the eigenvalues and A at ``out[at]``."""
+    a = plant(p, reverse, 5)
+    mean = 0.5 * (a[0, 0] + a[1, 1])
+    half = 0.5 * (a[0, 0] - a[1, 1])
+    d = half * half + a[0, 1] * a[1, 0]
+    root = math.sqrt(abs(d))
+    out[at + KIND] = SINGLE if p[layout.SOURCE] > 0.0 else (COMPLEX if d < 0.0 else REAL)
+    out[at + CLOSE] = 1.0 if root < NEARLY_DOUBLE * abs(mean) else 0.0
+    out[at + MEAN], out[at + ROOT] = mean, root
+    out[at + M11], out[at + M12] = a[0, 0], a[0, 1]
+    out[at + M21], out[at + M22] = a[1, 0], a[1, 1]
+
+
+@kernel
+def phi12(x):  # type: ignore[no-untyped-def]
+    """(exp(x) - 1)/x and (exp(x) - 1 - x)/x^2."""
+    if abs(x) < 0.5:
+        total, term = 0.5, 0.5
+        for j in range(3, 18):
+            term *= x / j
+            total += term
+        return 1.0 + x * total, total
+    first = math.expm1(x) / x
+    return first, (first - 1.0) / x
+
+
+@kernel
+def phi12_complex(x, y):  # type: ignore[no-untyped-def]
+    """The same for x + j y; returns the two real and imaginary parts."""
+    z = complex(x, y)
+    if abs(z) < 0.5:
+        total, term = complex(0.5, 0.0), complex(0.5, 0.0)
+        for j in range(3, 18):
+            term = term * z / j
+            total += term
+        first, second = 1.0 + z * total, total
+    else:
+        half = math.sin(0.5 * y)
+        grown = math.exp(x)
+        difference = complex(math.expm1(x) * math.cos(y) - 2.0 * half * half, grown * math.sin(y))
+        first = difference / z
+        second = (first - 1.0) / z
+    return first.real, first.imag, second.real, second.imag
+
+
+@kernel
+def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
+    """a(t), b(t) and their integrals (real distinct or complex eigenvalues m +- s, m +- j s)."""
+    if kind == REAL:
+        e1, f1 = phi12((m + s) * t)
+        e2, f2 = phi12((m - s) * t)
+        scale = t / (2.0 * s)
+        return 0.5 * t * (e1 + e2), scale * (e1 - e2), 0.5 * t * t * (f1 + f2), t * scale * (f1 - f2)
+    er, ei, fr, fi = phi12_complex(m * t, s * t)
+    return t * er, t * ei / s, t * t * fr, t * t * fi / s
+
+
+@kernel
+def slip_at(p, modal, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+    """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
+    kind = int(modal[at + KIND])
+    if kind == SINGLE:
+        rate = modal[at + M22]
+        dw = rate * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
+        first, second = phi12(rate * t)
+        return 0.0, w + t * first * dw, th + t * (w + t * second * dw)
+    if modal[at + CLOSE] > 0.0:
+        e = exponential(plant(p, reverse, 5) * t)
+        return (
+            e[0, 0] * i + e[0, 1] * w + e[0, 3] * u + e[0, 4] * T,
+            e[1, 0] * i + e[1, 1] * w + e[1, 3] * u + e[1, 4] * T,
+            th + e[2, 0] * i + e[2, 1] * w + e[2, 3] * u + e[2, 4] * T,
+        )
+    di, dw = derivative(p, modal, at, i, w, u, T)
+    m = modal[at + MEAN]
+    a, b, a2, b2 = integrals(kind, m, modal[at + ROOT], t)
+    qi = (modal[at + M11] - m) * di + modal[at + M12] * dw
+    qw = modal[at + M21] * di + (modal[at + M22] - m) * dw
+    return i + a * di + b * qi, w + a * dw + b * qw, th + w * t + a2 * dw + b2 * qw
+
+
+@kernel
+def derivative(p, modal, at, i, w, u, T):  # type: ignore[no-untyped-def]
+    """(i', w') while slipping."""
+    if int(modal[at + KIND]) == SINGLE:
+        return 0.0, modal[at + M22] * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
+    di = modal[at + M11] * i + modal[at + M12] * w + u / p[layout.INDUCTANCE]
+    dw = modal[at + M21] * i + modal[at + M22] * w + T / p[layout.INERTIA]
+    return di, dw
+
+
+@kernel
+def first_extremum(p, modal, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
+    """First time later than ``after`` at which w' = 0; inf if there is none."""
+    kind = int(modal[at + KIND])
+    if kind == SINGLE:
+        return np.inf
+    di, dw = derivative(p, modal, at, i, w, u, T)
+    m, s = modal[at + MEAN], modal[at + ROOT]
+    q = modal[at + M21] * di + (modal[at + M22] - m) * dw
+    if q == 0.0 and (dw == 0.0 or kind == REAL):
+        return np.inf
+    if kind == COMPLEX:  # dw cos(s t) + q sin(s t)/s = 0
+        step = math.pi / s
+        t = math.atan2(-s * dw, q) / s
+        return t + step * max(math.ceil((after - t) / step), 0.0)
+    ratio = -dw / q  # tanh(s t)/s
+    t = ratio
+    if s > 0.0:
+        t = math.atanh(s * ratio) / s if abs(s * ratio) < 1.0 else np.inf
+    return t if t > after else np.inf

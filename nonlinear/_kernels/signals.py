@@ -1,0 +1,67 @@
+"""The value of a command, a bias or an injected signal at a tick."""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import kernel
+
+TWO_PI = 2.0 * math.pi
+NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
+TRIANGLE, CHIRP, LOG_CHIRP = layout.TRIANGLE, layout.CHIRP, layout.LOG_CHIRP
+
+
+@kernel
+def triangle_wave(cycles):  # type: ignore[no-untyped-def]
+    """Triangle of amplitude 1 in phase with sin(2 pi cycles)."""
+    x = cycles + 0.25
+    x -= math.floor(x)
+    return 4.0 * x - 1.0 if x < 0.5 else 3.0 - 4.0 * x
+
+
+@kernel
+def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
+    """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
+    x = min(s, span)
+    if kind == CHIRP:
+        cycles = f0 * x + 0.5 * (f1 - f0) * x * x / span
+    else:
+        rate = math.log(f1 / f0) / span
+        cycles = f0 * x if rate == 0.0 else f0 * math.expm1(rate * x) / rate
+    return cycles + f1 * max(s - span, 0.0)
+
+
+@kernel
+def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
+    """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
+
+    Numbers: kind, amplitude, start time, then frequency and phase (sine, triangle), stop time (ramp),
+    f0, f1 and span (chirps), offset and length in ``tables`` (table: held after its end).
+    """
+    kind = int(row[at])
+    if kind == NONE:
+        return 0.0
+    amplitude = row[at + 1]
+    if kind == layout.TABLE:
+        offset, length = int(row[at + 3]), int(row[at + 4])
+        return amplitude * tables[offset + min(k, length - 1)]
+    s = k * period - row[at + 2]
+    if s < -1e-9 * period:
+        return 0.0
+    if kind == SINE:
+        return amplitude * math.sin(TWO_PI * row[at + 3] * s + row[at + 4])
+    if kind == STEP:
+        return amplitude
+    if kind == RAMP:
+        return amplitude * min(s, row[at + 3])
+    if kind == TRIANGLE:
+        return amplitude * triangle_wave(row[at + 3] * s + row[at + 4] / TWO_PI)
+    return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
+
+
+@kernel
+def fill(row, at, tables, period, out):  # type: ignore[no-untyped-def]
+    """Sample a signal at every tick."""
+    for k in range(out.shape[0]):
+        out[k] = signal(row, at, tables, k, period)

@@ -1,0 +1,246 @@
+"""What the drive is asked to do: angles of the output shaft against time.
+
+Every command begins at zero before its start time, takes amplitudes in rad at the output shaft (m on a
+linear axis) and is sampled at the ticks.  The same objects serve as bias motion and, with the unit of the
+break point, as the injected signal of a `Probe`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, pi
+from os import PathLike
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A signal of time; built by the functions of this module.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the function that built it.
+    code : int
+        Kind as the kernel knows it.
+    numbers : tuple of float
+        Amplitude, start time and what the kind needs (see ``_kernels.signals``).
+    highest_hz : float
+        Highest frequency asked for, 0 where that has no meaning.
+    end_s : float
+        When it is over; inf where it goes on.
+    samples : ndarray or None
+        Times (s) and values of a tabulated command, shape (2, m).
+    """
+
+    kind: str
+    code: int
+    numbers: tuple[float, ...]
+    highest_hz: float = 0.0
+    end_s: float = float("inf")
+    samples: Floats | None = None
+
+    def table(self, period_s: float, ticks: int) -> Floats | None:
+        """Values at the ticks of a tabulated command, linear between its points; ``None`` for the others."""
+        if self.samples is None:
+            return None
+        times, values = self.samples
+        count = min(ticks, int(np.ceil(times[-1] / period_s - 1e-9)) + 1)
+        return np.interp(np.arange(max(count, 1)) * period_s, times, values)
+
+    def values(self, period_s: float, ticks: int) -> Floats:
+        """Value at each of the first ``ticks`` ticks, as the simulator sees it."""
+        from nonlinear._kernels.signals import fill
+
+        row, table = np.zeros(at.SIGNAL_SIZE), self.table(period_s, ticks)
+        write(self, row, 0, 0, 0 if table is None else table.size)
+        out = np.empty(ticks)
+        fill(row, 0, np.zeros(1) if table is None else table, period_s, out)
+        return out
+
+
+def write(command: Command, row: Floats, place: int, offset: int, length: int) -> None:
+    """Write a command into a parameter row; ``offset`` and ``length`` locate its table, if it has one."""
+    row[place] = command.code
+    if command.code == at.TABLE:
+        row[place + 1] = 1.0
+        row[place + 3], row[place + 4] = offset, length
+        return
+    row[place + 1 : place + 1 + len(command.numbers)] = command.numbers
+
+
+def _finite(kind: str, **values: float) -> None:
+    for name, value in values.items():
+        if not isfinite(value):
+            raise InputError(f"command {kind}: {name} = {value}: must be a finite number")
+
+
+def _positive(kind: str, **values: float) -> None:
+    _finite(kind, **values)
+    for name, value in values.items():
+        if value <= 0.0:
+            raise InputError(f"command {kind}: {name} = {value}: must be positive")
+
+
+def hold(angle_rad: float = 0.0) -> Command:
+    """Hold an angle from the first tick on (zero: stand still)."""
+    _finite("hold", angle_rad=angle_rad)
+    return Command("hold", at.STEP, (angle_rad, -1.0))
+
+
+def step(amplitude_rad: float, start_s: float = 0.0) -> Command:
+    """Step of the output angle at ``start_s``.
+
+    Examples
+    --------
+    >>> step(0.1, start_s=0.002).values(1e-3, 4).tolist()
+    [0.0, 0.0, 0.1, 0.1]
+    """
+    _finite("step", amplitude_rad=amplitude_rad, start_s=start_s)
+    return Command("step", at.STEP, (amplitude_rad, start_s))
+
+
+def ramp(rate_rad_s: float, start_s: float = 0.0, stop_s: float = float("inf")) -> Command:
+    """Constant speed of the output from ``start_s`` to ``stop_s``, held afterwards."""
+    _finite("ramp", rate_rad_s=rate_rad_s, start_s=start_s)
+    if not stop_s > start_s:
+        raise InputError(f"command ramp: stop_s = {stop_s}: must be later than start_s = {start_s}")
+    return Command("ramp", at.RAMP, (rate_rad_s, start_s, stop_s - start_s))
+
+
+def sine(amplitude_rad: float, frequency_hz: float, phase_rad: float = 0.0, start_s: float = 0.0) -> Command:
+    """``amplitude sin(2 pi f (t - start) + phase)``, peak amplitude at the output shaft."""
+    _finite("sine", amplitude_rad=amplitude_rad, phase_rad=phase_rad, start_s=start_s)
+    _positive("sine", frequency_hz=frequency_hz)
+    return Command("sine", at.SINE, (amplitude_rad, start_s, frequency_hz, phase_rad), frequency_hz)
+
+
+def triangle(amplitude_rad: float, frequency_hz: float, start_s: float = 0.0) -> Command:
+    """Triangle of peak ``amplitude_rad`` that starts at zero, rising."""
+    _finite("triangle", amplitude_rad=amplitude_rad, start_s=start_s)
+    _positive("triangle", frequency_hz=frequency_hz)
+    return Command("triangle", at.TRIANGLE, (amplitude_rad, start_s, frequency_hz, 0.0), frequency_hz)
+
+
+def chirp(
+    amplitude_rad: float,
+    from_hz: float,
+    to_hz: float,
+    span_s: float,
+    *,
+    logarithmic: bool = True,
+    start_s: float = 0.0,
+) -> Command:
+    """Sine whose frequency runs from ``from_hz`` to ``to_hz`` over ``span_s``; it stays there afterwards."""
+    _finite("chirp", amplitude_rad=amplitude_rad, start_s=start_s)
+    _positive("chirp", from_hz=from_hz, to_hz=to_hz, span_s=span_s)
+    code = at.LOG_CHIRP if logarithmic else at.CHIRP
+    numbers = (amplitude_rad, start_s, from_hz, to_hz, span_s)
+    return Command("chirp", code, numbers, max(from_hz, to_hz), start_s + span_s)
+
+
+def stepped_sine(
+    amplitude_rad: float,
+    frequencies_hz: Sequence[float],
+    cycles: int,
+    period_s: float,
+    *,
+    settle_cycles: int = 2,
+) -> Command:
+    """Sines one after another, ``settle_cycles + cycles`` whole periods each, joined without a jump.
+
+    ``period_s`` is the tick of the drive; the table is exact at the ticks.
+    """
+    _finite("stepped_sine", amplitude_rad=amplitude_rad)
+    for frequency in frequencies_hz:
+        _positive("stepped_sine", frequencies_hz=frequency)
+    if cycles < 1 or settle_cycles < 0 or not len(frequencies_hz):
+        raise InputError("command stepped_sine: at least one frequency and one cycle needed")
+    f = np.asarray(frequencies_hz, dtype=float)
+    ends = np.cumsum((cycles + settle_cycles) / f)
+    t = np.arange(int(np.ceil(ends[-1] / period_s)) + 1) * period_s
+    which = np.minimum(np.searchsorted(ends, t, side="right"), f.size - 1)
+    begins = np.concatenate(([0.0], ends[:-1]))[which]
+    values = amplitude_rad * np.sin(2.0 * pi * f[which] * (t - begins))
+    values[t >= ends[-1]] = 0.0
+    return Command("stepped_sine", at.TABLE, (), float(f.max()), float(ends[-1]), np.vstack([t, values]))
+
+
+def multisine(
+    amplitude_rad: float,
+    frequencies_hz: Sequence[float],
+    duration_s: float,
+    period_s: float,
+    *,
+    seed: int = 0,
+) -> Command:
+    """Sum of equal sines with random phases from ``seed``, scaled to the peak ``amplitude_rad``."""
+    _finite("multisine", amplitude_rad=amplitude_rad)
+    _positive("multisine", duration_s=duration_s, period_s=period_s)
+    for frequency in frequencies_hz:
+        _positive("multisine", frequencies_hz=frequency)
+    if not len(frequencies_hz):
+        raise InputError("command multisine: at least one frequency needed")
+    f = np.asarray(frequencies_hz, dtype=float)
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * pi, f.size)
+    t = np.arange(round(duration_s / period_s) + 1) * period_s
+    values = np.zeros(t.size)
+    for frequency, phase in zip(f, phases, strict=True):
+        values += np.sin(2.0 * pi * frequency * t + phase)
+    values *= amplitude_rad / np.abs(values).max()
+    return Command("multisine", at.TABLE, (), float(f.max()), float(t[-1]), np.vstack([t, values]))
+
+
+def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "record") -> Command:
+    """Recorded command: angles at times, linear between them, the last held.
+
+    Raises
+    ------
+    InputError
+        If times or angles are not finite, do not rise, or have a hole: a gap longer than 1.5 times the
+        median interval.
+    """
+    times, values = np.asarray(time_s, dtype=float).ravel(), np.asarray(angle_rad, dtype=float).ravel()
+    if times.size != values.size or times.size < 2:
+        raise InputError(
+            f"{times.size} times and {values.size} angles: equal numbers, at least 2, needed", where
+        )
+    for name, array in (("time", times), ("angle", values)):
+        bad = np.flatnonzero(~np.isfinite(array))
+        if bad.size:
+            raise InputError(f"{name} in row {bad[0] + 1} = {array[bad[0]]}: must be finite", where)
+    gaps = np.diff(times)
+    if (gaps <= 0.0).any():
+        k = int(np.argmax(gaps <= 0.0))
+        raise InputError(
+            f"time in row {k + 2} = {times[k + 1]:g} s: must be later than {times[k]:g} s", where
+        )
+    usual = float(np.median(gaps))
+    if gaps.max() > 1.5 * usual:
+        k = int(np.argmax(gaps))
+        hole = f"hole in time from {times[k]:g} s to {times[k + 1]:g} s (rows {k + 1}, {k + 2})"
+        raise InputError(f"{hole}: intervals up to 1.5 times the usual {usual:g} s are allowed", where)
+    times = times - times[0]
+    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]))
+
+
+def recorded(
+    path: str | PathLike[str], *, time_column: str | int = 0, angle_column: str | int = 1, unit: str = "deg",
+    delimiter: str = ",",
+) -> Command:  # fmt: skip
+    """Recorded command from a CSV file with a header line: times in s, angles in ``unit`` (deg or rad)."""
+    from nonlinear.records import read_columns
+
+    scale = {"deg": pi / 180.0, "rad": 1.0, "m": 1.0}.get(unit)
+    if scale is None:
+        raise InputError(f"unit = {unit!r}: must be deg, rad or m", where=str(path))
+    times, angles = read_columns(path, (time_column, angle_column), delimiter)
+    return sampled(times, angles * scale, where=str(path))

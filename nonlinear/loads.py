@@ -1,0 +1,50 @@
+"""Hinge moments at the output shaft: constant, a time series, or proportional to the output angle.
+
+The moment is held over each tick at its value at the tick.  Through a self-locking gear it only adds
+friction ``CM |M|``; through a back-drivable one it also turns the motor shaft with ``M/N``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.errors import InputError
+from nonlinear.commands import Command, sampled
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoadMoment:
+    """``M = constant + slope * output angle + series(t)`` in N m (N on a linear axis)."""
+
+    constant_Nm: float = 0.0
+    slope_Nm_rad: float = 0.0
+    series: Command | None = None
+
+
+def constant(moment_Nm: float) -> LoadMoment:
+    """The same moment all the time."""
+    if not np.isfinite(moment_Nm):
+        raise InputError(f"load_Nm = {moment_Nm}: must be a finite number")
+    return LoadMoment(constant_Nm=float(moment_Nm))
+
+
+def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
+    """Hinge moment ``offset + slope * output angle``; a negative slope pulls the canard back."""
+    if not (np.isfinite(slope_Nm_rad) and np.isfinite(offset_Nm)):
+        raise InputError(f"load slope = {slope_Nm_rad}, offset = {offset_Nm}: must be finite numbers")
+    return LoadMoment(constant_Nm=float(offset_Nm), slope_Nm_rad=float(slope_Nm_rad))
+
+
+def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike) -> LoadMoment:
+    """Recorded or given moments at times (from 0), linear between them, the last held; holes are refused."""
+    return LoadMoment(series=sampled(time_s, moment_Nm, where="load series"))
+
+
+def as_load(load: float | LoadMoment) -> LoadMoment:
+    """A plain number is a constant moment."""
+    return load if isinstance(load, LoadMoment) else constant(load)

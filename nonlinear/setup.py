@@ -1,0 +1,122 @@
+"""Commands, loads, probes and the initial state written into a run's row and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear.commands import Command, write
+from nonlinear.loads import LoadMoment
+from nonlinear.probe import Probe, write_probe
+from nonlinear.trajectory import State
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass
+class Tables:
+    """All time series of one or many runs, end to end; a run knows offsets and lengths."""
+
+    parts: list[Floats] = field(default_factory=list)
+    size: int = 0
+    known: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+    def add(self, values: Floats, key: object = None) -> tuple[int, int]:
+        """Append a series; returns its offset and length.  The same ``key`` object is stored only once."""
+        if key is not None and id(key) in self.known:
+            return self.known[id(key)]
+        place = (self.size, values.size)
+        self.parts.append(np.ascontiguousarray(values, dtype=float))
+        self.size += values.size
+        if key is not None:
+            self.known[id(key)] = place
+        return place
+
+    def joined(self) -> Floats:
+        """One array for the kernel."""
+        return np.concatenate(self.parts) if self.parts else np.zeros(1)
+
+
+def ticks_of(duration_s: float, period_s: float) -> int:
+    """Number of ticks in a duration, rounded; refuses a duration without any."""
+    if not isfinite(duration_s):
+        raise InputError(f"duration_s = {duration_s}: must be a finite number of seconds")
+    ticks = round(duration_s / period_s)
+    if ticks < 1:
+        raise InputError(f"duration_s = {duration_s:g}: must hold at least one tick of {period_s:g} s")
+    return ticks
+
+
+def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> None:
+    """Write a command at a place of the row, its table beside the others."""
+    table = command.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+    offset, length = (0, 0) if table is None else tables.add(table)
+    write(command, row, place, offset, length)
+
+
+def check_frequency(design: Design, command: Command) -> None:
+    """Refuse a command that the position loop, sampled every n_p ticks, cannot follow in principle."""
+    nyquist = 0.5 / (design.controller.period_s * design.controller.position.every)
+    if command.highest_hz >= nyquist:
+        message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
+        raise InputError(f"{message} of the position loop, {nyquist:g} Hz", where=design.name)
+
+
+def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
+    """Write the hinge moment."""
+    row[at.LOAD], row[at.LOAD_SLOPE] = load.constant_Nm, load.slope_Nm_rad
+    if load.series is not None:
+        table = load.series.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+        if table is not None:
+            row[at.LOAD_TABLE], row[at.LOAD_TABLE_LENGTH] = tables.add(table)
+
+
+def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
+    """Write an extra torque at the motor shaft: a number, or one value a tick."""
+    values = np.atleast_1d(np.asarray(torque_Nm, dtype=float))
+    if not np.isfinite(values).all():
+        raise InputError("disturbance_Nm holds values that are not finite")
+    row[at.TORQUE_TABLE], row[at.TORQUE_TABLE_LENGTH] = tables.add(values)
+
+
+def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
+    """Write the probes, at most one a point."""
+    seen = set()
+    for probe in probes:
+        if probe.point in seen:
+            raise InputError(f"two probes at {probe.point}: one a point is allowed")
+        seen.add(probe.point)
+        _check_point(row, probe.point)
+        place = write_probe(probe, row)
+        if isinstance(probe.injection, Command):
+            put_signal(row, place, probe.injection, tables)
+        elif probe.injection is not None:
+            offset, length = tables.add(np.asarray(probe.injection, dtype=float))
+            row[place], row[place + 1] = at.TABLE, 1.0
+            row[place + 3], row[place + 4] = offset, length
+
+
+def _check_point(row: Floats, point: str) -> None:
+    missing = (point == "w_ref" and not row[at.HAS_VELOCITY]) or (
+        point == "i_ref" and not row[at.HAS_CURRENT]
+    )
+    if missing:
+        raise InputError(f"probe point = {point!r}: this design has no such stage")
+
+
+def put_state(row: Floats, state: State) -> None:
+    """Write the initial state."""
+    row[at.ANGLE_START], row[at.SPEED_START] = state.motor_angle_rad, state.motor_speed_rad_s
+    row[at.CURRENT_START] = 0.0 if row[at.SOURCE] else state.current_A
+    row[at.CURRENT_INTEGRATOR_START] = state.current_integral_V
+    row[at.VELOCITY_INTEGRATOR_START] = state.velocity_integral
+    row[at.SPEED_COMMAND_START] = state.speed_command_rad_s
+    row[at.CURRENT_COMMAND_START] = state.current_command_A
+    row[at.VOLTAGE_START] = state.voltage_V

@@ -1,0 +1,184 @@
+"""Simulate one run: check, convert, call the kernel, wrap."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from threading import Thread
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from nonlinear._kernels import layout as at
+from nonlinear.commands import Command
+from nonlinear.loads import LoadMoment, as_load
+from nonlinear.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
+from nonlinear.probe import Probe
+from nonlinear.setup import (
+    Tables,
+    check_frequency,
+    put_load,
+    put_probes,
+    put_signal,
+    put_state,
+    put_torque,
+    ticks_of,
+)
+from nonlinear.trajectory import STATUS, State, Trajectory
+from nonlinear.wrap import wrap
+
+Floats = npt.NDArray[np.float64]
+LARGEST_HISTORY_BYTES = 4e9
+Progress = Callable[[int, int], None]
+
+
+def simulate(
+    design: Design,
+    command: Command,
+    duration_s: float,
+    load_Nm: float | LoadMoment = 0.0,
+    *,
+    bias: Command | None = None,
+    probes: Sequence[Probe] = (),
+    initial: State | None = None,
+    disturbance_Nm: npt.ArrayLike | None = None,
+    friction_on: bool = True,
+    limits_on: bool = True,
+    energy: bool = False,
+    record_every: int = 1,
+    tanh_tolerance: float = TANH_TOLERANCE,
+    max_events: int = MAX_EVENTS_PER_TICK,
+    raise_on_failure: bool = True,
+    progress: Progress | None = None,
+) -> Trajectory:
+    """Run the sampled cascade on the nonlinear drive (model.md sections 1 and 2).
+
+    Between events the slipping plant is propagated exactly; zero crossings of the speed, stick and breakaway
+    are located inside the tick in closed form, so there is no integration error (the tanh law: see
+    ``tanh_tolerance``).
+
+    Parameters
+    ----------
+    design : Design
+    command : Command
+        Output angle against time, from `nonlinear.commands`.
+    duration_s : float
+        Rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
+    load_Nm : float or LoadMoment
+        Hinge moment at the output shaft, held over each tick.  The slope in the design file is not added by
+        itself: pass ``loads.proportional(design.load.moment_slope_Nm_rad)``.
+    bias : Command, optional
+        Motion added under the command, in the same unit.
+    probes : sequence of Probe
+        Instruments at break points.
+    initial : State, optional
+        Default: everything at rest at zero.
+    disturbance_Nm : array_like, optional
+        Extra torque at the motor shaft, one value a tick (the last is held).
+    friction_on, limits_on : bool
+        ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
+    energy : bool
+        Integrate the energies (some ten times slower).
+    record_every : int
+        Keep every so many rows.
+    tanh_tolerance : float
+        Relative accuracy asked of one tick under the tanh law; sets its sub-steps.
+    max_events : int
+        Most events in one tick before the run is given up.
+    raise_on_failure : bool
+        ``False`` returns a failed run with its status instead; rows not reached are NaN.
+    progress : callable, optional
+        Called as ``progress(done, total)`` in ticks from time to time.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    InputError
+        For a command faster than the Nyquist frequency of the position loop, a duration of no tick, values
+        that are not finite, a probe at a stage that the design does not have.
+    NumericalError
+        If the run ends early (state not finite, too many events in a tick).
+
+    Notes
+    -----
+    At a zero crossing the rotor rests while ``|drive torque| <= Tc * breakaway_ratio``, as model.md says of
+    stick; it passes through otherwise.  Counts are the floor of angle times counts per rad; they enter the
+    speed estimate by difference only, the position controller sees the angle itself.  The reference before the
+    first tick is the initial angle (feed-forward by backward difference).
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> from nonlinear import commands, simulate
+    >>> run = simulate(load_design("ilr33-amber"), commands.step(0.01), duration_s=0.1)
+    >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
+    (1000, True)
+    """
+    row = design_row(design, friction_on=friction_on, limits_on=limits_on)
+    row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
+    row[at.WITH_ENERGY] = energy
+    row[at.TANH_TOLERANCE], row[at.MAX_EVENTS] = tanh_tolerance, max_events
+    if record_every < 1:
+        raise InputError(f"record_every = {record_every}: must be at least 1")
+    row[at.RECORD_EVERY] = record_every
+    tables = Tables()
+    for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):
+        if signal is not None:
+            check_frequency(design, signal)
+            put_signal(row, place, signal, tables)
+    put_load(row, as_load(load_Nm), tables)
+    if disturbance_Nm is not None:
+        put_torque(row, disturbance_Nm, tables)
+    put_probes(row, probes, tables)
+    put_state(row, initial or State())
+    trajectory = run_row(design, row, tables.joined(), progress)
+    if raise_on_failure and trajectory.status != "ok":
+        reached = trajectory.period_s * float(np.isfinite(trajectory.output_angle_rad).sum()) * record_every
+        raise NumericalError(f"run stopped at {reached:.6g} s ({trajectory.status}): {trajectory.advice}")
+    return trajectory
+
+
+def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | None = None) -> Trajectory:
+    """Run one row of parameters with its history."""
+    ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
+    probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
+    rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
+    if 8.0 * rows * columns > LARGEST_HISTORY_BYTES:
+        message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
+        raise InputError(f"{message}; use record_every, or simulate_many with reducers")
+    history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint8)
+    out = np.zeros(at.OUT_SIZE)
+    status = _call(row, tables, history, flags, out, progress)
+    done = (int(out[at.OUT_TICKS]) + every - 1) // every
+    history[:, done:] = np.nan
+    digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
+    return wrap(design, row, history, flags, out, STATUS[status], probing, digest)
+
+
+def _call(
+    row: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None
+) -> int:
+    """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
+    from nonlinear._kernels.run import run
+
+    shared = np.zeros(2)
+    if progress is None:
+        return int(run(row, tables, history, flags, out, shared))
+    result: list[int] = []
+    thread = Thread(target=lambda: result.append(int(run(row, tables, history, flags, out, shared))))
+    thread.start()
+    total = int(row[at.TICKS])
+    try:
+        while thread.is_alive():
+            thread.join(0.1)
+            progress(int(shared[0]), total)
+    except BaseException:
+        shared[1] = 1.0
+        thread.join()
+        raise
+    return result[0]

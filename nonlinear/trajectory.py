@@ -1,0 +1,236 @@
+"""What comes back from one simulated run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from nonlinear._kernels import layout as at
+
+if TYPE_CHECKING:
+    import pandas
+
+Floats = npt.NDArray[np.float64]
+Status = Literal["ok", "too many events", "not finite", "cancelled"]
+STATUS: dict[int, Status] = {
+    at.OK: "ok",
+    at.TOO_MANY_EVENTS: "too many events",
+    at.NOT_FINITE: "not finite",
+    at.CANCELLED: "cancelled",
+}
+ADVICE: dict[Status, str] = {
+    "ok": "",
+    "too many events": "the speed crosses zero too often in one tick: check the friction and the tick, or "
+    "raise max_events",
+    "not finite": "the state grew without bound: the loop is unstable; lower the gain or set limits",
+    "cancelled": "the run was stopped before its end",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitUse:
+    """How long one limiter acted: its limit, fraction of the ticks, first time (``None``: never)."""
+
+    limit: float
+    unit: str
+    fraction: float
+    first_time_s: float | None
+
+    @property
+    def active(self) -> bool:
+        """Whether it ever acted."""
+        return self.first_time_s is not None
+
+
+@dataclass(frozen=True, kw_only=True)
+class State:
+    """State of the drive at an instant, motor side; also what a run may start from.
+
+    Beside these, past encoder readings are taken as those of constant speed, past voltages as ``voltage_V``.
+    """
+
+    motor_angle_rad: float = 0.0
+    motor_speed_rad_s: float = 0.0
+    current_A: float = 0.0
+    current_integral_V: float = 0.0
+    velocity_integral: float = 0.0
+    speed_command_rad_s: float = 0.0
+    current_command_A: float = 0.0
+    voltage_V: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Energy:
+    """Where the electrical energy of a run went, all in J.
+
+    ``input = copper + magnetic + kinetic + friction (dry, viscous, offset) + output work + conversion``;
+    ``conversion`` is ``(kE - kM) i w`` integrated, zero for a motor whose constants agree.
+    """
+
+    electrical_input_J: float
+    copper_loss_J: float
+    magnetic_J: float
+    kinetic_J: float
+    dry_friction_J: float
+    viscous_friction_J: float
+    offset_friction_J: float
+    output_work_J: float
+    conversion_J: float
+
+    @property
+    def balance_error_J(self) -> float:
+        """Input less everything it became; zero but for rounding."""
+        out = (
+            self.copper_loss_J
+            + self.magnetic_J
+            + self.kinetic_J
+            + self.dry_friction_J
+            + self.viscous_friction_J
+        )
+        return self.electrical_input_J - (
+            out + self.offset_friction_J + self.output_work_J + self.conversion_J
+        )
+
+    @property
+    def relative_error(self) -> float:
+        """Balance error over the largest term."""
+        terms = [abs(value) for value in vars(self).values()]
+        return abs(self.balance_error_J) / max(max(terms), 1e-300)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbeRecord:
+    """Signals in front of and behind a probe, one value a row, in the unit of the point."""
+
+    point: str
+    before: Floats
+    after: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """One run: a row a tick, sampled at t_k; motor side unless a name says output or reference.
+
+    ``voltage_V`` is what the controller computes at t_k (it acts from t_k + d); ``current_command_A`` and
+    ``speed_command_rad_s`` are held between their updates and zero where the design has no such stage; the
+    current of an ideal torque source is zero.  On a linear axis read m for rad, N for N m.
+
+    Attributes
+    ----------
+    limit_flags : ndarray of uint8
+        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest.
+    limits : mapping
+        `LimitUse` by name: speed, acceleration, current, voltage.
+    events : int
+        Landings, breakaways and reversals; ``events_per_tick`` is the most in one tick.
+    stick_fraction : float
+        Fraction of the ticks that began at rest.
+    energy : Energy or None
+        If asked for.
+    final : State
+        State after the last tick.
+    parameters_hash : str
+        SHA-256 of the kernel's parameters.
+    """
+
+    design_name: str
+    axis: str
+    period_s: float
+    time_s: Floats
+    reference_rad: Floats
+    output_angle_rad: Floats
+    motor_angle_rad: Floats
+    motor_speed_rad_s: Floats
+    current_A: Floats
+    voltage_V: Floats
+    current_command_A: Floats
+    speed_command_rad_s: Floats
+    limit_flags: npt.NDArray[np.uint8]
+    limits: Mapping[str, LimitUse]
+    events: int
+    events_per_tick: int
+    stick_fraction: float
+    status: Status
+    final: State
+    energy: Energy | None = None
+    probes: Mapping[str, ProbeRecord] = field(default_factory=dict)
+    parameters_hash: str = ""
+
+    @property
+    def probe_before(self) -> Floats:
+        """Signal in front of the first probe."""
+        return next(iter(self.probes.values())).before
+
+    @property
+    def probe_after(self) -> Floats:
+        """Signal behind the first probe."""
+        return next(iter(self.probes.values())).after
+
+    @property
+    def advice(self) -> str:
+        """What to do about a status that is not ok."""
+        return ADVICE[self.status]
+
+    def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
+        """Rows in which a limiter acts."""
+        return (self.limit_flags & (1 << at.LIMITERS.index(name))) != 0
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Every column by name, with its unit as suffix."""
+        names = (
+            "time_s",
+            "reference_rad",
+            "output_angle_rad",
+            "motor_angle_rad",
+            "motor_speed_rad_s",
+            "current_A",
+            "voltage_V",
+            "current_command_A",
+            "speed_command_rad_s",
+        )
+        linear = self.axis == "linear"
+        out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
+        for name in at.LIMITERS:
+            out[f"{name}_limit_active"] = self.limit_active(name)
+        out["at_rest"] = (self.limit_flags & at.FLAG_STICK) != 0
+        for record in self.probes.values():
+            out[f"probe_{record.point}_before"], out[f"probe_{record.point}_after"] = (
+                record.before,
+                record.after,
+            )
+        return out
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A data frame with one row a tick; name, hash and status in ``attrs``."""
+        import pandas
+
+        frame = pandas.DataFrame(self.columns())
+        frame.attrs = {"design": self.design_name, "parameters": self.parameters_hash, "status": self.status}
+        return frame
+
+    def to_csv(self, path: str | PathLike[str]) -> None:
+        """Write a CSV file (comma, point, 17 digits); the header carries the units."""
+        from nonlinear.export import write_csv
+
+        write_csv(self, path)
+
+    def to_parquet(self, path: str | PathLike[str]) -> None:
+        """Write a Parquet file, the design's name and the parameters' hash in its metadata."""
+        from nonlinear.export import write_parquet
+
+        write_parquet(self, path)
+
+    def __repr__(self) -> str:
+        used = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in self.limits.items() if use.active]
+        peak = float(np.abs(self.output_angle_rad).max()) if self.time_s.size else 0.0
+        size = f"{peak:.4g} m" if self.axis == "linear" else f"{np.degrees(peak):.4g} deg"
+        return (
+            f"Trajectory({self.design_name}: {self.time_s.size} rows of {self.period_s:g} s, "
+            f"output up to {size}, current up to {np.abs(self.current_A).max(initial=0.0):.3g} A, "
+            f"limits: {', '.join(used) or 'none'}; {self.events} events, status {self.status})"
+        )

@@ -1,0 +1,93 @@
+"""The kernel's arrays as a `Trajectory`."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout as at
+from nonlinear.trajectory import Energy, LimitUse, ProbeRecord, State, Status, Trajectory
+
+Floats = npt.NDArray[np.float64]
+
+
+def wrap(
+    design: Design, row: Floats, history: Floats, flags: npt.NDArray[np.uint8], out: Floats, status: Status,
+    probing: list[str], digest: str,
+) -> Trajectory:  # fmt: skip
+    """Name the columns and the results of one run."""
+    period = float(row[at.PERIOD])
+    probes = {
+        point: ProbeRecord(
+            point=point,
+            before=history[at.HISTORY_PROBES + 2 * k],
+            after=history[at.HISTORY_PROBES + 2 * k + 1],
+        )
+        for k, point in enumerate(probing)
+    }
+    return Trajectory(
+        design_name=design.name,
+        axis=design.axis,
+        period_s=period,
+        time_s=np.arange(history.shape[1]) * (period * row[at.RECORD_EVERY]),
+        **{name: history[k] for k, name in enumerate(at.SIGNALS[: at.BASE_SIGNALS])},
+        motor_angle_rad=history[at.HISTORY_ANGLE],
+        limit_flags=flags,
+        limits=limit_uses(row, out, design.axis),
+        events=int(out[at.OUT_EVENTS]),
+        events_per_tick=int(out[at.OUT_MAX_EVENTS]),
+        stick_fraction=float(out[at.OUT_STICK_TICKS] / row[at.TICKS]),
+        status=status,
+        final=final_state(out),
+        energy=energy_of(row, out) if row[at.WITH_ENERGY] else None,
+        probes=probes,
+        parameters_hash=digest,
+    )
+
+
+def limit_uses(row: Floats, out: Floats, axis: str = "rotary") -> dict[str, LimitUse]:
+    """How long each limiter acted."""
+    places = (at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT, at.VOLTAGE_LIMIT)
+    units = ("m/s", "m/s2", "A", "V") if axis == "linear" else ("rad/s", "rad/s2", "A", "V")
+    uses = {}
+    for k, name in enumerate(at.LIMITERS):
+        first = out[at.OUT_LIMIT_FIRST + k]
+        uses[name] = LimitUse(
+            limit=float(row[places[k]]),
+            unit=units[k],
+            fraction=float(out[at.OUT_LIMIT_TICKS + k] / max(out[at.OUT_TICKS], 1.0)),
+            first_time_s=None if first < 0 else float(first * row[at.PERIOD]),
+        )
+    return uses
+
+
+def final_state(out: Floats) -> State:
+    """State after the last tick."""
+    return State(
+        motor_angle_rad=float(out[at.OUT_ANGLE]),
+        motor_speed_rad_s=float(out[at.OUT_SPEED]),
+        current_A=float(out[at.OUT_CURRENT]),
+        current_integral_V=float(out[at.OUT_CURRENT_INTEGRATOR]),
+        velocity_integral=float(out[at.OUT_VELOCITY_INTEGRATOR]),
+        speed_command_rad_s=float(out[at.OUT_SPEED_COMMAND]),
+        current_command_A=float(out[at.OUT_CURRENT_COMMAND]),
+        voltage_V=float(out[at.OUT_VOLTAGE]),
+    )
+
+
+def energy_of(row: Floats, out: Floats) -> Energy:
+    """Energies of the run: integrals from the kernel, stored energies from the end states."""
+    e = out[at.OUT_ENERGY : at.OUT_ENERGY + at.ENERGY_SIZE]
+    stored = 0.0 if row[at.SOURCE] else 0.5 * row[at.INDUCTANCE]
+    return Energy(
+        electrical_input_J=float(e[at.ENERGY_INPUT]),
+        copper_loss_J=float(e[at.ENERGY_COPPER]),
+        magnetic_J=float(stored * (out[at.OUT_CURRENT] ** 2 - row[at.CURRENT_START] ** 2)),
+        kinetic_J=float(0.5 * row[at.INERTIA] * (out[at.OUT_SPEED] ** 2 - row[at.SPEED_START] ** 2)),
+        dry_friction_J=float(e[at.ENERGY_DRY]),
+        viscous_friction_J=float(e[at.ENERGY_VISCOUS]),
+        offset_friction_J=float(e[at.ENERGY_OFFSET]),
+        output_work_J=float(e[at.ENERGY_LOAD]),
+        conversion_J=float(e[at.ENERGY_CONVERSION]),
+    )
