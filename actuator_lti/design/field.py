@@ -1,0 +1,89 @@
+"""What is known of one key of a design file, and how its unit follows from the kind of drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal
+
+from actuator_lti.design.model import Axis, Design
+
+Kind = Literal["quantity", "integer", "quantities", "choice", "text"]
+
+BIG = 1e12
+SMALL = 1e-18
+_AXES: dict[str, dict[str, str]] = {
+    "rotary": {"angle": "rad", "torque": "N*m", "inertia": "kg*m^2"},
+    "linear": {"angle": "m", "torque": "N", "inertia": "kg"},
+}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What decides the units of the gains: the axis, and which inner loops there are."""
+
+    axis: Axis = "rotary"
+    has_velocity: bool = True
+    has_current: bool = True
+
+    @classmethod
+    def of(cls, design: Design) -> Structure:
+        """The structure of a design."""
+        control = design.controller
+        return cls(design.axis, control.velocity is not None, control.current is not None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """One key of the design file.
+
+    ``unit_template`` is an SI unit in which ``{angle}``, ``{torque}`` and ``{inertia}`` stand for
+    rad, N*m, kg*m^2 on a rotary axis and m, N, kg on a linear one, ``{drive}`` for A or V.
+    ``low`` and ``high`` are inclusive, in SI; ``low_open`` makes the lower one exclusive.
+    """
+
+    path: str
+    attribute: str
+    kind: Kind
+    description: str
+    unit_template: str = "1"
+    symbol: str = ""
+    low: float = -inf
+    high: float = inf
+    low_open: bool = False
+    choices: tuple[str, ...] = ()
+    required: bool = False
+    example: str = ""
+
+    @property
+    def section(self) -> str:
+        """Section name, such as ``"control.velocity"``."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def key(self) -> str:
+        """Key inside the section."""
+        return self.path.rpartition(".")[2]
+
+    def unit(self, structure: Structure) -> str:
+        """The SI unit of this key in a drive of this structure; ``"1"`` is dimensionless."""
+        words = _AXES[structure.axis]
+        drive = "A" if structure.has_current else "V"
+        if self.path == "control.position.gain" and structure.has_velocity:
+            return "1/s"
+        return self.unit_template.format(drive=drive, **words)
+
+    def allowed(self, unit: str) -> str:
+        """The allowed range in words."""
+        if self.choices:
+            return " or ".join(f'"{choice}"' for choice in self.choices)
+        shown = "" if unit == "1" else f" {unit}"
+        if self.low == SMALL:
+            return f"above 0, {self.low:g} to {self.high:g}{shown}"
+        low = "" if self.low == -inf else f"{'above' if self.low_open else 'at least'} {self.low:g}{shown}"
+        high = "" if self.high == inf else f"at most {self.high:g}{shown}"
+        return " and ".join(part for part in (low, high) if part) or "any finite number"
+
+    def accepts(self, value: float) -> bool:
+        """Whether an SI value lies in the allowed range; NaN does not."""
+        return (self.low < value if self.low_open else self.low <= value) and value <= self.high
