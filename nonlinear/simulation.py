@@ -108,8 +108,8 @@ def simulate(
     -----
     At a zero crossing the rotor rests while ``|drive torque| <= Tc * breakaway_ratio``, as model.md says of
     stick; it passes through otherwise.  Counts are the floor of angle times counts per rad; they enter the
-    speed estimate by difference only, the position controller sees the angle itself.  The reference before the
-    first tick is the initial angle (feed-forward by backward difference).
+    speed estimate by difference only, the position controller sees the angle itself.  The reference before
+    the first tick is the initial angle (feed-forward by backward difference).
 
     Examples
     --------
