@@ -33,8 +33,8 @@ class SteadyCriterion:
     def __str__(self) -> str:
         return (
             f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
-            f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), longest stretch, "
-            f"{self.trim_s:g} s cut off at both ends"
+            f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), "
+            f"longest stretch, {self.trim_s:g} s cut off at both ends"
         )
 
 

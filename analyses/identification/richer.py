@@ -1,0 +1,167 @@
+"""Is a richer friction law warranted? Asked of runs that the law has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analyses.identification.surface import SurfaceFit
+
+FloatArray = NDArray[np.float64]
+Terms = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+FOLDS = 9
+STRIBECK_SPEEDS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawScore:
+    """How well one law predicts runs that it was not fitted to.
+
+    ``error_Nm`` is the root of the mean weighted squared prediction error, in N m; ``gain`` the relative
+    reduction of the squared error against the plain law with its standard error ``gain_std`` (paired over the
+    runs). ``warranted``: the gain exceeds twice its standard error and 5 %.
+    """
+
+    name: str
+    formula: str
+    parameters: int
+    error_Nm: float
+    gain: float
+    gain_std: float
+    warranted: bool
+    possible: bool = True
+    reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RicherLaws:
+    """All laws that were tried; ``best`` is the plain one unless another is warranted."""
+
+    scores: tuple[LawScore, ...]
+    best: str
+    folds: int
+
+
+def compare_laws(fit: SurfaceFit) -> RicherLaws:
+    """Score richer laws by cross-validation over the runs of a fit.
+
+    The runs are ordered by load and speed and dealt to nine folds; each law is fitted to eight of them, with
+    the weights of the fit, and predicts the ninth. The speed of the Stribeck term is chosen inside each fit.
+    """
+    points = fit.points
+    speed = np.array([p.speed_rad_s for p in points])
+    load = np.array([p.load_Nm for p in points])
+    side = np.array([float(p.direction) for p in points])
+    torque = np.array([p.torque_Nm for p in points])
+    weight = 1.0 / fit.residual_stds_Nm
+    weight = weight / np.sqrt(np.mean(weight**2))
+    folds = _folds(speed, load, side)
+    data = _Data(speed, load, side, torque, weight)
+    base = _errors(data, folds, _plain(data))
+    scores = [_score("plain", "C0 + Cv w + CM |M|", 3, base, base)]
+    for name, formula, terms in _LAWS:
+        extra = terms(speed, load, side)
+        if name == "per direction" and len(set(side)) < 2:
+            scores.append(_impossible(name, formula, "the runs turn in one direction only"))
+        elif len(points) < 2 * (3 + extra.shape[1]):
+            scores.append(_impossible(name, formula, "too few runs"))
+        else:
+            table = np.column_stack([_plain(data), extra])
+            scores.append(_score(name, formula, table.shape[1], base, _errors(data, folds, table)))
+    scores.append(_score("Stribeck", "+ CS exp(-w/ws)", 5, base, _stribeck_errors(data, folds)))
+    good = [score for score in scores if score.warranted]
+    best = min(good, key=lambda score: score.error_Nm).name if good else "plain"
+    return RicherLaws(scores=tuple(scores), best=best, folds=int(folds.max()) + 1)
+
+
+_LAWS: tuple[tuple[str, str, Terms], ...] = (
+    ("quadratic", "+ C2 w^2", lambda w, m, s: (w**2)[:, None]),
+    ("load-dependent viscous", "+ CvM w |M|", lambda w, m, s: (w * m)[:, None]),
+    ("load squared", "+ CM2 M^2", lambda w, m, s: (m**2)[:, None]),
+    ("per direction", "C0 and Cv per direction", lambda w, m, s: np.column_stack([s, s * w])),
+)
+
+
+@dataclass(frozen=True)
+class _Data:
+    speed: FloatArray
+    load: FloatArray
+    side: FloatArray
+    torque: FloatArray
+    weight: FloatArray
+
+
+def _plain(data: _Data) -> FloatArray:
+    return np.column_stack([np.ones_like(data.speed), data.speed, data.load])
+
+
+def _folds(speed: FloatArray, load: FloatArray, side: FloatArray) -> NDArray[np.int64]:
+    """Fold of each run; neighbours in load and speed fall into different folds."""
+    count = min(FOLDS, len(speed))
+    order = np.lexsort((speed, np.round(load, 1), side))
+    folds = np.empty(len(speed), dtype=np.int64)
+    folds[order] = (np.arange(len(speed)) + np.arange(len(speed)) // count) % count
+    return folds
+
+
+def _errors(data: _Data, folds: NDArray[np.int64], table: FloatArray) -> FloatArray:
+    """Weighted prediction error of each run by the law that has not seen it."""
+    out = np.empty(len(folds))
+    for fold in range(int(folds.max()) + 1):
+        seen, unseen = folds != fold, folds == fold
+        values = _fit(table[seen], data.torque[seen], data.weight[seen])
+        out[unseen] = (data.torque[unseen] - table[unseen] @ values) * data.weight[unseen]
+    return out
+
+
+def _fit(table: FloatArray, torque: FloatArray, weight: FloatArray) -> FloatArray:
+    rows = table * weight[:, None]
+    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(rows / scale, torque * weight, rcond=None)[0] / scale)
+
+
+def _stribeck_errors(data: _Data, folds: NDArray[np.int64]) -> FloatArray:
+    speeds = np.geomspace(0.2 * data.speed.min(), data.speed.max(), STRIBECK_SPEEDS)
+    tables = [np.column_stack([_plain(data), np.exp(-data.speed / ws)]) for ws in speeds]
+    out = np.empty(len(folds))
+    for fold in range(int(folds.max()) + 1):
+        seen, unseen = folds != fold, folds == fold
+        y, w = data.torque[seen], data.weight[seen]
+        fits = [_fit(table[seen], y, w) for table in tables]
+        rests = [float(np.sum(((y - t[seen] @ v) * w) ** 2)) for t, v in zip(tables, fits, strict=True)]
+        k = int(np.argmin(rests))
+        out[unseen] = (data.torque[unseen] - tables[k][unseen] @ fits[k]) * data.weight[unseen]
+    return out
+
+
+def _score(name: str, formula: str, parameters: int, base: FloatArray, errors: FloatArray) -> LawScore:
+    level = float(np.mean(base**2))
+    saved = (base**2 - errors**2) / level if level > 0.0 else np.zeros(len(base))
+    gain, std = float(np.mean(saved)), float(np.std(saved, ddof=1) / np.sqrt(len(saved)))
+    return LawScore(
+        name=name,
+        formula=formula,
+        parameters=parameters,
+        error_Nm=float(np.sqrt(np.mean(errors**2))),
+        gain=gain,
+        gain_std=std,
+        warranted=gain > max(2.0 * std, 0.05),
+    )
+
+
+def _impossible(name: str, formula: str, reason: str) -> LawScore:
+    return LawScore(
+        name=name,
+        formula=formula,
+        parameters=0,
+        error_Nm=float("nan"),
+        gain=float("nan"),
+        gain_std=float("nan"),
+        warranted=False,
+        possible=False,
+        reason=reason,
+    )
