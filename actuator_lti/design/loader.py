@@ -41,14 +41,27 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     name = fspath(name_or_path)
     if name in shipped_designs():
         return _shipped(name)
+    return read_design_text(design_text(name), shown(name, 200)[1:-1])
+
+
+def design_text(name_or_path: str | PathLike[str]) -> str:
+    """The text of a design file, by shipped name or path, with its comments.
+
+    Raises
+    ------
+    InputError
+        If there is no such design, or the file is too large or not UTF-8.
+    """
+    name = fspath(name_or_path)
+    if name in shipped_designs():
+        return shipped_path(name).read_text(encoding="utf-8")
     path = Path(name)
     if not path.suffix and "/" not in name and "\\" not in name and not _exists(path):
         near = get_close_matches(name, shipped_designs(), 1, 0.4)
         hint = f' (nearest known: "{near[0]}")' if near else ""
         names = ", ".join(shipped_designs())
         raise InputError(f"{shown(name)}: no such design{hint}; allowed: {names}, or a design file")
-    where = shown(name)[1:-1]
-    return read_design_text(decode(read_bytes(path), where), where)
+    return decode(read_bytes(path), shown(name, 200)[1:-1])
 
 
 def _exists(path: Path) -> bool:
@@ -60,7 +73,7 @@ def _exists(path: Path) -> bool:
 
 @lru_cache(maxsize=16)
 def _shipped(name: str) -> Design:
-    return read_design_text(shipped_path(name).read_text(encoding="utf-8"), name)
+    return read_design_text(design_text(name), name)
 
 
 def read_design_text(text: str, origin: str = "design") -> Design:

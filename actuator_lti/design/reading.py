@@ -28,7 +28,7 @@ def shown(value: object, longest: int = 60) -> str:
 
 def read_bytes(path: Path, what: str = "design file") -> bytes:
     """The bytes of a regular file of at most 1 MiB."""
-    where = shown(str(path))[1:-1]
+    where = shown(str(path), 200)[1:-1]
     try:
         if path.is_dir():
             raise InputError(f"is a directory; allowed: a {what}", where=where)

@@ -1,0 +1,115 @@
+"""`actuator-lti objects export` and `objects import`: settings in the motion controller's own objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import ControllerObject
+
+app = typer.Typer(
+    help="Settings in the motion controller's own objects: export and import.", no_args_is_help=True
+)
+
+SettingsArgument = Annotated[
+    Path, typer.Argument(metavar="SETTINGS", help="Settings file, TOML or .xdc XML.")
+]
+TargetOption = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")]
+PerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--velocity-gain-per", metavar="UNIT", help="Unit of 0x2344.01: rad/s (factor 1) or rpm (9.549)."
+    ),
+]
+BaseOption = Annotated[
+    str, typer.Option("--onto", metavar="DESIGN", help="Design that the settings are put into.")
+]
+CompleteOption = Annotated[
+    bool, typer.Option("--complete", help="Also objects that the imported settings did not have.")
+]
+
+
+@app.command("export")
+def export(
+    design: DesignArgument = DEFAULT_DESIGN,
+    out: TargetOption = None,
+    per: PerOption = None,
+    complete: CompleteOption = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a design's settings as controller objects: TOML, or XML where FILE ends in .xdc or .xml."""
+    from dataclasses import replace
+
+    from actuator_lti.design import load_design
+    from actuator_lti.design.objects import calibration, export_objects
+    from actuator_lti.design.settings_file import write_settings_toml, write_settings_xml
+    from reports.atomic import write_text
+    from reports.cli.output import print_json, print_line
+    from reports.cli.targets import refuse_existing
+
+    drive = load_design(design)
+    if per is not None:
+        drive = replace(drive, objects=replace(drive.objects, velocity_gain_factor=calibration(per)))
+    result = export_objects(drive, complete=complete or None)
+    xml = out is not None and out.suffix.lower() in (".xdc", ".xml")
+    text = write_settings_xml(result.objects) if xml else write_settings_toml(result.objects)
+    if out is not None:
+        refuse_existing(out, force)
+        write_text(out, text)
+    notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
+    if as_json:
+        objects = [_plain(item) for item in result.objects.values]
+        print_json({"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes,
+                    "velocity_gain_factor": result.objects.velocity_gain_factor})  # fmt: skip
+        return
+    if out is None:
+        print_line(text.rstrip())
+    for note in notes:
+        typer.echo(note, err=True)
+
+
+@app.command("import")
+def import_settings(
+    settings: SettingsArgument,
+    base: BaseOption = DEFAULT_DESIGN,
+    out: TargetOption = None,
+    per: PerOption = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Put controller settings into a design and write it as a design file."""
+    from actuator_lti.design import load_design, write_design
+    from actuator_lti.design.objects import calibration, import_objects
+    from actuator_lti.design.settings_file import read_settings
+    from reports.atomic import write_text
+    from reports.cli.output import print_json, print_line
+    from reports.cli.targets import refuse_existing
+
+    factor = None if per is None else calibration(per)
+    result = import_objects(read_settings(settings, factor), load_design(base), str(settings))
+    text = write_design(result.design)
+    if out is not None:
+        refuse_existing(out, force)
+        write_text(out, text)
+    if as_json:
+        changed = {path: result.design.parameters[path].text for path in result.changed}
+        print_json({"schema": "actuator-lti/objects-import", "version": 1, "changed": changed,
+                    "kept": [_plain(item) for item in result.kept], "notes": list(result.notes)})  # fmt: skip
+        return
+    if out is None:
+        print_line(text.rstrip())
+    changed_lines = [f"{path} = {result.design.parameters[path].text}" for path in result.changed]
+    kept_lines = [f"kept: {item.label} = {item.value}" for item in result.kept]
+    for line in [*changed_lines, *kept_lines, *result.notes]:
+        typer.echo(line, err=True)
+
+
+def _plain(item: ControllerObject) -> dict[str, object]:
+    return {"object": item.label, "value": item.value, "name": item.name}
