@@ -1,0 +1,95 @@
+"""Requirements judged over columns of figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.batch import DRIVE_QUANTITIES
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, Requirement
+
+Columns = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One requirement over many designs.
+
+    Attributes
+    ----------
+    value : ndarray, shape (count,)
+        The figure that is limited, the worst of the loops; NaN where there is none.
+    distance : ndarray, shape (count,)
+        To the limit, positive where met; -inf where a loop is unstable or the figure is missing.
+    passed : ndarray of bool, shape (count,)
+    """
+
+    value: np.ndarray
+    distance: np.ndarray
+    passed: np.ndarray
+
+
+def loops_of(design: Design) -> tuple[str, ...]:
+    """Names of the loops that a design has, innermost first."""
+    control = design.controller
+    present = {"current": control.current, "velocity": control.velocity, "position": control.position}
+    return tuple(name for name, loop in present.items() if loop is not None)
+
+
+def drive_column(quantity: str, load_Nm: float | None) -> str:
+    """Name of the column of a static figure at a hinge moment."""
+    return f"drive.{quantity}@{load_Nm or 0.0:g}"
+
+
+def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
+    """Columns that a requirement reads."""
+    if requirement.quantity in DRIVE_QUANTITIES:
+        return (drive_column(requirement.quantity, requirement.load_Nm),)
+    wanted = requirement.loop or "position"
+    loops = loops_of(design) if wanted == "every" else (wanted,)
+    if not set(loops) <= set(loops_of(design)):
+        raise InputError(f"requirement {requirement.id}: the design has no {wanted} loop")
+    return tuple(f"{loop}.{requirement.quantity}" for loop in loops)
+
+
+def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
+    """Value, distance to the limit and verdict of one requirement for every design."""
+    names = source_columns(requirement, design)
+    values = np.stack([columns[name] for name in names])
+    low = -np.inf if requirement.minimum is None else requirement.minimum
+    high = np.inf if requirement.maximum is None else requirement.maximum
+    with np.errstate(invalid="ignore"):
+        distances = np.fmin(_beyond(values, low), _beyond(-values, -high))
+    for k, name in enumerate(names):
+        loop = name.partition(".")[0]
+        unstable = (
+            columns[f"{loop}.stable"] != 1.0 if loop != "drive" else np.zeros(values.shape[1], dtype=bool)
+        )
+        distances[k, unstable | np.isnan(values[k])] = -np.inf
+    worst = np.argmin(distances, axis=0)
+    places = np.arange(values.shape[1])
+    distance = distances[worst, places]
+    return Judged(values[worst, places], distance, distance >= 0.0)
+
+
+def _beyond(values: np.ndarray, limit: float) -> np.ndarray:
+    """values - limit, +inf where there is no limit or the value is itself unlimited."""
+    if np.isneginf(limit):
+        return np.full(values.shape, np.inf)
+    return values - limit
+
+
+def label(requirement: Requirement) -> str:
+    """A requirement in words: quantity, loop, load."""
+    words = [requirement.quantity.replace("_", " ")]
+    if requirement.loop:
+        words.append(f"{requirement.loop} loop")
+    if requirement.load_Nm is not None:
+        words.append(f"at {requirement.load_Nm:g} N m")
+    return ", ".join(words)

@@ -1,0 +1,124 @@
+"""What a Monte Carlo study returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from analyses.monte_carlo.statistics import ColumnStatistics
+
+__all__ = ["ColumnStatistics", "MonteCarloResult", "Odds", "WorstCase"]
+
+
+@dataclass(frozen=True)
+class Odds:
+    """How often a requirement is met within the tolerances.
+
+    Attributes
+    ----------
+    id, label, unit : str
+        Of the requirement; ``"all"`` for all of them together.
+    passed, count : int
+    probability, low, high : float
+        Share of passes with its 95 % interval (Clopper and Pearson; on the safe side for Sobol points).
+    minimum, maximum : float or None
+        The limit.
+    nominal, worst : float or None
+        Value of the nominal design, and the worst of all samples.
+    worst_sample : int or None
+        Its number.
+    """
+
+    id: str
+    label: str
+    unit: str
+    passed: int
+    count: int
+    probability: float
+    low: float
+    high: float
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    worst: float | None = None
+    worst_sample: int | None = None
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """The worst design for a requirement that sampling and then an optimiser found in the tolerance box.
+
+    Attributes
+    ----------
+    requirement : str
+    unit : str
+    sampled, sample : float, int
+        Worst of all samples, and its number.
+    value : float or None
+        After the optimiser; ``None`` where a loop is unstable there.
+    distance : float or None
+        To the limit, positive where it is still met; ``None`` where unstable.
+    passed : bool
+    parameters : mapping of str to float
+        SI values of the worst design.
+    evaluations : int
+        Designs that the optimiser looked at.
+    file : Path or None
+        Design file of it.
+    """
+
+    requirement: str
+    unit: str
+    sampled: float | None
+    sample: int
+    value: float | None
+    distance: float | None
+    passed: bool
+    parameters: Mapping[str, float]
+    evaluations: int
+    file: Path | None = None
+
+
+@dataclass(frozen=True)
+class MonteCarloResult:
+    """A finished study.
+
+    Attributes
+    ----------
+    design_name, design_hash : str
+    samples, seed : int
+    paths : tuple of str
+        Parameters that varied.
+    columns : mapping of str to ColumnStatistics
+    odds : tuple of Odds
+        One a requirement, in the order of the design file; then all together (id ``"all"``).
+    worst : tuple of WorstCase
+    folder : Path
+        Every sample, as Parquet.
+    notes : tuple of str
+    """
+
+    design_name: str
+    design_hash: str
+    samples: int
+    seed: int
+    paths: tuple[str, ...]
+    columns: Mapping[str, ColumnStatistics]
+    odds: tuple[Odds, ...]
+    worst: tuple[WorstCase, ...]
+    folder: Path
+    notes: tuple[str, ...] = ()
+
+    @property
+    def met(self) -> bool:
+        """Whether every sample met every requirement, and every worst case does."""
+        return all(o.passed == o.count for o in self.odds) and all(w.passed for w in self.worst)
+
+    def __str__(self) -> str:
+        lines = [f"{self.design_name}: {self.samples} samples, seed {self.seed}"]
+        lines += [
+            f"{o.id}: {100 * o.probability:.2f} % ({100 * o.low:.2f} to {100 * o.high:.2f})"
+            for o in self.odds
+        ]
+        return "\n".join(lines)

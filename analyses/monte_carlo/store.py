@@ -1,0 +1,142 @@
+"""Results of a numbered study on disk: one Parquet file a chunk, and a manifest that says of what.
+
+A chunk appears under its name only when it is complete (written beside, synchronised, renamed); a run that
+is interrupted, killed included, goes on from the chunks that are there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from analyses.engine import Arrays, Chunk
+
+SCHEMA = "actuator-lti/samples"
+VERSION = 1
+CHUNK = 4096
+
+
+def write_atomic(path: Path, data: bytes) -> None:
+    """Write a file so that its name never stands for half of it."""
+    handle, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(name, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of chunks.
+
+    Attributes
+    ----------
+    folder : Path
+    chunk : int
+        Numbers a file.
+    """
+
+    folder: Path
+    chunk: int
+
+    @classmethod
+    def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
+        """Open a folder for a study, new or begun before.
+
+        Parameters
+        ----------
+        identity : mapping
+            Everything that decides the numbers (hashes, seed, settings), plain JSON.
+
+        Raises
+        ------
+        InputError
+            If the folder holds another study.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / "manifest.json"
+        wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
+        if path.exists():
+            found = _read_manifest(path)
+            if {key: found.get(key) for key in wanted} != wanted:
+                raise InputError("holds another study (design, seed, settings or code); take another folder",
+                                 where=str(folder))  # fmt: skip
+            return cls(folder, int(found["chunk"]))
+        text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
+        write_atomic(path, text.encode())
+        return cls(folder, chunk)
+
+    def path(self, chunk: Chunk) -> Path:
+        """File of a chunk."""
+        return self.folder / f"samples-{chunk[0]:010d}-{chunk[1]}.parquet"
+
+    def chunks(self, total: int) -> list[Chunk]:
+        """All chunks of a study of so many numbers."""
+        return [(first, min(self.chunk, total - first)) for first in range(0, total, self.chunk)]
+
+    def missing(self, total: int) -> list[Chunk]:
+        """Chunks that are not on disk, or whose file is damaged."""
+        return [chunk for chunk in self.chunks(total) if not _whole(self.path(chunk), chunk[1])]
+
+    def write(self, chunk: Chunk, arrays: Arrays) -> None:
+        """Put a chunk on disk."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        sink = pa.BufferOutputStream()
+        pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
+        write_atomic(self.path(chunk), sink.getvalue().to_pybytes())
+
+    def blocks(self, total: int, columns: list[str] | None = None, size: int = 4096) -> Iterator[Arrays]:
+        """Columns in blocks of a fixed size in order of number, however the chunks were cut."""
+        import pyarrow.parquet as pq
+
+        held: Arrays = {}
+        filled = 0
+        for chunk in self.chunks(total):
+            part = pq.read_table(self.path(chunk), columns=columns, partitioning=None)
+            arrays = {name: part.column(name).to_numpy() for name in part.column_names}
+            held = {k: np.concatenate([held[k], v]) for k, v in arrays.items()} if filled else arrays
+            filled += chunk[1]
+            while filled >= size:
+                yield {name: values[:size] for name, values in held.items()}
+                held = {name: values[size:] for name, values in held.items()}
+                filled -= size
+        if filled:
+            yield held
+
+
+def _read_manifest(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read: {error}", where=str(path)) from error
+    if not isinstance(found, dict) or not isinstance(found.get("chunk"), int) or found["chunk"] < 1:
+        raise InputError("is no manifest of a study", where=str(path))
+    return found
+
+
+def _whole(path: Path, count: int) -> bool:
+    """Whether a chunk's file is there and holds as many rows as it should."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return int(pq.read_metadata(path).num_rows) == count
+    except (OSError, pa.ArrowInvalid):
+        return False

@@ -1,0 +1,151 @@
+"""What is computed for every sample: parameters drawn, linear figures, static figures, a nonlinear step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_lti.batch import (
+    DRIVE_QUANTITIES,
+    QUANTITIES,
+    UNITS,
+    Population,
+    drive_figures,
+    linear_figures,
+    variable_paths,
+)
+from actuator_lti.batch.parameters import OperatingPoint
+from actuator_lti.errors import InputError
+from analyses.engine import Arrays
+from analyses.monte_carlo.judging import drive_column, loops_of
+from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
+from analyses.sampling import Sampler, as_values
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+
+@dataclass(frozen=True)
+class SampleTask:
+    """Figures of numbered samples of a design; goes to workers as it is.
+
+    Attributes
+    ----------
+    design : Design
+    sampler : Sampler
+    operating_point : str
+    load_Nm : float
+        For the linear loops.
+    time_figures : bool
+        Step figures of the linear loops.
+    step : StepCheck or None
+        A nonlinear step of every sample.
+    """
+
+    design: Design
+    sampler: Sampler
+    operating_point: OperatingPoint = "sliding"
+    load_Nm: float = 0.0
+    time_figures: bool = True
+    step: StepCheck | None = None
+
+    def __post_init__(self) -> None:
+        known = variable_paths(self.design)
+        for path in self.sampler.paths:
+            if path not in known:
+                raise InputError(f"{path}: cannot vary in a Monte Carlo study")
+
+    def evaluate(self, first: int, count: int) -> Arrays:
+        """All columns of samples first to first + count - 1."""
+        draws = self.sampler.draw(first, count)
+        columns: Arrays = {"sample": np.arange(first, first + count, dtype=np.int64)}
+        columns |= {f"parameter.{p}": draws[:, k] for k, p in enumerate(self.sampler.paths)}
+        return columns | self.figures(draws)
+
+    def figures(self, draws: np.ndarray) -> Arrays:
+        """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""
+        population = Population(self.design, as_values(self.sampler.paths, draws), len(draws))
+        linear = linear_figures(
+            population,
+            operating_point=self.operating_point,
+            load_Nm=self.load_Nm,
+            time_figures=self.time_figures,
+        )
+        columns: Arrays = {}
+        for loop in linear.loops:
+            columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
+            for quantity in self._quantities:
+                columns[f"{loop}.{quantity}"] = linear.quantity(quantity, loop)
+        for quantity, load in self._drive_wanted:
+            columns[drive_column(quantity, load)] = drive_figures(population, quantity, load)
+        if self.step is not None:
+            columns |= step_columns(self.step, population)
+        return columns
+
+    @property
+    def _quantities(self) -> tuple[str, ...]:
+        time = {"rise_time", "overshoot", "settling_time"}
+        return tuple(q for q in QUANTITIES if self.time_figures or q not in time)
+
+    @cached_property
+    def _drive_wanted(self) -> tuple[tuple[str, float], ...]:
+        wanted = {
+            (r.quantity, r.load_Nm or 0.0) for r in self.design.requirements if r.quantity in DRIVE_QUANTITIES
+        }
+        return tuple(sorted(wanted))
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Columns of figures (without parameters and stability flags) with their units."""
+        units = {f"{loop}.{q}": UNITS[q] for loop in loops_of(self.design) for q in self._quantities}
+        shown = "deg" if self.design.axis == "rotary" else "m"
+        drive = {"output_rate": f"{shown}/s", "motor_current": "A", "acceleration": f"{shown}/s^2"}
+        units |= {drive_column(q, load): drive[q] for q, load in self._drive_wanted}
+        if self.step is not None:
+            units |= step_units(self.step)
+        return units
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that decides the numbers, as plain JSON."""
+        from actuator_lti.design import design_hash
+        from analyses.engine import code_version
+
+        table = self.sampler.table
+        return {
+            "design": design_hash(self.design),
+            "code": code_version(),
+            "seed": self.sampler.seed,
+            "factors": [repr(factor) for factor in self.sampler.factors],
+            "correlation": self.sampler.correlation.tolist(),
+            "table": None if table is None else [list(table.paths), _digest(table.rows)],
+            "operating_point": self.operating_point,
+            "load_Nm": self.load_Nm,
+            "time_figures": self.time_figures,
+            "step": None if self.step is None else repr(self.step),
+        }
+
+
+def _digest(rows: np.ndarray) -> str:
+    import hashlib
+
+    return hashlib.sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()
+
+
+def replay(design: Design, sampler: Sampler, number: int) -> Design:
+    """The design of one sample, by its number.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> from analyses.sampling import sampler_of
+    >>> design = load_design("ilr33-amber")
+    >>> replay(design, sampler_of(design, seed=3), 17).load.inertia_kgm2 == design.load.inertia_kgm2
+    False
+    """
+    from actuator_lti.design import with_values
+
+    values = sampler.draw(number, 1)[0]
+    return with_values(design, {path: float(v) for path, v in zip(sampler.paths, values, strict=True)})

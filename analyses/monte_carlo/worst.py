@@ -1,0 +1,113 @@
+"""The worst design in the tolerance box: corners, the worst samples, then differential evolution.
+
+Sampling alone finds no worst case: the chance that a point lands near a corner of a box of many dimensions is
+small.  The search starts from the corners and the worst samples, and never returns less bad than the worst of
+them.  Storn and Price 1997 (`scipy.optimize.differential_evolution`), then Nelder and Mead.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from analyses.monte_carlo.judging import judge
+from analyses.monte_carlo.result import WorstCase
+from analyses.monte_carlo.task import SampleTask
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Requirement
+
+MOST_CORNERS = 1024
+_UNSTABLE = -1e6  # stands for a distance of - infinity, so that the optimiser can compare
+
+
+def corners(lower: np.ndarray, upper: np.ndarray, seed: int) -> np.ndarray:
+    """Corners of a box, shape (corners, dimensions): all, or a random 1024 where there are more."""
+    size = len(lower)
+    if 2**size <= MOST_CORNERS:
+        choice = np.array(list(product((False, True), repeat=size)))
+    else:
+        choice = np.random.default_rng(seed).integers(0, 2, (MOST_CORNERS, size)).astype(bool)
+    return np.where(choice, upper, lower)
+
+
+def distances(task: SampleTask, requirement: Requirement, points: np.ndarray) -> np.ndarray:
+    """Distance to the limit of designs at points (SI), shape (count,)."""
+    judged = judge(requirement, task.design, task.figures(points)).distance
+    return np.where(np.isneginf(judged), _UNSTABLE, judged)
+
+
+def worst_case(
+    task: SampleTask, requirement: Requirement, worst_samples: np.ndarray, *, effort: int = 40
+) -> WorstCase:
+    """Make the worst samples worse.
+
+    Parameters
+    ----------
+    worst_samples : ndarray of int
+        Numbers of the worst samples, worst first.
+    effort : int
+        Generations of the evolution.
+    """
+    from scipy.optimize import differential_evolution, minimize
+
+    lower, upper = task.sampler.box
+    span = np.where(upper > lower, upper - lower, 1.0)
+    looked_at = 0
+
+    def cost(unit: np.ndarray) -> np.ndarray:
+        nonlocal looked_at
+        points = lower + np.clip(np.atleast_2d(unit.T), 0.0, 1.0) * span
+        looked_at += len(points)
+        return distances(task, requirement, points)
+
+    drawn = np.vstack([task.sampler.draw(int(k), 1) for k in worst_samples])
+    starts = np.clip((drawn - lower) / span, 0.0, 1.0)
+    edges = corners(np.zeros(len(lower)), np.ones(len(lower)), task.sampler.seed)
+    pool = np.vstack([edges, starts])
+    found = cost(pool.T)
+    size = max(12, min(40, 4 * len(lower)))
+    population = _padded(pool[np.argsort(found, kind="stable")[:size]], size, task.sampler.seed)
+    result = differential_evolution(
+        cost, [(0.0, 1.0)] * len(lower), init=population, maxiter=effort, tol=1e-10, polish=False,
+        vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
+    )  # fmt: skip
+    fine = minimize(
+        lambda x: float(cost(x[:, None])[0]), result.x, method="Nelder-Mead",
+        bounds=[(0.0, 1.0)] * len(lower),
+        options={"maxfev": 60 * len(lower), "xatol": 1e-9, "fatol": 1e-12},
+    )  # fmt: skip
+    candidates = np.vstack([fine.x, result.x, pool[np.argmin(found)]])
+    best = candidates[np.argmin(cost(candidates.T))]
+    return _described(task, requirement, lower + np.clip(best, 0, 1) * span, int(worst_samples[0]), looked_at)
+
+
+def _padded(points: np.ndarray, size: int, seed: int) -> np.ndarray:
+    """Fill up a population with random points; shake equal ones apart."""
+    rng = np.random.default_rng(seed)
+    missing = size - len(points)
+    if missing > 0:
+        points = np.vstack([points, rng.uniform(size=(missing, points.shape[1]))])
+    return points
+
+
+def _described(
+    task: SampleTask, requirement: Requirement, point: np.ndarray, sample: int, evaluations: int
+) -> WorstCase:
+    drawn = task.sampler.draw(sample, 1)
+    judged = judge(requirement, task.design, task.figures(np.vstack([drawn[0], point])))
+    sampled, value = (float(v) for v in judged.value)
+    distance = float(judged.distance[1])
+    return WorstCase(
+        requirement.id,
+        requirement.unit,
+        sampled if np.isfinite(sampled) else None,
+        sample,
+        value if np.isfinite(distance) else None,
+        distance if np.isfinite(distance) else None,
+        bool(judged.passed[1]),
+        dict(zip(task.sampler.paths, (float(v) for v in point), strict=True)),
+        evaluations,
+    )
