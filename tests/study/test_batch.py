@@ -104,3 +104,19 @@ def test_what_cannot_vary_is_refused():
         Population(design, {"motor.color": np.ones(2)}, 2)
     with pytest.raises(InputError, match="finite"):
         Population(design, {"motor.resistance": np.array([np.nan])}, 1)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "emps", "ctms-motor-position"])
+def test_drive_figures_are_those_of_the_report(name):
+    from analyses.drive_figures import drive_figures as scalar
+
+    population = Population(load_design(name), {}, 1)
+    truth = scalar(population.design, 3.0)
+    degrees = 1.0 if population.design.axis == "linear" else 180 / np.pi
+    assert drive_figures(population, "output_rate", 3.0)[0] == pytest.approx(
+        truth.output_rate_rad_s * degrees
+    )
+    accelerated = drive_figures(population, "acceleration", 3.0)[0]
+    assert accelerated == pytest.approx(truth.acceleration_rad_s2 * degrees)
+    if truth.motor_current_A is not None:
+        assert drive_figures(population, "motor_current", 3.0)[0] == pytest.approx(truth.motor_current_A)
