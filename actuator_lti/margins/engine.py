@@ -6,6 +6,8 @@ import math
 from typing import Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.delay_form import delay_form, from_rational
+from actuator_lti.margins.delayed import delayed_margins
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.margins.rational import rational_margins
 from actuator_lti.margins.results import StabilityMargins
@@ -17,4 +19,11 @@ def stability_margins(
     """Find all margins of a loop L with negative unit feedback."""
     if not (math.isfinite(delay_s) and delay_s >= 0.0):
         raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
-    return rational_margins(rational_loop(system))
+    if hasattr(system, "delays_s"):
+        if system.delays_s.size or delay_s:
+            return delayed_margins(delay_form(system, delay_s), band_rad_s)
+        system = system.to_state_space()
+    loop = rational_loop(system)
+    if delay_s:
+        return delayed_margins(from_rational(loop, delay_s), band_rad_s)
+    return rational_margins(loop)
