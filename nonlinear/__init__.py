@@ -6,17 +6,31 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nonlinear import commands, loads
+    from nonlinear.batch import Reducers, Run, simulate_many
     from nonlinear.probe import Probe
     from nonlinear.simulation import simulate
     from nonlinear.trajectory import State, Trajectory
 
-__all__ = ["Probe", "State", "Trajectory", "commands", "loads", "simulate"]
+__all__ = [
+    "Probe",
+    "Reducers",
+    "Run",
+    "State",
+    "Trajectory",
+    "commands",
+    "loads",
+    "simulate",
+    "simulate_many",
+]
 
 _WHERE = {
     "Probe": "nonlinear.probe",
+    "Reducers": "nonlinear.batch",
+    "Run": "nonlinear.batch",
     "State": "nonlinear.trajectory",
     "Trajectory": "nonlinear.trajectory",
     "simulate": "nonlinear.simulation",
+    "simulate_many": "nonlinear.batch",
 }
 
 
