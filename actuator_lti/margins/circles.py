@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg.lapack import dgeev
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.loop import Complex, Real, RationalLoop
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 NEAR_AXIS = 0.1
 _DEGENERATE = 1e-9
@@ -52,7 +52,9 @@ class ShiftedLoop:
         """All s with a L L~ + b (L + L~) + e = 0; ``None`` where the shift does not allow it."""
         product, total = self.l_plus * self.l_minus, self.l_plus + self.l_minus
         D = a * product + b * total + e
-        if abs(D) <= _DEGENERATE * (abs(a * product) + abs(b) * (abs(self.l_plus) + abs(self.l_minus)) + abs(e)):
+        if abs(D) <= _DEGENERATE * (
+            abs(a * product) + abs(b) * (abs(self.l_plus) + abs(self.l_minus)) + abs(e)
+        ):
             return None
         n = self.b_plus.size
         H = np.zeros((2 * n, 2 * n))
@@ -80,7 +82,9 @@ class ShiftedLoop:
         H -= (B / D)[:, None] * C
         re, im, _, _, info = dgeev(H, compute_vl=0, compute_vr=0, overwrite_a=1)
         if info:
-            raise NumericalError("the eigenvalues of the Hamiltonian matrix did not converge: rescale the loop")
+            raise NumericalError(
+                "the eigenvalues of the Hamiltonian matrix did not converge: rescale the loop"
+            )
         sigma = re[im <= 0.0] + 1j * im[im <= 0.0]  # the upper half plane of s
         return self.shift + 1.0 / sigma[sigma != 0.0]
 

@@ -98,6 +98,20 @@ def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical
     return Crossings(gain_x, gain_L, gain_touch, real_x, real_L, real_touch, real.samples, L_real)
 
 
+def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
+    """Only the crossings of the unit circle, 0 < x < end, points of touch left out; border poles allowed."""
+    zeros = circles.circle(1.0, 0.0, -1.0)
+    if zeros is None:
+        return np.empty(0)
+    found = _candidates(zeros, np.empty(0), loop.sampled, 1.0)
+    above = np.abs(loop.response(found.samples)) > 1.0
+    hit = above[1:] != above[:-1]
+    k = int(np.count_nonzero(hit))
+    x, values = _polish(loop, found.x[hit], found.samples[:-1][hit], found.samples[1:][hit], k)
+    x, _, touch = _with_touches(loop, found, hit, x, values, True)
+    return x[~touch]
+
+
 def _candidates(zeros: Complex, border_x: Real, sampled: bool, typical_x: float) -> _Candidates:
     near = on_axis(zeros)
     w, touch = near.imag, np.abs(near.real) <= _POSSIBLE_TOUCH * near.imag
@@ -199,9 +213,7 @@ def _near_touch(
         touch.extend((False, False))
 
 
-def _merged(
-    loop: RationalLoop, x: Real, L: Complex, more: Real, touch: Mask
-) -> tuple[Real, Complex, Mask]:
+def _merged(loop: RationalLoop, x: Real, L: Complex, more: Real, touch: Mask) -> tuple[Real, Complex, Mask]:
     keep = np.ones(more.size, dtype=bool)
     for k in range(more.size):
         known = np.concatenate((x, more[:k][keep[:k]]))

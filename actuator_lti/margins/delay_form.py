@@ -80,9 +80,13 @@ def delay_form(system: Any, series_s: float = 0.0) -> DelayForm:
     if np.size(system.D11) != 1:
         raise InputError(f"a loop has one input and one output; this has D11 of shape {np.shape(system.D11)}")
     top = np.hstack((A, np.reshape(system.B2, (n, q)), B1.reshape(n, 1)))
-    middle = np.hstack((np.reshape(system.C2, (q, n)), np.reshape(system.D22, (q, q)), np.reshape(system.D21, (q, 1))))
+    middle = np.hstack(
+        (np.reshape(system.C2, (q, n)), np.reshape(system.D22, (q, q)), np.reshape(system.D21, (q, 1)))
+    )
     bottom = np.hstack((C1.reshape(1, n), np.reshape(system.D12, (1, q)), np.reshape(system.D11, (1, 1))))
-    return _form(np.vstack((top, middle, bottom)), n, np.asarray(system.delays_s, dtype=float).ravel(), series_s, None)
+    return _form(
+        np.vstack((top, middle, bottom)), n, np.asarray(system.delays_s, dtype=float).ravel(), series_s, None
+    )
 
 
 def from_rational(loop: RationalLoop, series_s: float) -> DelayForm:

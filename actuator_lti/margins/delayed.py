@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.collocation import closed_loop_matrix, open_loop_matrix, points_for
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, values
-from actuator_lti.margins.extremes import DISK, MODULUS, Criterion
+from actuator_lti.margins.extremes import COMPLEMENTARY, DISK, MODULUS, PEAK, Criterion
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.nyquist import _arc, _turn
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
@@ -56,10 +56,14 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     return _assembled(setting, band_rad_s, agreement, (gain_x, gain_touch), (phase_x, phase_touch), distances)
 
 
-def _setting(form: DelayForm, band: tuple[float, float] | None) -> _Setting:
+def _setting(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> _Setting:
     slow = open_loop_matrix(form, 24)
     poles = sorted_poles(slow, form.sampled)
-    sizes = np.abs(np.log(np.where(poles.values == 0.0, 1e-300, poles.values))) if form.sampled else np.abs(poles.values)
+    sizes = (
+        np.abs(np.log(np.where(poles.values == 0.0, 1e-300, poles.values)))
+        if form.sampled
+        else np.abs(poles.values)
+    )
     at_dc = sum(pole.multiplicity for pole in poles.border if pole.x == 0.0)
     sizes = np.sort(sizes[sizes > 0.0])
     physical = sizes[at_dc:] if at_dc and sizes.size > at_dc else sizes
@@ -75,10 +79,18 @@ def _setting(form: DelayForm, band: tuple[float, float] | None) -> _Setting:
             raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
     if form.sampled:
         return _Setting(form, poles, low, math.pi, order, hidden)
+    if not tail:
+        return _Setting(form, poles, low, math.inf, order, hidden)
     high = _tail(form, max(float(sizes.max()) if sizes.size else 0.0, low * 10.0))
     if band is not None:
         high = max(high, float(band[1]))
     return _Setting(form, poles, low, high, order, hidden)
+
+
+def low_frequency(form: DelayForm) -> tuple[float, int]:
+    """A frequency x below which L follows its pole at zero, and the multiplicity of that pole in L."""
+    setting = _setting(form.without_series(), None, tail=False)
+    return setting.low, setting.order
 
 
 def _order_at_dc(form: DelayForm, low: float) -> tuple[float, int]:
@@ -101,7 +113,12 @@ def _tail(form: DelayForm, start: float) -> float:
         return start
 
     def bound(w: float) -> float:
-        M = np.block([[w * np.eye(n) - np.abs(form.A), -np.abs(form.B2)], [-np.abs(form.C2), np.eye(q) - np.abs(form.D22)]])
+        M = np.block(
+            [
+                [w * np.eye(n) - np.abs(form.A), -np.abs(form.B2)],
+                [-np.abs(form.C2), np.eye(q) - np.abs(form.D22)],
+            ]
+        )
         rhs = np.concatenate((np.abs(form.B1), np.abs(form.D21)))
         X = np.linalg.solve(M, rhs)
         inverse = np.linalg.inv(M)
@@ -133,8 +150,8 @@ def _cells(setting: _Setting) -> Cells:
     def resolved(found: Cells) -> Mask:
         R = reach(form, found)
         no_gain, no_phase = _excluded(found, R)
-        turns = R < 0.7 * np.abs(1.0 + found.L)
-        return turns & ((R <= RESOLVED * np.abs(found.L)) | (no_gain & no_phase))
+        turns = 0.7 * np.abs(1.0 + found.L) > R
+        return turns & ((RESOLVED * np.abs(found.L) >= R) | (no_gain & no_phase))
 
     decades = max(math.log10(setting.high / setting.low), 0.1)
     edges = np.geomspace(setting.low, setting.high, int(_PER_DECADE * decades) + 2)
@@ -146,6 +163,20 @@ def _cells(setting: _Setting) -> Cells:
         if _touches(form, edges):
             raise NumericalError(f"{error} (or a closed-loop pole there)") from error
         raise
+
+
+def delayed_extreme(form: DelayForm, criterion: Criterion) -> tuple[float, float]:
+    """Smallest value of a criterion over the axis, and where (x)."""
+    setting = _setting(form, None)
+    return _smallest(setting, _cells(setting), criterion)
+
+
+def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
+    """Frequencies at which the gain crosses ``level``, in order (x)."""
+    scaled = replace(form, C1=form.C1 / level, D11=form.D11 / level, D12=form.D12 / level)
+    found = _cells(_setting(scaled, None))
+    x, touch = crossings(scaled, found, GAIN, _excluded(found, reach(scaled, found))[0])
+    return x[~touch].tolist() if x.size else []
 
 
 def _touches(form: DelayForm, edges: Real) -> bool:
@@ -226,6 +257,11 @@ def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
     distance = criterion.distance(found.L)
     if criterion is MODULUS:
         return distance - R
+    size = np.abs(found.L)
+    if criterion is PEAK:
+        return 1.0 / (size + R)
+    if criterion is COMPLEMENTARY:
+        return np.where(size > R, distance - R / (size * (size - R)), -np.inf)
     away = np.abs(1.0 - found.L)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
@@ -270,7 +306,12 @@ def _assembled(
         notes.append("one mode at zero frequency that the loop neither drives nor sees is left out")
     if band is None and not form.sampled:
         notes.append(f"gain margins above 40 dB beyond {setting.high * unit:.4g} rad/s are not listed")
-    common = {"period_s": form.period_s, "delay_s": form.series_s, "band_rad_s": (low, high), "method": method}
+    common = {
+        "period_s": form.period_s,
+        "delay_s": form.series_s,
+        "band_rad_s": (low, high),
+        "method": method,
+    }
     if not agreement.agree:
         notes.append("poles and Nyquist count disagree: no figure is given")
         return StabilityMargins(
@@ -293,7 +334,9 @@ def _assembled(
     )
 
 
-def _gain_margins(setting: _Setting, phases: tuple[Real, Mask], band: tuple[float, float]) -> tuple[GainMargin, ...]:
+def _gain_margins(
+    setting: _Setting, phases: tuple[Real, Mask], band: tuple[float, float]
+) -> tuple[GainMargin, ...]:
     form = setting.form
     unit = 1.0 if form.period_s is None else 1.0 / form.period_s
     out = []
@@ -306,7 +349,9 @@ def _gain_margins(setting: _Setting, phases: tuple[Real, Mask], band: tuple[floa
     return tuple(out)
 
 
-def _phase_margins(form: DelayForm, gains: tuple[Real, Mask], band: tuple[float, float]) -> tuple[PhaseMargin, ...]:
+def _phase_margins(
+    form: DelayForm, gains: tuple[Real, Mask], band: tuple[float, float]
+) -> tuple[PhaseMargin, ...]:
     unit = 1.0 if form.period_s is None else 1.0 / form.period_s
     x, touch = gains
     deg = np.degrees(np.angle(-border_values(form, x))) if x.size else x

@@ -43,6 +43,24 @@ def _disk_circle(alpha: float) -> tuple[float, float, float]:
     return 1.0 - k, 1.0 + k, 1.0 - k
 
 
+def _complementary_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+    return 1.0 + 1.0 / L, -1.0 / L**2, 2.0 / L**3
+
+
+def _complementary_distance(L: Complex) -> Real:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(L == 0.0, np.inf, np.abs((1.0 + L) / L))
+
+
+def _peak_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+    return 1.0 / L, -1.0 / L**2, 2.0 / L**3
+
+
+def _peak_distance(L: Complex) -> Real:
+    with np.errstate(divide="ignore"):
+        return np.where(L == 0.0, np.inf, 1.0 / np.abs(L))
+
+
 MODULUS = Criterion(lambda L: np.abs(1.0 + L), _modulus_derivatives, lambda m: (1.0, 1.0, 1.0 - m * m))
 DISK = Criterion(_disk_distance, _disk_derivatives, _disk_circle)
 
@@ -108,3 +126,9 @@ def _refined(
         if abs(step) <= 1e-10 * at[0]:
             break
     return value, best
+
+
+COMPLEMENTARY = Criterion(
+    _complementary_distance, _complementary_derivatives, lambda m: (1.0 - m * m, 1.0, 1.0)
+)
+PEAK = Criterion(_peak_distance, _peak_derivatives, lambda m: (m * m, 0.0, -1.0))

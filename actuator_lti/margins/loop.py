@@ -58,7 +58,8 @@ class RationalLoop:
     def at(self, points: Complex) -> Complex:
         """L at any complex points s or z, shape kept (1-D)."""
         if self.numerator is not None and self.denominator is not None:
-            return np.polyval(self.numerator, points) / np.polyval(self.denominator, points)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.polyval(self.numerator, points) / np.polyval(self.denominator, points)
         if self.order == 0:
             return np.full(points.shape, self.d, dtype=complex)
         return self.d + np.linalg.solve(self._resolvent(points), self.b[:, None])[..., 0] @ self.c
@@ -119,7 +120,9 @@ def rational_loop(system: Any) -> RationalLoop:
         More than one input or output, an improper transfer function, or a value that is not finite.
     """
     if system.ninputs != 1 or system.noutputs != 1:
-        raise InputError(f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}")
+        raise InputError(
+            f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
+        )
     period_s = _period(system.dt)
     if hasattr(system, "num"):
         num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")

@@ -14,7 +14,12 @@ _SMALLEST = 1e-13
 
 
 def nyquist_count(
-    loop: RationalLoop, found: Crossings, poles: SortedPoles, visible_at_dc: int, L_dc: complex, L_end: complex
+    loop: RationalLoop,
+    found: Crossings,
+    poles: SortedPoles,
+    visible_at_dc: int,
+    L_dc: complex,
+    L_end: complex,
 ) -> int:
     """Number of unstable closed-loop poles: open-loop ones less the turns of 1 + L about the origin.
 

@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import Crossings, find_crossings
-from actuator_lti.margins.extremes import DISK, MODULUS, smallest
+from actuator_lti.margins.extremes import DISK, MODULUS, Criterion, smallest
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.nyquist import nyquist_count
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
@@ -24,7 +24,9 @@ from actuator_lti.margins.results import (
     Verdict,
 )
 
-_HIDDEN = "one mode at zero frequency that the loop neither drives nor sees is left out (it is no instability)"
+_HIDDEN = (
+    "one mode at zero frequency that the loop neither drives nor sees is left out (it is no instability)"
+)
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,22 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
         disk=(alpha, alpha_x),
         notes=(_HIDDEN,) if ends.hidden else (),
     )
+
+
+def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, float]:
+    """Smallest value of a criterion over the whole axis, ends included, and where (x of `RationalLoop`)."""
+    if not loop.order:
+        return float(criterion.distance(np.array([loop.d + 0j]))[0]), 0.0
+    poles = sorted_poles(loop.A, loop.sampled)
+    end_x = math.pi if loop.sampled else math.inf
+    size = np.abs(np.angle(poles.values)) if loop.sampled else np.abs(poles.values)
+    around = size[(size > 1e-9 * size.max()) & (size < end_x)] if size.size else size
+    x = np.concatenate((around * 0.7, np.minimum(around * 1.4, 0.5 * (around + min(end_x, 1e300)))))
+    L = loop.response(x)
+    x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.sampled else loop.d)
+    if not any(pole.x == 0.0 for pole in poles.border):
+        x, L = np.append(x, 0.0), np.append(L, loop.response(np.zeros(1)))
+    return smallest(loop, Circles(loop, poles.values), criterion, x, L, end_x)
 
 
 def _constant(loop: RationalLoop) -> StabilityMargins:
@@ -217,7 +235,9 @@ def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: End
     """Where to look for the smallest distance first: crossings, and the resonances of the closed loop."""
     values = closed.values
     own = np.abs(np.angle(values)) if loop.sampled else np.abs(values)
-    own = own[(values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.sampled else own > 0.0)]
+    own = own[
+        (values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.sampled else own > 0.0)
+    ]
     x = np.concatenate((found.gain_x, found.real_x, found.between_x, own))
     L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own)))
     if ends.dc is not None:

@@ -311,7 +311,9 @@ def _lines(m: StabilityMargins) -> list[str]:
             lines.append(f"{name} margin: none")
         lines += [f"{name} margin: {margin}" for margin in margins]
     if m.modulus_margin is not None and m.modulus_frequency_rad_s is not None:
-        lines.append(f"modulus margin: {m.modulus_margin:.6g} at {_frequency_text(m.modulus_frequency_rad_s)}")
+        lines.append(
+            f"modulus margin: {m.modulus_margin:.6g} at {_frequency_text(m.modulus_frequency_rad_s)}"
+        )
     if m.disk_margin is not None:
         lines.append(f"disk margin: {m.disk_margin}")
     lines.append(f"band: {m.band_rad_s[0]:.6g} to {m.band_rad_s[1]:.6g} rad/s; method: {m.method}")

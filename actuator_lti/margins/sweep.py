@@ -61,7 +61,9 @@ def _taken(found: Cells, mask: Mask) -> Cells:
 def joined(parts: list[Cells]) -> Cells:
     """Several sets of intervals as one, in order of x."""
     order = np.concatenate([p.x for p in parts]).argsort()
-    return Cells(*(np.concatenate([getattr(p, name) for p in parts])[order] for name in Cells.__dataclass_fields__))
+    return Cells(
+        *(np.concatenate([getattr(p, name) for p in parts])[order] for name in Cells.__dataclass_fields__)
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,242 @@
+"""Bandwidths of a closed loop by both definitions, its resonance, and the peaks of S and T."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.circles import Circles
+from actuator_lti.margins.crossings import gain_crossings
+from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form, from_rational
+from actuator_lti.margins.delayed import delayed_extreme, delayed_gain_crossings, low_frequency
+from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
+from actuator_lti.margins.loop import RationalLoop, rational_loop
+from actuator_lti.margins.poles import sorted_poles
+from actuator_lti.margins.rational import rational_extreme
+from actuator_lti.margins.sweep import reach, subdivided
+
+Level = Literal["1/sqrt(2)", "-3 dB"]
+_LEVELS: dict[str, float] = {"1/sqrt(2)": math.sqrt(0.5), "-3 dB": 10.0**-0.15}
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """Bandwidths of a closed-loop response T.
+
+    Attributes
+    ----------
+    minus3db_rad_s : float or None
+        Where \\|T\\| first falls below ``level`` times its value at zero frequency; ``None`` if it never does.
+    minus90deg_rad_s : float or None
+        Where the unwrapped phase of T first falls below -90 deg against zero frequency.
+    resonance_peak_db : float
+        Largest \\|T\\| over its value at zero frequency, dB (0: no resonance).
+    resonance_rad_s : float
+        Where it is reached; 0 where there is no resonance.
+    dc_gain : float
+        T at zero frequency, with its sign.
+    definition : str
+        What "-3 dB" means here: 1/sqrt(2) (half the power) or -3 dB exactly.
+    """
+
+    minus3db_rad_s: float | None
+    minus90deg_rad_s: float | None
+    resonance_peak_db: float
+    resonance_rad_s: float
+    dc_gain: float
+    definition: str
+
+    @property
+    def minus3db_hz(self) -> float | None:
+        """-3 dB bandwidth, Hz."""
+        return None if self.minus3db_rad_s is None else self.minus3db_rad_s / (2.0 * math.pi)
+
+    @property
+    def minus90deg_hz(self) -> float | None:
+        """-90 deg bandwidth, Hz."""
+        return None if self.minus90deg_rad_s is None else self.minus90deg_rad_s / (2.0 * math.pi)
+
+    @property
+    def resonance_hz(self) -> float:
+        """Frequency of the resonance peak, Hz."""
+        return self.resonance_rad_s / (2.0 * math.pi)
+
+    def __str__(self) -> str:
+        def text(hz: float | None) -> str:
+            return "none" if hz is None else f"{hz:.6g} Hz"
+
+        return (
+            f"bandwidth: {text(self.minus3db_hz)} ({self.definition}), {text(self.minus90deg_hz)} (-90 deg); "
+            f"resonance {self.resonance_peak_db:+.4f} dB at {self.resonance_hz:.6g} Hz"
+        )
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Peaks of the sensitivity S = 1/(1 + L) and of the complementary sensitivity T = L/(1 + L).
+
+    Attributes
+    ----------
+    sensitivity_db, complementary_db : float
+        Peak gains, dB.
+    sensitivity_rad_s, complementary_rad_s : float
+        Where they are reached (0 and infinity are possible).
+    """
+
+    sensitivity_db: float
+    sensitivity_rad_s: float
+    complementary_db: float
+    complementary_rad_s: float
+
+    def __str__(self) -> str:
+        return (
+            f"peak of S {self.sensitivity_db:.4f} dB at {self.sensitivity_rad_s / (2 * math.pi):.6g} Hz, "
+            f"of T {self.complementary_db:.4f} dB at {self.complementary_rad_s / (2 * math.pi):.6g} Hz"
+        )
+
+
+def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
+    """Bandwidths of a closed-loop response (give T itself, not the open loop).
+
+    Parameters
+    ----------
+    system : StateSpace, TransferFunction or DelaySystem
+        T, one input, one output; continuous or sampled.
+    delay_s : float, optional
+        Exact delay in series with T, s: it leaves the -3 dB bandwidth and takes phase.
+    level : {"1/sqrt(2)", "-3 dB"}
+        What "-3 dB" is: 1/sqrt(2) of the value at zero frequency (default), or 10^(-3/20) of it.
+
+    Raises
+    ------
+    InputError
+        T is zero or infinite at zero frequency: there is nothing to measure the fall from.
+
+    Examples
+    --------
+    >>> import control
+    >>> print(closed_loop_bandwidth(control.tf([1], [1, 1])))
+    bandwidth: 0.159155 Hz (1/sqrt(2)), none (-90 deg); resonance +0.0000 dB at 0 Hz
+    """
+    if level not in _LEVELS:
+        raise InputError(f"level = {level!r}: one of {list(_LEVELS)}")
+    inner = hasattr(system, "delays_s") and system.delays_s.size > 0
+    if not inner:
+        loop = rational_loop(system.to_state_space() if hasattr(system, "delays_s") else system)
+        form = from_rational(loop, delay_s)
+        unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+    else:
+        form, unit = delay_form(system, delay_s), 1.0
+    dc = _dc(form)
+    if inner:
+        falls = delayed_gain_crossings(form.without_series(), abs(dc) * _LEVELS[level])
+        peak, place = delayed_extreme(form.without_series(), PEAK)
+    else:
+        falls = _rational_falls(loop, abs(dc) * _LEVELS[level])
+        peak, place = rational_extreme(loop, PEAK)
+    turn = _first_turn(form, dc)
+    resonance = -20.0 * math.log10(peak * abs(dc))
+    return Bandwidth(
+        minus3db_rad_s=falls[0] * unit if falls else None,
+        minus90deg_rad_s=None if turn is None else turn * unit,
+        resonance_peak_db=max(resonance, 0.0),
+        resonance_rad_s=place * unit if resonance > 1e-9 else 0.0,
+        dc_gain=dc,
+        definition=level,
+    )
+
+
+def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
+    """Peaks of S and T of the loop ``system`` (the open loop L) under negative unit feedback.
+
+    Parameters
+    ----------
+    system : StateSpace, TransferFunction or DelaySystem
+        L, one input, one output.
+    delay_s : float, optional
+        Exact delay in series with L, s.
+    """
+    inner = hasattr(system, "delays_s") and system.delays_s.size > 0
+    if inner or delay_s:
+        form = (
+            delay_form(system, delay_s)
+            if hasattr(system, "delays_s")
+            else from_rational(rational_loop(system), delay_s)
+        )
+        found = [delayed_extreme(form, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
+        unit = 1.0 if form.period_s is None else 1.0 / form.period_s
+    else:
+        loop = rational_loop(system.to_state_space() if hasattr(system, "delays_s") else system)
+        found = [rational_extreme(loop, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
+        unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+    (s_value, s_place), (t_value, t_place) = found
+    return Peaks(_db(s_value), s_place * unit, _db(t_value), t_place * unit)
+
+
+def _db(inverse: float) -> float:
+    return -20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
+
+
+def _dc(form: DelayForm) -> float:
+    low, order = low_frequency(form)
+    if order:
+        raise InputError("the response has a pole at zero frequency: it is no closed loop with a bandwidth")
+    try:
+        value = float(border_values(form.without_series(), np.zeros(1))[0].real)
+    except np.linalg.LinAlgError:
+        value = float(border_values(form.without_series(), np.array([low]))[0].real)
+    if not math.isfinite(value):
+        value = float(border_values(form.without_series(), np.array([low]))[0].real)
+    reference = float(np.abs(border_values(form.without_series(), np.array([low * 1e3])))[0])
+    if abs(value) <= 1e-12 * reference:
+        raise InputError("the response is zero at zero frequency: there is no value to measure the fall from")
+    return value
+
+
+def _rational_falls(loop: RationalLoop, level: float) -> list[float]:
+    if not loop.order:
+        return []
+    scaled = replace(
+        loop,
+        c=loop.c / level,
+        d=loop.d / level,
+        numerator=None if loop.numerator is None else loop.numerator / level,
+    )
+    return gain_crossings(scaled, Circles(scaled, sorted_poles(loop.A, loop.sampled).values)).tolist()
+
+
+def _first_turn(form: DelayForm, dc: float) -> float | None:
+    """First x at which the phase, followed from zero frequency, falls below -90 deg."""
+    from scipy.optimize import brentq
+
+    low, _ = low_frequency(form)
+    high = math.pi if form.sampled else low * 10.0
+    bare_slope = 1e4 * low
+    phase_start = 0.0
+    start_x, start_value = low, complex(border_values(form, np.array([low]))[0]) * np.sign(dc)
+    phase_start = float(np.angle(start_value))
+    for _ in range(1 if form.sampled else 14):
+        edges = np.geomspace(start_x, high, 12)
+        found = subdivided(form, edges, lambda c: reach(form, c) < 0.3 * np.abs(c.L))
+        values = np.concatenate(([start_value], found.L * np.sign(dc)))
+        x = np.concatenate(([start_x], found.x))
+        phase = phase_start + np.concatenate(([0.0], np.cumsum(np.angle(values[1:] * values[:-1].conj()))))
+        below = np.flatnonzero(phase < -0.5 * np.pi)
+        if below.size:
+            k = int(below[0])
+            base, reference = float(phase[k - 1]), complex(values[k - 1])
+
+            def excess(at: float, base: float = base, reference: complex = reference) -> float:
+                L = complex(border_values(form, np.array([at]))[0]) * np.sign(dc)
+                return base + float(np.angle(L * reference.conjugate())) + 0.5 * np.pi
+
+            return float(brentq(excess, x[k - 1], x[k], xtol=1e-300, rtol=1e-14))
+        if form.sampled or (abs(values[-1]) < 1e-9 * abs(dc) and high > bare_slope):
+            break
+        start_x, start_value, phase_start = float(x[-1]), complex(values[-1]), float(phase[-1])
+        high *= 10.0
+    return None

@@ -1,0 +1,116 @@
+"""Phase without ambiguity: unwrapped factor by factor, the same on any grid."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
+from actuator_lti.margins.delayed import low_frequency
+from actuator_lti.margins.factors import factor_phase, poles, zeros
+from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
+from actuator_lti.margins.poles import sorted_poles
+from actuator_lti.margins.sweep import reach, subdivided
+
+
+def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.0) -> Real:
+    """Phase of a system over frequency, in deg, without jumps of 360 deg whatever the grid.
+
+    The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is
+    -omega delay; a system with inner delays is followed from low frequency in steps that a bound keeps
+    below a quarter turn. At zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
+    and 180 deg less for a negative gain. An undamped resonance turns by -180 deg, as a damped one does.
+
+    Parameters
+    ----------
+    system : StateSpace, TransferFunction or DelaySystem
+        One input, one output, continuous or sampled.
+    omega_rad_s : array_like
+        Angular frequencies > 0 (for a sampled system up to the Nyquist frequency), any order, any shape.
+    delay_s : float, optional
+        Exact delay in series, s.
+
+    Returns
+    -------
+    array
+        Phase in deg, shape of ``omega_rad_s``.
+
+    Raises
+    ------
+    InputError
+        A frequency that is not positive and finite, or beyond Nyquist; measured data, which have no factors.
+
+    Examples
+    --------
+    >>> import control
+    >>> lag = control.tf([1], [0.01, 1])
+    >>> round(float(unwrapped_phase_deg(lag, 1e4, delay_s=0.02)), 1)
+    -11548.6
+    """
+    omega = np.asarray(omega_rad_s, dtype=float)
+    if not (np.isfinite(omega).all() and (omega > 0.0).all()):
+        raise InputError("omega_rad_s: every frequency must be positive and finite")
+    if hasattr(system, "frdata"):
+        raise InputError("measured data have no factors: their phase cannot be unwrapped with certainty")
+    flat = np.atleast_1d(omega).ravel()
+    if hasattr(system, "delays_s"):
+        if system.delays_s.size:
+            phase = _followed(delay_form(system), flat)
+            return np.degrees(phase - flat * delay_s).reshape(omega.shape)
+        system = system.to_state_space()
+    loop = rational_loop(system)
+    x = flat if loop.period_s is None else flat * loop.period_s
+    if loop.sampled and (x > math.pi * (1.0 + 1e-12)).any():
+        raise InputError(
+            f"omega_rad_s: up to the Nyquist frequency {math.pi / (loop.period_s or 1.0):.6g} rad/s"
+        )
+    return np.degrees(rational_phase(loop, x) - flat * delay_s).reshape(omega.shape)
+
+
+def rational_phase(loop: RationalLoop, x: Real) -> Real:
+    """Unwrapped phase of a rational loop in rad; x as in `RationalLoop`."""
+    roots, p = zeros(loop), poles(loop)
+    at_dc = 1.0 + 0j if loop.sampled else 0j
+    border = [pole for pole in sorted_poles(loop.A, loop.sampled).border if pole.x == 0.0]
+    if border:  # a cluster of eigenvalues about the exact multiple pole
+        nearest = np.argsort(np.abs(p - at_dc))[: border[0].multiplicity]
+        p = p.copy()
+        p[nearest] = at_dc
+    near = np.abs(np.concatenate((roots, p)) - at_dc)
+    size = float(near.max()) if near.size else 1.0
+    first = 1e-3 * float(
+        min(near[near > 1e-7 * size].min(initial=1.0 if loop.sampled else size or 1.0), 1e300)
+    )
+    everywhere = np.append(x, first)
+    factors = factor_phase(roots, everywhere, loop.sampled) - factor_phase(p, everywhere, loop.sampled)
+    exact = np.angle(loop.response(everywhere))
+    sign = -np.pi if abs(_wrapped(exact[-1:] - factors[-1:])[0]) > 0.5 * np.pi else 0.0
+    factors = factors + sign
+    correction = _wrapped(exact - factors)
+    return (factors + np.where(np.isfinite(correction), correction, 0.0))[
+        :-1
+    ]  # on a pole: between both sides
+
+
+def _wrapped(angle: Real) -> Real:
+    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
+
+
+def _followed(form: DelayForm, omega: Real) -> Real:
+    """Unwrapped phase of a system with inner delays, rad."""
+    low, order = low_frequency(form)
+    edges = np.geomspace(low, max(float(omega.max()), 2.0 * low) * 1.001, 60)
+    found = subdivided(form, edges, lambda c: reach(form, c) < 0.5 * np.abs(c.L))
+    start = -0.5 * np.pi * order
+    first = float(np.angle(found.L[0]) - start)
+    first -= 2.0 * np.pi * np.round(first / (2.0 * np.pi))
+    if first > 0.5 * np.pi:
+        first -= 2.0 * np.pi  # a negative gain counts as -180 deg
+    steps = np.angle(found.L[1:] * found.L[:-1].conj())
+    phase = start + first + np.concatenate(([0.0], np.cumsum(steps)))
+    nearest = np.clip(np.searchsorted(found.x + found.half, omega), 0, found.x.size - 1)
+    return phase[nearest] + np.angle(border_values(form, omega) * found.L[nearest].conj())
