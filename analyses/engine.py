@@ -23,6 +23,7 @@ Arrays = dict[str, np.ndarray]
 Sink = Callable[[Chunk, Arrays], None]
 Progress = Callable[[int, int], None]
 _IN_FLIGHT = 3  # chunks a worker that are under way or waiting to be written
+CONNECT_S = 10.0
 _RETRIES = 20  # workers that may die over one chunk before the run gives up
 
 
@@ -79,7 +80,7 @@ class Engine:
 
         try:
             if self.scheduler is not None:
-                with distributed.Client(self.scheduler, timeout="10s") as client:
+                with distributed.Client(self.scheduler, timeout=CONNECT_S) as client:
                     _submit(client, task, todo, sink)
                 return
             with (
