@@ -18,6 +18,8 @@ from actuator_lti.errors import InputError, NumericalError
 
 FloatArray = NDArray[np.float64]
 
+CLUTCH_KNEE = 0.5
+"""Share of a run's speed over which the slipping clutch builds up its moment."""
 RPM = 2.0 * np.pi / 60.0
 
 
@@ -104,12 +106,12 @@ def _simulate_run(
 
     command = commands.ramp(speed / design.total_ratio, plan.lead_s, plan.duration_s - plan.lead_s)
     times = np.arange(0.0, plan.duration_s + plan.log_period_s, plan.log_period_s)
-    moment = _clutch_moment(plan, times, load, rng)
-    run = simulate(design, command, duration_s=plan.duration_s, load_Nm=loads.series(times, moment))
+    moment = load * _ripple(plan, len(times), rng)
     every = max(round(plan.log_period_s / design.controller.period_s), 1)
-    part = slice(0, None, every)
-    middle = run.motor_speed_rad_s[len(run.time_s) // 2 :: every]
-    plateau = float(np.median(middle[: len(middle) // 2]))
+    load_series = loads.series(times, moment)
+    run = simulate(design, command, plan.duration_s, load_series, record_every=every)
+    rows = len(run.time_s)
+    plateau = float(np.median(run.motor_speed_rad_s[rows // 2 : 3 * rows // 4]))
     if abs(plateau - speed) > 0.01 * speed:
         raise NumericalError(
             f"run {identity}: reaches {plateau:.1f} rad/s of {speed:.1f} rad/s; lower speed or load"
@@ -118,22 +120,29 @@ def _simulate_run(
         id=identity,
         speed_setting_rad_s=speed,
         load_setting_Nm=load,
-        time_s=run.time_s[part],
-        current_A=run.current_A[part],
-        speed_rad_s=run.motor_speed_rad_s[part],
-        angle_rad=run.motor_angle_rad[part],
-        torque_Nm=np.interp(run.time_s[part], times, moment),
+        time_s=run.time_s,
+        current_A=run.current_A,
+        speed_rad_s=run.motor_speed_rad_s,
+        angle_rad=run.motor_angle_rad,
+        torque_Nm=np.interp(run.time_s, times, moment) * _build_up(run.motor_speed_rad_s, speed),
     )
 
 
-def _clutch_moment(plan: BenchPlan, time_s: FloatArray, load: float, rng: np.random.Generator) -> FloatArray:
-    """The slipping clutch: no moment at rest, its setting with a slow ripple while it turns."""
+def _ripple(plan: BenchPlan, rows: int, rng: np.random.Generator) -> FloatArray:
+    """The clutch's slow ripple about one, a first-order process."""
     from scipy.signal import lfilter
 
     keep = float(np.exp(-plan.log_period_s / plan.ripple_time_s))
-    noise = rng.standard_normal(len(time_s)) * np.sqrt(1.0 - keep**2)
-    ripple = 1.0 + plan.ripple * np.asarray(lfilter([1.0], [1.0, -keep], noise))
-    rise = 1.0 - np.exp(-np.maximum(time_s - plan.lead_s, 0.0) / 0.02)
-    stop = plan.duration_s - plan.lead_s
-    fall = np.exp(-np.maximum(time_s - stop, 0.0) / 0.02)
-    return np.asarray(load * ripple * rise * fall)
+    noise = rng.standard_normal(rows) * np.sqrt(1.0 - keep**2)
+    return np.asarray(1.0 + plan.ripple * lfilter([1.0], [1.0, -keep], noise))
+
+
+def _build_up(speed_rad_s: FloatArray, setting_rad_s: float) -> FloatArray:
+    """Share of the clutch's moment at the sensor: none at rest, all of it at the run's speed.
+
+    The simulated drive feels the whole moment throughout, which at rest and in the few ms of run-up only
+    changes its dry friction.
+    """
+    return np.asarray(
+        np.tanh(np.abs(speed_rad_s) / (CLUTCH_KNEE * setting_rad_s)) / np.tanh(1.0 / CLUTCH_KNEE)
+    )

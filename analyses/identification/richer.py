@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analyses.identification.outliers import with_shared
 from analyses.identification.surface import SurfaceFit
 
 FloatArray = NDArray[np.float64]
@@ -58,10 +59,10 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     side = np.array([float(p.direction) for p in points])
     torque = np.array([p.torque_Nm for p in points])
     weight = 1.0 / fit.residual_stds_Nm
-    weight = weight / np.sqrt(np.mean(weight**2))
     folds = _folds(speed, load, side)
-    data = _Data(speed, load, side, torque, weight)
-    base = _errors(data, folds, _plain(data))
+    data = _Data(speed, load, side, torque, weight, fit.shared_effects * weight[:, None])
+    unit = 1.0 / float(np.sqrt(np.mean(weight**2)))
+    base = unit * _errors(data, folds, _plain(data))
     scores = [_score("plain", "C0 + Cv w + CM |M|", 3, base, base)]
     for name, formula, terms in _LAWS:
         extra = terms(speed, load, side)
@@ -71,8 +72,9 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
             scores.append(_impossible(name, formula, "too few runs"))
         else:
             table = np.column_stack([_plain(data), extra])
-            scores.append(_score(name, formula, table.shape[1], base, _errors(data, folds, table)))
-    scores.append(_score("Stribeck", "+ CS exp(-w/ws)", 5, base, _stribeck_errors(data, folds)))
+            errors = unit * _errors(data, folds, table)
+            scores.append(_score(name, formula, table.shape[1], base, errors))
+    scores.append(_score("Stribeck", "+ CS exp(-w/ws)", 5, base, unit * _stribeck_errors(data, folds)))
     good = [score for score in scores if score.warranted]
     best = min(good, key=lambda score: score.error_Nm).name if good else "plain"
     return RicherLaws(scores=tuple(scores), best=best, folds=int(folds.max()) + 1)
@@ -93,6 +95,7 @@ class _Data:
     side: FloatArray
     torque: FloatArray
     weight: FloatArray
+    shared: FloatArray
 
 
 def _plain(data: _Data) -> FloatArray:
@@ -113,15 +116,26 @@ def _errors(data: _Data, folds: NDArray[np.int64], table: FloatArray) -> FloatAr
     out = np.empty(len(folds))
     for fold in range(int(folds.max()) + 1):
         seen, unseen = folds != fold, folds == fold
-        values = _fit(table[seen], data.torque[seen], data.weight[seen])
-        out[unseen] = (data.torque[unseen] - table[unseen] @ values) * data.weight[unseen]
+        out[unseen] = _predicted(data, table, seen, unseen)[0]
     return out
 
 
-def _fit(table: FloatArray, torque: FloatArray, weight: FloatArray) -> FloatArray:
-    rows = table * weight[:, None]
-    scale = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
-    return np.asarray(np.linalg.lstsq(rows / scale, torque * weight, rcond=None)[0] / scale)
+def _predicted(
+    data: _Data, table: FloatArray, seen: NDArray[np.bool_], unseen: NDArray[np.bool_]
+) -> tuple[FloatArray, float]:
+    """Weighted errors at the unseen runs of a law fitted to the seen ones, and what is left at those.
+
+    The shared errors are estimated along, within their bounds: a law must not be credited with what an
+    instrument may have done.
+    """
+    rows = table * data.weight[:, None]
+    torque = data.torque * data.weight
+    scale = np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
+    a = with_shared(rows[seen] / scale, data.shared[seen])
+    b = np.concatenate([torque[seen], np.zeros(data.shared.shape[1])])
+    found = np.linalg.lstsq(a, b, rcond=None)[0]
+    errors = torque[unseen] - np.column_stack([rows[unseen] / scale, data.shared[unseen]]) @ found
+    return errors, float(np.sum((b - a @ found) ** 2))
 
 
 def _stribeck_errors(data: _Data, folds: NDArray[np.int64]) -> FloatArray:
@@ -130,11 +144,8 @@ def _stribeck_errors(data: _Data, folds: NDArray[np.int64]) -> FloatArray:
     out = np.empty(len(folds))
     for fold in range(int(folds.max()) + 1):
         seen, unseen = folds != fold, folds == fold
-        y, w = data.torque[seen], data.weight[seen]
-        fits = [_fit(table[seen], y, w) for table in tables]
-        rests = [float(np.sum(((y - t[seen] @ v) * w) ** 2)) for t, v in zip(tables, fits, strict=True)]
-        k = int(np.argmin(rests))
-        out[unseen] = (data.torque[unseen] - tables[k][unseen] @ fits[k]) * data.weight[unseen]
+        tried = [_predicted(data, table, seen, unseen) for table in tables]
+        out[unseen] = min(tried, key=lambda one: one[1])[0]
     return out
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.outliers import find_outliers
 from analyses.identification.points import SteadyPoint
-from analyses.identification.systematic import ErrorDraws, SharedError, draw_errors, shared_errors
+from analyses.identification.systematic import ErrorDraws, SharedError, draw_errors, effects_of, shared_errors
 from analyses.records.campaign_file import Instruments
 
 FloatArray = NDArray[np.float64]
@@ -38,11 +38,11 @@ class SurfaceFit:
     """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are.
 
     ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
-    errors, whose bounds move the coefficients by ``shared_shifts[name]``. ``half_widths`` are those of the 95
-    % intervals, from propagated distributions.
-    ``residuals_Nm`` and ``residual_stds_Nm`` are those of the runs used, in the order of ``points``.
-    ``run_scatter_Nm`` is the scatter between runs that their own noise does not explain, ``birge_ratio`` the
-    ratio of the two (1: explained).
+    errors, whose bounds move the coefficients by ``shared_shifts[name]`` and the torques of the runs by the
+    columns of ``shared_effects``. ``half_widths`` are those of the 95 % intervals, from propagated
+    distributions. ``residuals_Nm`` and ``residual_stds_Nm`` are those of the runs used, in the order of
+    ``points``. ``run_scatter_Nm`` is the scatter between runs that their own noise does not explain,
+    ``birge_ratio`` the ratio of the two (1: explained).
     """
 
     points: tuple[SteadyPoint, ...]
@@ -52,6 +52,7 @@ class SurfaceFit:
     shared_shifts: dict[str, FloatArray]
     half_widths: FloatArray
     draws: ErrorDraws
+    shared_effects: FloatArray
     residuals_Nm: FloatArray
     residual_stds_Nm: FloatArray
     run_scatter_Nm: float
@@ -116,7 +117,9 @@ def fit_surface(
     _check_excited(used)
     names = tuple(point.run for point in used)
     x, y = _table(used)
-    found = find_outliers(x, y, _own_variance(used, _ordinary(x, y)))
+    start = _ordinary(x, y)
+    errors = shared_errors(used, instruments, start[2], torque_constant_Nm_A)
+    found = find_outliers(x, y, _own_variance(used, start), effects_of(errors, len(y)))
     named = tuple(
         Outlier(run=names[k], standardised=float(value), limit=found.limit, set_aside=outliers == "set-aside")
         for k, value in zip(found.rows, found.standardised, strict=True)
@@ -139,8 +142,8 @@ def _fitted(
     for _ in range(ITERATIONS):
         own = _own_variance(points, theta)
         shared = shared_errors(points, instruments, theta[2], torque_constant)
-        scatter, birge = _run_scatter(x, y, own)
-        gain = _gain(x, own + scatter, shared)
+        scatter, birge = _run_scatter(x, y, own, shared)
+        gain = _gain(x, _covariance(own + scatter, shared))
         change = gain @ y - theta
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
@@ -159,6 +162,7 @@ def _fitted(
         shared_shifts=shifts,
         half_widths=draws.half_width(),
         draws=draws,
+        shared_effects=effects_of(shared, len(y)),
         residuals_Nm=y - x @ theta,
         residual_stds_Nm=np.sqrt(variance),
         run_scatter_Nm=float(np.sqrt(scatter)),
@@ -194,30 +198,35 @@ def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatAr
     return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
 
 
-def _gain(x: FloatArray, variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
+def _covariance(variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
+    """Covariance of the torques: each run's own, and the shared errors (a third of the bound squared)."""
+    effects = effects_of(shared, len(variance))
+    return np.asarray(np.diag(variance) + effects @ effects.T / 3.0)
+
+
+def _gain(x: FloatArray, covariance: FloatArray) -> FloatArray:
     """The matrix that makes the coefficients of the torques: (X' V^-1 X)^-1 X' V^-1."""
-    covariance = np.diag(variance)
-    for error in shared:
-        covariance += np.outer(error.effect, error.effect) / 3.0
     whitened = np.linalg.solve(covariance, x)
     return np.asarray(np.linalg.solve(x.T @ whitened, whitened.T))
 
 
-def _run_scatter(x: FloatArray, y: FloatArray, own: FloatArray) -> tuple[float, float]:
+def _run_scatter(
+    x: FloatArray, y: FloatArray, own: FloatArray, shared: tuple[SharedError, ...]
+) -> tuple[float, float]:
     """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
     freedom = len(y) - x.shape[1]
 
     def chi_square(extra: float) -> float:
-        variance = own + extra
-        rest = y - x @ (_gain(x, variance, ()) @ y)
-        return float(np.sum(rest**2 / variance))
+        covariance = _covariance(own + extra, shared)
+        rest = y - x @ (_gain(x, covariance) @ y)
+        return float(rest @ np.linalg.solve(covariance, rest))
 
     first = chi_square(0.0)
     birge = float(np.sqrt(first / freedom))
     if first <= freedom:
         return 0.0, birge
     low, high = 0.0, 10.0 * float(np.var(y - x @ _ordinary(x, y))) + float(np.max(own))
-    for _ in range(60):
+    for _ in range(30):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if chi_square(middle) > freedom else (low, middle)
     return 0.5 * (low + high), birge

@@ -53,6 +53,11 @@ def shared_errors(
     return tuple(error for error in candidates if np.any(error.effect != 0.0))
 
 
+def effects_of(errors: tuple[SharedError, ...], runs: int) -> FloatArray:
+    """The effects of all errors as columns, shape (runs, errors)."""
+    return np.array([error.effect for error in errors]).reshape(len(errors), runs).T
+
+
 @dataclass(frozen=True, kw_only=True)
 class ErrorDraws:
     """Draws of the joint error of the coefficients, shape (draws, p): random and shared parts together."""
