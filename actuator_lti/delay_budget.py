@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.plant import OperatingPoint
 
-_GRID = 2000
+_GRID = 1000
 _LOW = 1e-4  # of the frequency asked for: where unwrapping starts
 
 

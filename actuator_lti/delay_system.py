@@ -8,6 +8,7 @@ A `DelaySystem` is a state space in linear fractional form with a bank of delays
 
 Series, parallel and feedback connection only rearrange these matrices, so nested loops keep every delay
 exactly, and the frequency response is that of the delays themselves: nowhere a Pade approximation.
+Plots of python-control take its frequency response: ``control.bode_plot(control.frequency_response(loop))``.
 """
 
 from __future__ import annotations

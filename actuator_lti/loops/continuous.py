@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.delay_system import DelaySystem
-from actuator_lti.errors import InputError
 from actuator_lti.loops.cascade import ERRORS, MEASURED, Cascade
 from actuator_lti.loops.flow import INPUTS, Flow, FlowProgram
 from actuator_lti.loops.result import Loop
@@ -68,29 +67,30 @@ def point_loop(wired: Cascade, point: str, delays: str) -> Loop:
     return _loop(wired, loop, f"at {point}", point, (point, f"{point}_returned"))
 
 
-def reference_to_output(wired: Cascade, delays: str) -> Any:
-    """Command at the output shaft to output angle; the feed-forward acts on the derivative of the command.
+def feedforward_rate(wired: Cascade, delays: str, s: np.ndarray) -> np.ndarray:
+    """What the feed-forward takes for the derivative of the command: s, or with delays the controller's own.
 
-    The derivative is carried out exactly: with x' = x - B_rate r the command itself remains as input.
+    With delays it is the backward difference over the position period, (1 - exp(-s T))/T, as in the tick.
+    """
+    T = wired.period_s("position")
+    return s if delays == "none" else -np.expm1(-s * T) / T
+
+
+def reference_to_output(wired: Cascade, delays: str) -> Any:
+    """Command at the output shaft to output angle, with the feed-forward on the derivative of the command.
+
+    Ideal form: the exact derivative (with x' = x - B_rate r the command itself remains as input); with
+    delays see `feedforward_rate`, its delay kept exactly.
     """
     flow = FlowProgram(wired, "position", None, delays).flow()
     system = delay_system(flow, "ref", "th", scale=1 / wired.ratio)
     rate = delay_system(flow, "ref_rate", "th", scale=1 / wired.ratio)
-    if np.any(rate.D11) or np.any(rate.D21):
-        return _with_rate(system, rate, wired)
-    B = system.B1 + system.A @ rate.B1
-    D11, D21 = system.D11 + system.C1 @ rate.B1, system.D21 + system.C2 @ rate.B1
-    plain = DelaySystem(
-        *(system.A, B, system.B2, system.C1, system.C2), *(D11, system.D12, D21, system.D22), system.delays_s
-    )
-    return finished(plain, name="reference_to_output", inputs=["th_ref"], outputs=["output_angle"])
-
-
-def _with_rate(system: DelaySystem, rate: DelaySystem, wired: Cascade) -> Any:
-    """The feed-forward through a delay: by the backward difference over the position period (exact delay)."""
-    T = wired.period_s("position")
-    if np.any(rate.D11):
-        raise InputError("control.position.feedforward: the command's derivative reaches the output directly")
-    difference = (DelaySystem.from_system(1.0) - DelaySystem.delay(T)) / T
-    total = system + rate * difference
+    if wired.design.controller.position.feedforward == 0.0:
+        total = system
+    elif system.delay_free:
+        B, D = system.B1 + system.A @ rate.B1, system.D11 + system.C1 @ rate.B1
+        total = DelaySystem(system.A, B, [], system.C1, [], D, [], [], [], [])
+    else:
+        T = wired.period_s("position")
+        total = system + rate * ((DelaySystem.from_system(1.0) - DelaySystem.delay(T)) / T)
     return finished(total, name="reference_to_output", inputs=["th_ref"], outputs=["output_angle"])

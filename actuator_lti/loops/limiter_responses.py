@@ -9,7 +9,7 @@ import numpy as np
 from actuator_lti.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.blocks import compose
 from actuator_lti.loops.cascade import Cascade
-from actuator_lti.loops.continuous import delay_system
+from actuator_lti.loops.continuous import delay_system, feedforward_rate
 from actuator_lti.loops.flow import FlowProgram
 from actuator_lti.loops.tick import TickProgram
 
@@ -47,7 +47,7 @@ def sampled_limiters(wired: Cascade) -> dict[str, LimiterPath]:
 
 
 def continuous_limiters(wired: Cascade, delays: str) -> dict[str, LimiterPath]:
-    """With exact delays, or ideal; the feed-forward acts on j w times the command."""
+    """With exact delays, or ideal; the change of the speed command is taken as its derivative."""
     flow = FlowProgram(wired, "position", None, delays).flow()
 
     def evaluate(signal: str, kind: str) -> Response:
@@ -55,7 +55,7 @@ def continuous_limiters(wired: Cascade, delays: str) -> dict[str, LimiterPath]:
 
         def response(omega: np.ndarray) -> np.ndarray:
             s = 1j * omega
-            values = direct(s) + s * rate(s)
+            values = direct(s) + feedforward_rate(wired, delays, s) * rate(s)
             return np.atleast_2d(s * values if kind == "rate" else values)
 
         return response

@@ -73,7 +73,8 @@ class ExactMargins:
         up from 1 and down from 1; ``inf`` and 0 where there is none within a factor of 1e4. NaN if unstable.
     delay_s : float or None
         Smallest added computing delay that does so, in s (only at ``"u"``; ``inf`` if none within the bound
-        asked for; NaN if unstable).
+        asked for; NaN if unstable). It moves the hold within the tick, so where it is no whole number of
+        ticks it differs a little from phase margin over frequency, which delays the sampled signal.
     spectral_radius : float
         Largest eigenvalue magnitude over one position period.
     """

@@ -6,6 +6,8 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
+from hypothesis import strategies as st
+
 from actuator_lti.design.model import (
     Controller,
     CurrentLoop,
@@ -20,7 +22,6 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
-from hypothesis import strategies as st
 
 
 def amber(

@@ -7,8 +7,9 @@ piece of a tick, stored angles for the difference speed, PI as written there.
 from __future__ import annotations
 
 import numpy as np
-from actuator_lti.design.model import Design
 from scipy.linalg import expm
+
+from actuator_lti.design.model import Design
 
 
 def _piece(A: np.ndarray, B: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:

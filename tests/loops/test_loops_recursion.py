@@ -7,11 +7,12 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from actuator_lti import assemble_loops
-from actuator_lti.design.model import Design, Encoder
 from hypothesis import given, settings
 from loop_designs import amber, designs, emps
 from loop_recursion import run
+
+from actuator_lti import assemble_loops
+from actuator_lti.design.model import Design, Encoder
 
 
 def worst(ours: np.ndarray, theirs: np.ndarray) -> float:

@@ -1,0 +1,348 @@
+"""The three forms against each other, operating points, break points, traps."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from loop_designs import amber, ctms_position, designs, emps, without
+
+from actuator_lti import DelaySystem, InputError, assemble_loops
+from actuator_lti.design.model import Design, Encoder, Friction, Load
+from actuator_lti.loops import exact_margins
+from actuator_lti.plant import friction_slope
+
+
+def response(system: Any, omega: np.ndarray) -> np.ndarray:
+    return np.asarray(system(np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega))
+
+
+def proportional(design: Design) -> Design:
+    """The design with P controllers only."""
+    control_ = design.controller
+    assert control_.velocity is not None
+    assert control_.current is not None
+    return replace(
+        design,
+        controller=replace(
+            control_,
+            velocity=replace(control_.velocity, integral_time_s=None),
+            current=replace(control_.current, integral_time_s=None),
+        ),
+    )
+
+
+def faster(design: Design, factor: float) -> Design:
+    """The same continuous drive, all sampling and delay shortened by a factor."""
+    control_ = design.controller
+    return replace(
+        design,
+        controller=replace(
+            control_,
+            period_s=control_.period_s / factor,
+            computing_delay_s=control_.computing_delay_s / factor,
+        ),
+        encoder=replace(design.encoder, filter_time_s=design.encoder.filter_time_s / factor),
+    )
+
+
+def phase_gaps(design: Design, omega: np.ndarray) -> np.ndarray:
+    """Phase of sampled over continuous, one row a loop, in rad."""
+    sampled, continuous = assemble_loops(design), assemble_loops(design, "continuous")
+    rows = []
+    for name, loop in sampled.present.items():
+        ratio = response(loop.open_loop, omega) / response(getattr(continuous, name).open_loop, omega)
+        rows.append(np.angle(ratio))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize(
+    "encoder",
+    [
+        Encoder(),
+        Encoder(speed="difference", difference_samples=3),
+        Encoder(speed="difference", filter_time_s=5e-4),
+    ],
+)
+def test_delays_are_placed_right(encoder: Encoder) -> None:
+    """With P controllers the phases of sampled and continuous differ only to second order in Ts.
+
+    A hold counted twice, or missing, would leave a first-order difference: halving, not quartering.
+    """
+    design = proportional(amber(2, 10, delay_s=1.5e-4, encoder=encoder))
+    omega = np.array([30.0, 100.0])
+    gaps = [np.max(np.abs(phase_gaps(faster(design, k), omega)), axis=1) for k in (8, 16, 32)]
+    order = np.log2(gaps[1] / gaps[2])
+    assert np.all(order > 1.9)
+    # and in size: far less than half a tick
+    assert np.all(gaps[2] < 0.02 * 100.0 * 0.5e-4 / 32)
+
+
+def test_sampled_tends_to_continuous_and_both_to_ideal() -> None:
+    design, omega = amber(2, 10, delay_s=1e-4), np.array([20.0, 100.0, 300.0])
+    ideal = assemble_loops(design, "ideal")
+    for form in ("sampled", "continuous"):
+        errors = []
+        for k in (64, 128):
+            loops = assemble_loops(faster(design, k), form)  # type: ignore[arg-type]
+            errors.append(
+                max(
+                    np.max(
+                        np.abs(
+                            response(loop.open_loop, omega) / response(getattr(ideal, name).open_loop, omega)
+                            - 1
+                        )
+                    )
+                    for name, loop in loops.present.items()
+                )
+            )
+        assert errors[1] < 5e-3
+        assert errors[0] / errors[1] == pytest.approx(2, abs=0.1)  # first order in Ts
+
+
+def test_ideal_loops_are_the_hand_transfer_functions() -> None:
+    design = amber()
+    loops = assemble_loops(design, "ideal")
+    s = 1j * np.geomspace(0.1, 1e5, 60)
+    R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6
+    Ci = 0.02 * (1 + 1 / (150e-6 * s))
+    Cw = 0.12 * (1 + 1 / (15e-3 * s))
+    Li = Ci * (J * s + Cv) / ((L * s + R) * (J * s + Cv) + K**2)
+    assert loops.current is not None
+    assert loops.velocity is not None
+    assert loops.position is not None
+    np.testing.assert_allclose(loops.current.open_loop(s), Li, rtol=1e-10)
+    Lw = Cw * Li / (1 + Li) * K / (J * s + Cv)
+    np.testing.assert_allclose(loops.velocity.open_loop(s), Lw, rtol=1e-9)
+    Lp = 120 * Lw / (1 + Lw) / s
+    np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
+    np.testing.assert_allclose(loops.reference_to_output(s), Lp / (1 + Lp), rtol=1e-8)
+    # at i_ref with the position loop closed as well: Cw (1 + Kv/s) T_i K/(J s + Cv)
+    np.testing.assert_allclose(loops.break_points["i_ref"].open_loop(s), Lw * (1 + 120 / s), rtol=1e-8)
+
+
+def test_continuous_loops_keep_the_nested_delays() -> None:
+    design = amber(2, 10, delay_s=1.3e-4)
+    loops = assemble_loops(design, "continuous")
+    s = 1j * np.geomspace(0.1, 1e5, 60)
+    R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6
+    Li = 0.02 * (1 + 1 / (150e-6 * s)) * np.exp(-s * 1.8e-4)
+    Li = Li * (J * s + Cv) / ((L * s + R) * (J * s + Cv) + K**2)
+    Lw = 0.12 * (1 + 1 / (15e-3 * s)) * np.exp(-s * 0.5e-4) * Li / (1 + Li) * K / (J * s + Cv)
+    Lp = 120 / s * np.exp(-s * 4e-4) * Lw / (1 + Lw)
+    assert loops.position is not None
+    assert isinstance(loops.position.open_loop, DelaySystem)
+    np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
+    np.testing.assert_allclose(loops.position.closed_loop(s), Lp / (1 + Lp), rtol=1e-8)
+    np.testing.assert_allclose(loops.position.sensitivity(s), 1 / (1 + Lp), rtol=1e-8)
+
+
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_feedforward_is_the_derivative_of_the_command(form: Any) -> None:
+    """T_ff = T (1 + k_ff s/Kv); in the controller s is the backward difference over the position period."""
+    plain = assemble_loops(amber(2, 10), form).reference_to_output
+    fed = assemble_loops(amber(2, 10, feedforward=0.9), form).reference_to_output
+    omega = np.geomspace(1, 1000, 20)
+    rate = 1j * omega
+    if form != "ideal":
+        rate = (1 - np.exp(-1j * omega * 1e-3)) / 1e-3
+    np.testing.assert_allclose(
+        response(fed, omega), response(plain, omega) * (1 + 0.9 * rate / 120), rtol=1e-8
+    )
+
+
+def test_feedforward_of_a_position_loop_on_a_force_source() -> None:
+    design = without(emps(1e-3), "velocity", gain=2e4)
+    control_ = replace(design.controller, position=replace(design.controller.position, feedforward=200.0))
+    loops = assemble_loops(replace(design, controller=control_), "continuous")
+    omega = np.geomspace(1, 100, 10)
+    s = 1j * omega
+    P = 35.15065 / (s * (95.1089 * s + 203.5034)) * np.exp(-1.5e-3 * s)
+    rate = (1 - np.exp(-1e-3 * s)) / 1e-3
+    expected = (2e4 + 200 * rate) * P / (1 + 2e4 * P)
+    np.testing.assert_allclose(response(loops.reference_to_output, omega), expected, rtol=1e-9)
+
+
+def test_every_break_point_of_a_series_cascade() -> None:
+    loops = assemble_loops(amber())
+    assert list(loops.break_points) == ["u", "i_ref", "w_ref", "output"]
+    assert loops.position is not None
+    z = np.exp(1j * np.geomspace(1, 3e4, 30) * 1e-4)
+    for name in ("w_ref", "output"):
+        np.testing.assert_allclose(
+            loops.break_points[name].open_loop(z), loops.position.open_loop(z), rtol=1e-9
+        )
+    assert list(assemble_loops(ctms_position()).break_points) == ["u", "output"]
+    assert list(assemble_loops(without(amber(), "velocity", gain=1.0)).break_points) == [
+        "u",
+        "i_ref",
+        "output",
+    ]
+
+
+@pytest.mark.parametrize("rates", [(1, 1), (2, 10), (2, 2), (1, 5)])
+def test_closed_loops_of_all_break_points_have_the_poles_of_the_one_drive(rates: tuple[int, int]) -> None:
+    loops = assemble_loops(amber(*rates))
+    assert loops.tick_system is not None
+    whole = np.abs(np.linalg.eigvals(loops.tick_system.lifted().A))
+    largest = np.max(whole)
+    for point, loop in loops.break_points.items():
+        poles = np.abs(np.linalg.eigvals(loop.closed_loop.A))
+        updates = loop.period_s / (rates[1] * 1e-4)
+        assert np.max(poles) == pytest.approx(largest**updates, rel=1e-6), point
+
+
+def test_exact_margins_agree_with_the_bode_plot_where_the_loop_is_time_invariant() -> None:
+    loops = assemble_loops(amber())
+    exact = exact_margins(loops, "u")
+    margins = control.stability_margins(loops.break_points["u"].open_loop)
+    assert exact.stable
+    assert exact.gain_upper == pytest.approx(margins[0], rel=1e-6)
+    # a delay of the hold and of the samples are the same only in whole ticks: 4.81 and 4.69 of them here
+    assert exact.delay_s == pytest.approx(np.radians(margins[1]) / margins[4], rel=0.05)
+
+
+def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:
+    design = amber(2, 10)
+    exact = exact_margins(assemble_loops(design), "u")
+    assert exact.delay_s is not None
+    for change, stable in ((0.999, True), (1.001, False)):
+        slower = replace(
+            design.controller,
+            computing_delay_s=design.controller.computing_delay_s + change * exact.delay_s,
+        )
+        system = assemble_loops(replace(design, controller=slower)).tick_system
+        assert system is not None
+        assert bool(np.max(np.abs(np.linalg.eigvals(system.lifted().A))) < 1) is stable
+
+
+def test_trap_the_inner_loops_do_not_see_the_angle() -> None:
+    loops = assemble_loops(amber(encoder=Encoder(speed="difference", difference_samples=2)))
+    assert loops.current is not None
+    assert loops.velocity is not None
+    assert loops.position is not None
+    # the PI's own integrator is the only eigenvalue at 1 of the current and the velocity loop
+    for loop in (loops.current, loops.velocity):
+        assert np.sum(np.abs(loop.open_loop.poles() - 1) < 1e-9) == 1
+        assert np.all(np.abs(loop.closed_loop.poles()) < 1 - 1e-4)
+    assert np.sum(np.abs(loops.position.open_loop.poles() - 1) < 1e-9) == 1
+
+
+def test_trap_back_emf_and_the_locked_rotor() -> None:
+    free = assemble_loops(amber(), "ideal").current
+    locked = assemble_loops(amber(), "ideal", rotor="locked")
+    assert free is not None
+    assert locked.current is not None
+    # Ci(s) s-integral against a plant with a zero at -Cv/J: finite DC gain times 1/s would be infinite
+    K, Cv, J = 5.9e-3, 5.25e-6, 1.05e-6
+    assert abs(locked.current.closed_loop(1e-6j)) == pytest.approx(1, abs=1e-8)
+    dip = abs(free.closed_loop(30j))
+    plant = (J * 30j + Cv) / ((6e-6 * 30j + 0.055) * (J * 30j + Cv) + K**2)
+    L = 0.02 * (1 + 1 / (150e-6 * 30j)) * plant
+    assert dip == pytest.approx(abs(L / (1 + L)), rel=1e-9)
+    assert dip < 0.9
+    assert locked.velocity is None
+    assert locked.position is None
+    assert list(locked.break_points) == ["u"]
+    with pytest.raises(InputError, match="locked"):
+        assemble_loops(emps(), rotor="locked")
+
+
+def test_operating_points_of_the_friction() -> None:
+    design = amber()
+    assert friction_slope(design) == 5.25e-6
+    assert friction_slope(design, "rest", load_Nm=-8.0) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
+    slope = friction_slope(design, "describing-function", 8.0, speed_amplitude_rad_s=100.0)
+    assert slope == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
+    uneven = replace(
+        design,
+        friction=Friction(
+            dry_torque_Nm=2e-3,
+            dry_torque_reverse_Nm=4e-3,
+            viscous_Nms_rad=1e-6,
+            viscous_reverse_Nms_rad=3e-6,
+        ),
+    )
+    assert friction_slope(uneven, direction=-1) == 3e-6
+    assert friction_slope(uneven, "describing-function", speed_amplitude_rad_s=10.0) == pytest.approx(
+        2e-6 + 4 * 3e-3 / (np.pi * 10)
+    )
+    rest = assemble_loops(design, operating_point="rest", load_Nm=8.0).velocity
+    sliding = assemble_loops(design).velocity
+    assert rest is not None
+    assert sliding is not None
+    z = np.exp(1j * 50 * 1e-4)
+    assert abs(rest.open_loop(z)) < 0.5 * abs(sliding.open_loop(z))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"form": "discrete"}, "form = 'discrete'"),
+        ({"operating_point": "moving"}, "operating_point = 'moving'"),
+        ({"operating_point": "describing-function"}, "speed_amplitude_rad_s"),
+        ({"load_Nm": float("nan")}, "load_Nm"),
+        ({"direction": 0}, "direction"),
+        ({"rotor": "stuck"}, "rotor"),
+    ],
+)
+def test_refusals_name_the_argument(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        assemble_loops(amber(), **wrong)
+
+
+def test_stiffness_of_a_back_drivable_load() -> None:
+    design = amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0))
+    s = 1j * np.geomspace(0.01, 1e4, 20)
+    loop = assemble_loops(design, "ideal").velocity
+    assert loop is not None
+    R, L, K, J, Cv, k = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6, 40.0 / 2376**2
+    mechanics = s / (J * s**2 + Cv * s + k)
+    electric = 1 / ((L * s + R) + K**2 * mechanics)
+    Li = 0.02 * (1 + 1 / (150e-6 * s)) * electric
+    Lw = 0.12 * (1 + 1 / (15e-3 * s)) * Li / (1 + Li) * K * mechanics
+    np.testing.assert_allclose(loop.open_loop(s), Lw, rtol=1e-7)
+    held = assemble_loops(replace(design, load=Load(moment_slope_Nm_rad=-40.0)), "ideal").velocity
+    plain = assemble_loops(amber(), "ideal").velocity
+    assert held is not None
+    assert plain is not None
+    np.testing.assert_array_equal(held.open_loop.A, plain.open_loop.A)
+
+
+@settings(max_examples=25, deadline=None)
+@given(designs())
+def test_sensitivities_sum_to_one_in_every_form(design: Design) -> None:
+    omega = np.geomspace(1, 0.9 * np.pi / (design.controller.position.every * 1e-4), 12)
+    for form in ("sampled", "continuous", "ideal"):
+        loops = assemble_loops(design, form)  # type: ignore[arg-type]
+        for loop in (*loops.present.values(), *loops.break_points.values()):
+            L, T, S = (response(x, omega) for x in (loop.open_loop, loop.closed_loop, loop.sensitivity))
+            np.testing.assert_allclose(S + T, 1, atol=1e-7 * np.max(np.abs(T)))
+            np.testing.assert_allclose(S * (1 + L), 1, rtol=1e-5)
+            assert loop.open_loop.ninputs == 1
+            assert loop.unit_in == loop.unit_out
+
+
+def test_signals_are_named_and_bode_works() -> None:
+    loops = assemble_loops(amber())
+    assert loops.velocity is not None
+    assert loops.velocity.open_loop.input_labels == ["e_w"]
+    assert loops.velocity.open_loop.output_labels == ["w_meas"]
+    assert loops.reference_to_output.output_labels == ["output_angle"]
+    continuous = assemble_loops(amber(), "continuous").position
+    assert continuous is not None
+    assert continuous.open_loop.input_labels == ["e_th"]
+    frd = control.frequency_response(continuous.open_loop, np.array([1.0, 10.0, 100.0]))
+    np.testing.assert_allclose(frd.complex, continuous.open_loop(1j * np.array([1.0, 10.0, 100.0])))
+
+
+def test_importing_the_package_is_cheap() -> None:
+    code = "import sys, actuator_lti; print('control' in sys.modules, 'numpy' in sys.modules)"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.split() == ["False", "False"]
