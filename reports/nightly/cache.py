@@ -1,0 +1,108 @@
+"""Content-addressed store of results: one file an entry, whole or refused.
+
+An entry is one line (magic, version, SHA-256 of the rest) and a ZIP archive with ``meta.json`` (figures,
+verdicts, what the pages need) and the files of the report.  It is written beside and put in place, so a
+killed run leaves no half entry; one that was damaged later fails its checksum and is built again.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import time
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from reports.atomic import write_bytes
+from reports.nightly.text import sha256
+
+MAGIC = b"actuator-lti/nightly-cache 1 "
+MAX_ENTRY_BYTES = 256_000_000
+_COMPRESSION = 3
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A result as stored: ``meta`` at once, the files of the report when asked for."""
+
+    key: str
+    meta: Mapping[str, Any]
+    archive: bytes
+
+    def file(self, name: str) -> bytes:
+        """Content of one file of the report."""
+        with zipfile.ZipFile(io.BytesIO(self.archive)) as archive:
+            return archive.read(f"files/{name}")
+
+
+class CorruptEntry(ValueError):
+    """An entry whose checksum or layout is wrong."""
+
+
+@dataclass(frozen=True)
+class Cache:
+    """The store below one folder."""
+
+    folder: Path
+
+    def path(self, key: str) -> Path:
+        """Where an entry lies."""
+        return self.folder / key[:2] / f"{key}.entry"
+
+    def write(self, key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
+        """Store a result; the hashes of its files go into ``meta["files"]``."""
+        full = {**meta, "key": key, "files": {name: sha256(data) for name, data in files.items()}}
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=_COMPRESSION) as archive:
+            archive.writestr("meta.json", json.dumps(full, allow_nan=False))
+            for name, data in files.items():
+                archive.writestr(f"files/{name}", data)
+        body = buffer.getvalue()
+        write_bytes(self.path(key), MAGIC + sha256(body).encode() + b"\n" + body)
+
+    def read(self, key: str) -> Entry | None:
+        """Return an entry, or ``None`` where there is none.
+
+        Raises
+        ------
+        CorruptEntry
+            Where the file is there but not whole.
+        """
+        path = self.path(key)
+        try:
+            if path.stat().st_size > MAX_ENTRY_BYTES:
+                raise CorruptEntry(f"larger than {MAX_ENTRY_BYTES} bytes")
+            data = path.read_bytes()
+        except FileNotFoundError:
+            return None
+        header, separator, body = data.partition(b"\n")
+        if not separator or header != MAGIC + sha256(body).encode():
+            raise CorruptEntry("checksum differs")
+        try:
+            with zipfile.ZipFile(io.BytesIO(body)) as archive:
+                meta = json.loads(archive.read("meta.json"))
+        except (zipfile.BadZipFile, KeyError, ValueError) as error:
+            raise CorruptEntry("layout differs") from error
+        if meta.get("key") != key:
+            raise CorruptEntry("stored under another key")
+        os.utime(path)
+        return Entry(key, meta, body)
+
+    def discard(self, key: str) -> None:
+        """Remove an entry that is corrupt."""
+        self.path(key).unlink(missing_ok=True)
+
+    def collect_garbage(self, keep: Iterable[str], older_than_days: float) -> int:
+        """Remove entries that are not in ``keep`` and have not been used for so long; how many."""
+        kept = set(keep)
+        limit = time.time() - older_than_days * 86400.0
+        removed = 0
+        for path in self.folder.glob("*/*.entry"):
+            if path.name.removesuffix(".entry") not in kept and path.stat().st_mtime < limit:
+                path.unlink(missing_ok=True)
+                removed += 1
+        return removed

@@ -1,0 +1,111 @@
+"""One design over all its nights: its charts, what never moved, and what happened in which night."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from reports.nightly.charts import Chart, line_chart
+from reports.nightly.clock import to_seconds
+from reports.nightly.figures import Figure, Verdict, first_number
+from reports.nightly.history import History, Result
+from reports.nightly.tolerance import Tolerances
+from reports.nightly.trend import ChangePoint, change_points, flaps
+from reports.nightly.view import DesignView, Overview
+
+MAX_CHARTS = 60
+
+
+@dataclass
+class Course:
+    """Charts for the page, figures without a change, change points and number of moves by night."""
+
+    charts: list[dict[str, Any]] = field(default_factory=list)
+    steady: list[Figure] = field(default_factory=list)
+    marks: dict[int, list[tuple[Figure, ChangePoint]]] = field(default_factory=dict)
+    moved: dict[int, int] = field(default_factory=dict)
+
+
+def course_of(night: Overview, design: DesignView, history: History, past: Sequence[Result]) -> Course:
+    """Put together the course of a design.
+
+    Requirements are always charted; margins and other figures with a better side only where they moved.
+    """
+    good = [r for r in past if r.snapshot is not None]
+    if not good:
+        return Course()
+    current = history.figures(good[-1].snapshot)
+    chosen = [(number, current[f.name]) for number, f in history.figure_table().items() if f.name in current]
+    values = history.matrix(past, [number for number, _ in chosen])
+    writer = _Writer(night, design, past)
+    writer.course.moved = _moved(past, values, [figure for _, figure in chosen], night.tolerances)
+    order = sorted(range(len(chosen)), key=lambda j: chosen[j][1].kind != "requirement")
+    for column in order:
+        figure = chosen[column][1]
+        if figure.kind == "requirement" or (figure.better and figure.kind == "figure"):
+            writer.add(figure, values[:, column])
+    return writer.course
+
+
+class _Writer:
+    def __init__(self, night: Overview, design: DesignView, past: Sequence[Result]) -> None:
+        started = {r.id: r.started for r in night.runs}
+        self.course = Course()
+        self.past = past
+        self.tolerances: Tolerances = night.tolerances
+        self.days = [started[r.run][:10] for r in past]
+        self.times = np.array([to_seconds(started[r.run]) for r in past])
+        self.verdicts: Mapping[str, Verdict] = {f"{v.id}: value": v for v in design.verdicts}
+
+    def add(self, figure: Figure, values: np.ndarray) -> None:
+        """Chart a figure, or count it among the steady ones."""
+        finite = values[np.isfinite(values)]
+        if not len(finite):
+            return
+        tolerance = self.tolerances.of(figure, float(np.max(np.abs(finite))))
+        points = change_points(values, tolerance)
+        to_and_fro = flaps(values, tolerance)
+        moved = bool(points) or to_and_fro
+        if figure.kind != "requirement" and (not moved or len(self.course.charts) >= MAX_CHARTS):
+            self.course.steady.append(figure)
+            return
+        for point in points:
+            self.course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
+        self.course.charts.append({**self._chart(figure, values, points), "flaps": to_and_fro})
+
+    def _chart(self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint]) -> dict[str, Any]:
+        verdict = self.verdicts.get(figure.name)
+        chart = Chart(
+            title=verdict.label if verdict is not None else figure.name,
+            unit=figure.unit,
+            times=self.times,
+            values=values,
+            points=points,
+            limit=first_number(verdict.limit) if verdict is not None else None,
+            first_label=self.days[0] if len(self.days) > 1 else "",
+            last_label=self.days[-1],
+        )
+        return {
+            "title": chart.title,
+            "id": verdict.id if verdict is not None else "",
+            "unit": figure.unit,
+            "svg": Markup(line_chart(chart)),
+            "points": [(self.days[p.index], p) for p in points],
+        }
+
+
+def _moved(
+    past: Sequence[Result], values: np.ndarray, figures: Sequence[Figure], tolerances: Tolerances
+) -> dict[int, int]:
+    """How many figures moved beyond their tolerance in each night, against the last night with a result."""
+    rows = [i for i, r in enumerate(past) if r.snapshot is not None]
+    if len(rows) < 2:
+        return {}
+    size = np.max(np.abs(np.nan_to_num(values)), axis=0)
+    limits = np.array([tolerances.of(f, float(s)) for f, s in zip(figures, size, strict=True)])
+    steps = np.abs(np.diff(values[rows], axis=0)) > limits
+    return {past[row].run: int(count) for row, count in zip(rows[1:], steps.sum(axis=1), strict=True)}

@@ -1,0 +1,213 @@
+"""The figures of a report: every number that it states, under the same name every night."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from reports.nightly.text import one_line
+
+MAX_FIGURES = 5_000
+MAX_TABLE_ROWS = 200
+_INPUT_SECTIONS = ("parameters", "provenance")
+# Which way is better, by what the name holds; figures of no known direction change but do not regress.
+_LARGER = ("margin", "bandwidth", "output_rate", "acceleration", "probability")
+_SMALLER = ("overshoot", "rise_time", "settling", "peak", "motor_current", "standing_error", "distortion")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """One number of a report; ``better`` is +1 where larger is better, -1 where smaller is, else 0."""
+
+    name: str
+    value: float | None
+    unit: str = ""
+    better: int = 0
+    kind: str = "figure"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """One requirement: ``distance`` is positive where it is met; ``passed`` is ``None`` where not judged."""
+
+    id: str
+    label: str
+    value: float | None
+    limit: str
+    unit: str
+    distance: float | None
+    relative: float | None
+    passed: bool | None
+    source: str = ""
+    reason: str = ""
+
+
+def digest(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
+    verdicts = list(verdicts_of(document))
+    figures = list(figures_of(document))
+    design = document.get("design") or {}
+    return {
+        "title": str(document.get("title", "")),
+        "revision": str(design.get("revision", "") or ""),
+        "verdicts": [asdict(v) for v in verdicts],
+        "figures": [asdict(f) for f in figures[:MAX_FIGURES]],
+        "failed": sum(v.passed is False for v in verdicts),
+        "total": len(verdicts),
+    }
+
+
+def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
+    """Return the requirements of a document, each once, in its order."""
+    seen: set[str] = set()
+    for _, block in _blocks(document):
+        if block.get("kind") != "verdicts":
+            continue
+        for item in block.get("items", ()):
+            name = str(item.get("id", ""))
+            if name in seen:
+                continue
+            seen.add(name)
+            yield _verdict(name, item)
+
+
+def _verdict(name: str, item: Mapping[str, Any]) -> Verdict:
+    distance = number(item.get("distance"))
+    limit = number(item.get("limit"))
+    if limit is None:
+        limit = first_number(str(item.get("limit", "")))
+    scale = abs(limit) if limit else 1.0
+    return Verdict(
+        id=name,
+        label=str(item.get("label", "") or name),
+        value=number(item.get("value")),
+        limit=_limit_text(item),
+        unit=str(item.get("unit", "") or ""),
+        distance=distance,
+        relative=None if distance is None else distance / scale,
+        passed=item.get("passed"),
+        source=str(item.get("source", "") or ""),
+        reason=str(item.get("reason", "") or ""),
+    )
+
+
+def _limit_text(item: Mapping[str, Any]) -> str:
+    limit = item.get("limit")
+    if limit is None:
+        return ""
+    text = f"{limit:.6g}" if _is_number(limit) else str(limit)
+    return f"{item.get('comparison') or ''} {text}".strip()
+
+
+def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
+    """Return every number of verdicts, facts and tables; the inputs (parameters, provenance) are none."""
+    seen: set[str] = set()
+    for verdict in verdicts_of(document):
+        better = 1
+        yield Figure(name=f"{verdict.id}: value", value=verdict.value, unit=verdict.unit, kind="requirement")
+        yield Figure(
+            name=f"{verdict.id}: distance",
+            value=verdict.distance,
+            unit=verdict.unit,
+            better=better,
+            kind="distance",
+        )
+        passed = None if verdict.passed is None else float(verdict.passed)
+        yield Figure(name=f"{verdict.id}: met", value=passed, kind="verdict")
+    for section, block in _blocks(document):
+        if section in _INPUT_SECTIONS:
+            continue
+        for figure in _of_block(section, block):
+            if figure.name not in seen:
+                seen.add(figure.name)
+                yield figure
+
+
+def _blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for section in document.get("sections", ()):
+        yield from _nested(str(section.get("id", "")), section.get("blocks", ()))
+
+
+def _nested(section: str, blocks: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for block in blocks:
+        if block.get("kind") == "details":
+            yield from _nested(section, block.get("blocks", ()))
+        else:
+            yield section, block
+
+
+def _of_block(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
+    if block.get("kind") == "facts":
+        for item in block.get("items", ()):
+            value = number(item.get("value"))
+            if value is not None:
+                name = f"{section} / {one_line(str(item.get('label', '')), 120)}"
+                yield Figure(
+                    name=name, value=value, unit=str(item.get("unit", "") or ""), better=direction(name)
+                )
+    elif block.get("kind") == "table" and len(block.get("rows", ())) <= MAX_TABLE_ROWS:
+        yield from _of_table(section, block)
+
+
+def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
+    columns = block.get("columns", ())
+    rows = block.get("rows", ())
+    numeric = [c for c in columns if any(_is_number(r.get(c["key"])) for r in rows)]
+    names = [c["key"] for c in columns if c not in numeric]
+    counts: dict[str, int] = {}
+    for row in rows:
+        label = " / ".join(one_line(str(row[k]), 60) for k in names[:3] if row.get(k) not in (None, ""))
+        counts[label] = counts.get(label, 0) + 1
+        if counts[label] > 1:
+            label = f"{label} ({counts[label]})"
+        for column in numeric:
+            value = row.get(column["key"])
+            if value is not None and not _is_number(value):
+                continue
+            caption = one_line(str(block.get("caption", "")), 50)
+            name = f"{section} / {caption} / {label} / {column['key']}"
+            yield Figure(
+                name=name,
+                value=number(value),
+                unit=str(column.get("unit", "") or ""),
+                better=direction(str(column["key"])),
+            )
+
+
+def direction(name: str) -> int:
+    """+1 where more of it is better, -1 where less is, 0 where that cannot be said.
+
+    Examples
+    --------
+    >>> direction("phase_margin_deg"), direction("overshoot"), direction("crossover")
+    (1, -1, 0)
+    """
+    key = name.lower().replace(" ", "_").replace("-", "_")
+    if any(word in key for word in _SMALLER):
+        return -1
+    return 1 if any(word in key for word in _LARGER) else 0
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, float | int) and not isinstance(value, bool)
+
+
+def number(value: object) -> float | None:
+    """Return a finite number, or ``None`` for anything else."""
+    if isinstance(value, float | int) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    return None
+
+
+def first_number(text: str) -> float | None:
+    """Return the first number in a text such as ``>= 6 dB``."""
+    for word in text.replace("≥", " ").replace("≤", " ").replace(">", " ").replace("<", " ").split():
+        try:
+            value = float(word.strip("=,;"))
+        except ValueError:
+            continue
+        if math.isfinite(value):
+            return value
+    return None

@@ -1,0 +1,357 @@
+"""The history: every figure of every night, in one SQLite file in write-ahead mode.
+
+The numbers of a result are one block of float64 in the order of its layout (the list of its figures); a
+result that has not changed since is stored once and referred to, its layout and inputs as well.  A night
+is written in one transaction: it is there whole, or not at all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sqlite3
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from reports.nightly import schema
+from reports.nightly.figures import Figure
+from reports.nightly.job import canonical
+from reports.nightly.text import sha256
+
+PAGE_BYTES = 16384
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One night: when, and with which code and study."""
+
+    id: int
+    started: str
+    finished: str | None
+    state: str
+    code: str
+    code_commit: str
+    study_commit: str
+    libraries: Mapping[str, str]
+    host: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """What one design came to in one night; ``snapshot`` is ``None`` where there is no result."""
+
+    run: int
+    name: str
+    kind: str
+    status: str
+    snapshot: int | None
+    key: str
+    seconds: float
+    cached: bool
+    failed: int
+    total: int
+    worst: float | None
+    worst_id: str
+    message: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline:
+    """A night that somebody has approved, for one design or for all of them (``name`` is ``None``)."""
+
+    id: int
+    run: int
+    at: str
+    by: str
+    reason: str
+    name: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewResult:
+    """What a night adds for one design."""
+
+    name: str
+    kind: str
+    status: str
+    key: str = ""
+    figures: Sequence[Figure] = ()
+    inputs: Mapping[str, Any] | None = None
+    seconds: float = 0.0
+    cached: bool = False
+    failed: int = 0
+    total: int = 0
+    worst: float | None = None
+    worst_id: str = ""
+    message: str = ""
+
+
+class History:
+    """Reader and writer of one history file; see `open_history`."""
+
+    def __init__(self, connection: sqlite3.Connection, notice: str | None) -> None:
+        self.connection = connection
+        self.notice = notice
+
+    # ---- writing -----------------------------------------------------------------------------------
+
+    def start_run(self, run: Mapping[str, Any]) -> int:
+        """Note that a night has begun; earlier ones that never ended become ``interrupted``."""
+        with self.connection as c:
+            c.execute("BEGIN IMMEDIATE")
+            c.execute("UPDATE runs SET state = 'interrupted' WHERE state = 'running'")
+            cursor = c.execute(
+                "INSERT INTO runs(started, state, code, code_commit, study_commit, libraries, host)"
+                " VALUES (:started, 'running', :code, :code_commit, :study_commit, :libraries, :host)",
+                {**run, "libraries": canonical(run["libraries"])},
+            )
+        return int(cursor.lastrowid or 0)
+
+    def finish_run(self, run: int, finished: str, results: Iterable[NewResult]) -> None:
+        """Write a whole night in one transaction."""
+        with self.connection as c:
+            c.execute("BEGIN IMMEDIATE")
+            for result in results:
+                self._insert(run, result)
+            c.execute("UPDATE runs SET state = 'done', finished = ? WHERE id = ?", (finished, run))
+
+    def _insert(self, run: int, result: NewResult) -> None:
+        snapshot = self._snapshot(result) if result.key and result.status in ("pass", "fail") else None
+        subject = self._id("subjects", "name", {"name": result.name, "kind": result.kind})
+        self.connection.execute(
+            "INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (
+                subject, run, result.status, snapshot, result.seconds, int(result.cached), result.failed,
+                result.total, result.worst, result.worst_id, result.message,
+            ),
+        )  # fmt: skip
+
+    def _snapshot(self, result: NewResult) -> int:
+        found = self.connection.execute("SELECT id FROM snapshots WHERE key = ?", (result.key,)).fetchone()
+        if found:
+            return int(found[0])
+        ids = np.array([self._figure(f) for f in result.figures], dtype="<i4")
+        layout = self._id(
+            "layouts", "sha", {"sha": sha256(ids.tobytes()), "figures": zlib.compress(ids.tobytes())}
+        )
+        body = canonical(result.inputs or {})
+        inputs = self._id("inputs", "sha", {"sha": sha256(body), "body": zlib.compress(body.encode())})
+        values = np.array([np.nan if f.value is None else f.value for f in result.figures], dtype="<f8")
+        cursor = self.connection.execute(
+            "INSERT INTO snapshots(key, layout, input, numbers) VALUES (?, ?, ?, ?)",
+            (result.key, layout, inputs, values.tobytes()),
+        )
+        return int(cursor.lastrowid or 0)
+
+    def _figure(self, figure: Figure) -> int:
+        return self._id(
+            "figures", "name",
+            {"name": figure.name, "unit": figure.unit, "better": figure.better, "kind": figure.kind},
+        )  # fmt: skip
+
+    def _id(self, table: str, unique: str, row: Mapping[str, Any]) -> int:
+        query = f"SELECT id FROM {table} WHERE {unique} = ?"
+        found = self.connection.execute(query, (row[unique],)).fetchone()
+        if found:
+            return int(found[0])
+        columns = ", ".join(row)
+        marks = ", ".join(f":{name}" for name in row)
+        cursor = self.connection.execute(f"INSERT INTO {table}({columns}) VALUES ({marks})", dict(row))
+        return int(cursor.lastrowid or 0)
+
+    def approve(self, run: int, names: Sequence[str] | None, *, by: str, reason: str, at: str) -> None:
+        """Make a night the baseline of some designs, or of all (``None``)."""
+        with self.connection as c:
+            c.execute("BEGIN IMMEDIATE")
+            for name in [None] if names is None else names:
+                c.execute(
+                    "INSERT INTO baselines(run, at, by, reason, subject)"
+                    " VALUES (?, ?, ?, ?, (SELECT id FROM subjects WHERE name = ?))",
+                    (run, at, by, reason, name),
+                )
+
+    def claim(self, study: str) -> None:
+        """Note whose history this is.
+
+        Raises
+        ------
+        InputError
+            Where it is that of another study.
+        """
+        found = self.connection.execute("SELECT value FROM meta WHERE key = 'study'").fetchone()
+        if found is None:
+            with self.connection as c:
+                c.execute("INSERT INTO meta VALUES ('study', ?)", (study,))
+        elif found[0] != study:
+            raise InputError(
+                f"holds the nights of study {found[0][:80]!r}, not of {study[:80]!r}: use another --site"
+            )
+
+    # ---- reading -----------------------------------------------------------------------------------
+
+    def runs(self) -> list[Run]:
+        """Return the finished nights, oldest first."""
+        rows = self.connection.execute("SELECT * FROM runs WHERE state = 'done' ORDER BY id").fetchall()
+        return [Run(**{**dict(r), "libraries": json.loads(r["libraries"])}) for r in rows]
+
+    def interrupted(self) -> list[str]:
+        """When nights began that never ended."""
+        rows = self.connection.execute("SELECT started FROM runs WHERE state = 'interrupted' ORDER BY id")
+        return [str(r[0]) for r in rows]
+
+    def baselines(self) -> list[Baseline]:
+        """Return all approvals, oldest first."""
+        rows = self.connection.execute(
+            "SELECT b.id, b.run, b.at, b.by, b.reason, s.name FROM baselines b"
+            " LEFT JOIN subjects s ON s.id = b.subject ORDER BY b.id"
+        )
+        return [Baseline(**dict(r)) for r in rows]
+
+    def results(
+        self, *, run: int | None = None, name: str | None = None, good: bool = False, last: int | None = None
+    ) -> list[Result]:
+        """Return results in the order of the nights, of finished nights only.
+
+        Parameters
+        ----------
+        run, name : optional
+            Only of this night, of this design.
+        good : bool
+            Only those that have figures.
+        last : int, optional
+            Only the last so many; the first so many where negative.
+        """
+        conditions = ["u.state = 'done'"]
+        conditions += ["r.run = :run"] if run is not None else []
+        conditions += ["r.subject = (SELECT id FROM subjects WHERE name = :name)"] if name is not None else []
+        conditions += ["r.snapshot IS NOT NULL"] if good else []
+        order = "r.run, r.subject" if last is None or last < 0 else "r.run DESC, r.subject"
+        rows = self.connection.execute(
+            "SELECT r.run, s.name, s.kind, r.status, r.snapshot, r.seconds,"
+            " coalesce(n.key, '') AS key,"
+            " r.cached, r.failed, r.total, r.worst, r.worst_id, r.message"
+            " FROM results r JOIN runs u ON u.id = r.run"
+            " JOIN subjects s ON s.id = r.subject LEFT JOIN snapshots n ON n.id = r.snapshot"
+            f" WHERE {' AND '.join(conditions)} ORDER BY {order} LIMIT :count",
+            {"run": run, "name": name, "count": -1 if last is None else abs(last)},
+        ).fetchall()
+        if last is not None and last > 0:
+            rows.reverse()
+        return [Result(**{**dict(r), "cached": bool(r["cached"])}) for r in rows]
+
+    def contents(self, runs: Iterable[int]) -> list[tuple[str, str]]:
+        """Return name and content address of all that some nights show, each once."""
+        ids = sorted(runs)
+        rows = self.connection.execute(
+            "SELECT DISTINCT s.name, n.key FROM results r JOIN subjects s ON s.id = r.subject"
+            f" JOIN snapshots n ON n.id = r.snapshot WHERE r.run IN ({','.join('?' * len(ids))})",
+            ids,
+        )
+        return [(row[0], row[1]) for row in rows]
+
+    def inputs(self, snapshot: int) -> dict[str, Any]:
+        """Return parameters and settings behind a result."""
+        row = self.connection.execute(
+            "SELECT i.body FROM snapshots s JOIN inputs i ON i.id = s.input WHERE s.id = ?", (snapshot,)
+        ).fetchone()
+        return dict(json.loads(zlib.decompress(row[0]))) if row else {}
+
+    def figures(self, snapshot: int | None) -> dict[str, Figure]:
+        """Return the figures of one result by name."""
+        if snapshot is None:
+            return {}
+        layout, numbers = self.connection.execute(
+            "SELECT layout, numbers FROM snapshots WHERE id = ?", (snapshot,)
+        ).fetchone()
+        known = self.figure_table()
+        values = np.frombuffer(numbers, dtype="<f8")
+        out = {}
+        for number, value in zip(self._layout(layout), values.tolist(), strict=True):
+            figure = known[number]
+            out[figure.name] = replace(figure, value=None if math.isnan(value) else value)
+        return out
+
+    def figure_table(self) -> dict[int, Figure]:
+        """Return name, unit and direction of every figure by its number (without values)."""
+        rows = self.connection.execute("SELECT id, name, unit, better, kind FROM figures")
+        return {r[0]: Figure(name=r[1], value=None, unit=r[2], better=r[3], kind=r[4]) for r in rows}
+
+    def _layout(self, layout: int) -> list[int]:
+        row = self.connection.execute("SELECT figures FROM layouts WHERE id = ?", (layout,)).fetchone()
+        return [int(v) for v in np.frombuffer(zlib.decompress(row[0]), dtype="<i4")]
+
+    def matrix(self, results: Sequence[Result], figures: Sequence[int]) -> np.ndarray:
+        """Values of some figures over some results, (results x figures); NaN where there is none."""
+        wanted = sorted({r.snapshot for r in results if r.snapshot is not None})
+        rows: dict[int, np.ndarray] = {}
+        column = {number: j for j, number in enumerate(figures)}
+        places: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        for snapshot, layout, numbers in self._numbers(wanted):
+            if layout not in places:
+                ids = self._layout(layout)
+                found = [(i, column[n]) for i, n in enumerate(ids) if n in column]
+                pairs = np.array(found, dtype=int).reshape(-1, 2)
+                places[layout] = (pairs[:, 0], pairs[:, 1])
+            source, target = places[layout]
+            row = np.full(len(figures), np.nan)
+            row[target] = np.frombuffer(numbers, dtype="<f8")[source]
+            rows[snapshot] = row
+        nothing = np.full(len(figures), np.nan)
+        values = [nothing if r.snapshot is None else rows[r.snapshot] for r in results]
+        return np.array(values).reshape(len(results), len(figures))
+
+    def _numbers(self, snapshots: Sequence[int]) -> Iterator[tuple[int, int, bytes]]:
+        for start in range(0, len(snapshots), 500):
+            part = snapshots[start : start + 500]
+            marks = ",".join("?" * len(part))
+            yield from self.connection.execute(
+                f"SELECT id, layout, numbers FROM snapshots WHERE id IN ({marks})", part
+            ).fetchall()
+
+
+@contextmanager
+def open_history(path: Path) -> Iterator[History]:
+    """Open (or begin) a history, brought to the schema of this version.
+
+    Raises
+    ------
+    InputError
+        Where the file is no history, is damaged or was written by a newer version.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        connection = sqlite3.connect(path, isolation_level=None, timeout=30.0)
+    except sqlite3.OperationalError as error:
+        raise InputError(f"cannot be opened ({error})", where=str(path)) from error
+    try:
+        connection.row_factory = sqlite3.Row
+        notice = _configure(connection, path)
+        yield History(connection, notice)
+    finally:
+        connection.close()
+
+
+def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
+    try:
+        connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        notice = schema.prepare(connection, path)
+        damage = (
+            connection.execute("PRAGMA quick_check(1)").fetchone()[0] if path.stat().st_size < 5e6 else "ok"
+        )
+    except sqlite3.DatabaseError as error:
+        if isinstance(error, sqlite3.OperationalError):
+            raise
+        raise InputError(f"is no history of a nightly build ({error})", where=str(path)) from error
+    if damage != "ok":
+        raise InputError(f"is damaged ({damage}): restore it from a copy", where=str(path))
+    return notice

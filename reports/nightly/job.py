@@ -1,0 +1,100 @@
+"""What a night has to do: jobs, and what came of each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from actuator_lti.errors import InputError
+from reports.nightly.text import one_line, sha256
+
+Status = Literal["pass", "fail", "error", "timeout", "crash"]
+BROKEN: tuple[Status, ...] = ("error", "timeout", "crash")
+
+MAX_JOBS = 10_000
+MAX_NAME = 20_000
+MAX_PAYLOAD_BYTES = 4_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One report to build.
+
+    Parameters
+    ----------
+    name : str
+        Name of the design or variant; any text.
+    kind : str
+        ``design``, or a page of the whole study (``compare``, ``monte-carlo``).
+    payload : mapping
+        Plain JSON that the compute function gets; all that the result depends on, except the code.
+    design_hash : str
+        Hash of the design's content.
+    parameters : mapping
+        Dotted key to text as written: what is shown when a figure has moved.
+    title, revision : str
+        Of the design.
+    """
+
+    name: str
+    kind: str = "design"
+    payload: Mapping[str, Any] = field(default_factory=dict)
+    design_hash: str = ""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    title: str = ""
+    revision: str = ""
+
+    def key(self, code: str) -> str:
+        """Content address of the result: design, settings and code version."""
+        return sha256(canonical([self.name, self.kind, self.design_hash, self.payload, code]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of a job: its content address, or why there is nothing."""
+
+    job: Job
+    key: str
+    status: Status
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+    cached: bool = False
+    message: str = ""
+
+
+def canonical(value: Any) -> str:
+    """JSON text that is the same for the same content."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+
+
+def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
+    """Refuse a study that is too large or names two designs alike.
+
+    Raises
+    ------
+    InputError
+        With the limit in one line.
+    """
+    if not jobs:
+        raise InputError("nothing to build: no design and no variant", where=where)
+    if len(jobs) > MAX_JOBS:
+        raise InputError(f"{len(jobs)} designs and variants: at most {MAX_JOBS} are allowed", where=where)
+    seen: set[str] = set()
+    for job in jobs:
+        if len(job.name) > MAX_NAME:
+            raise InputError(
+                f"name {one_line(job.name, 40)!r} has {len(job.name)} characters: at most {MAX_NAME} allowed",
+                where=where,
+            )
+        if job.name in seen:
+            raise InputError(f"name {one_line(job.name, 80)!r} is used twice: names must differ", where=where)
+        seen.add(job.name)
+        size = len(canonical(job.payload))
+        if size > MAX_PAYLOAD_BYTES:
+            raise InputError(
+                f"{one_line(job.name, 80)!r}: {size} bytes: at most {MAX_PAYLOAD_BYTES} are allowed",
+                where=where,
+            )
+    return jobs

@@ -1,0 +1,273 @@
+"""A night from beginning to end: lock, build what is new, write the history, publish the site."""
+
+from __future__ import annotations
+
+import platform
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from actuator_lti.errors import InputError
+from reports.nightly import site as site_files
+from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.clock import now
+from reports.nightly.code_version import CodeVersion, code_version, commit_of
+from reports.nightly.figures import Figure
+from reports.nightly.history import History, NewResult, open_history
+from reports.nightly.job import Job, Outcome, check_jobs
+from reports.nightly.lock import hold
+from reports.nightly.pool import Done, Pool, Task
+from reports.nightly.text import one_line
+from reports.nightly.tolerance import Tolerances
+from reports.nightly.view import Overview, overview
+
+Progress = Callable[[int, int], None]
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What a team builds every night: designs and variants, and how far figures may move."""
+
+    name: str
+    jobs: tuple[Job, ...]
+    title: str = ""
+    origin: Path | None = None
+    tolerances: Tolerances = field(default_factory=Tolerances)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a night is run.
+
+    Parameters
+    ----------
+    workers : int
+        Worker processes; 0 builds in this process, without a time limit.
+    time_limit_s : float
+        A design that takes longer is ended and named, in s.
+    wait_s : float
+        How long to wait for another nightly on the same site, in s.
+    keep_reports : int
+        Nights whose reports stay on the site; their figures stay in the history for good.
+    build : str
+        ``module:function`` that makes ``(meta, files)`` of a job's payload.
+    state : pathlib.Path, optional
+        Folder of history and cache; ``DIR.state`` beside the site where left out.
+    """
+
+    workers: int = 2
+    time_limit_s: float = 900.0
+    wait_s: float = 0.0
+    keep_reports: int = 60
+    build: str = "reports.nightly.compute:build"
+    state: Path | None = None
+
+
+def state_of(site: Path, settings: Settings) -> Path:
+    """Return the folder of history, cache and lock: beside the site, so that none of it is published."""
+    return settings.state if settings.state is not None else site.with_name(site.name + ".state")
+
+
+def run_night(
+    study: Study,
+    site: Path,
+    settings: Settings | None = None,
+    *,
+    progress: Progress | None = None,
+    say: Say | None = None,
+    code: CodeVersion | None = None,
+    clock: Callable[[], str] = now,
+) -> Overview:
+    """Build all of a study, note it in the history and publish the site.
+
+    Whatever ends this early leaves the site of the night before whole; what was built until then is in
+    the cache and not built again.
+
+    Parameters
+    ----------
+    study : Study
+        What to build.
+    site : pathlib.Path
+        Folder of the site; made where it is missing, refused where it holds something else.
+    progress : callable, optional
+        Called with (jobs done, jobs in all).
+    say : callable, optional
+        Called with one line for whatever somebody should know (a corrupt cache entry, a migration).
+    code : CodeVersion, optional
+        Version of the code; found out where left out.
+
+    Raises
+    ------
+    InputError
+        Where the lock is held, the site or its state cannot be written, or the history is of a newer version.
+    """
+    use = settings or Settings()
+    tell = say or _silent
+    jobs = check_jobs(study.jobs, study.name)
+    state = state_of(site, use)
+    site_files.check_place(site)
+    version = code or code_version()
+    with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
+        if history.notice:
+            tell(history.notice)
+        site_files.remove_leftovers(site, state)
+        history.claim(study.name)
+        run = history.start_run(_run_row(version, study, clock()))
+        outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
+        history.finish_run(run, clock(), [_new_result(o) for o in outcomes])
+        return publish(study, site, history, Cache(state / "cache"), use)
+
+
+def publish(study: Study, site: Path, history: History, cache: Cache, settings: Settings) -> Overview:
+    """Make the site of the last finished night anew from history and cache."""
+    view = overview(history, cache, study)
+    site_files.publish(site, view, history, cache, keep_reports=settings.keep_reports)
+    return view
+
+
+def approve(
+    study: Study,
+    site: Path,
+    *,
+    by: str,
+    reason: str,
+    names: Sequence[str] = (),
+    settings: Settings | None = None,
+    clock: Callable[[], str] = now,
+) -> Overview:
+    """Make the last night the baseline that later ones are held against, and publish the site anew.
+
+    Raises
+    ------
+    InputError
+        Where name or reason is empty, there is no night yet, or a design has no result in it.
+    """
+    use = settings or Settings()
+    if not by.strip() or not reason.strip():
+        raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
+    state = state_of(site, use)
+    if not (state / "history.sqlite").exists():
+        raise InputError("no night has been built here yet", where=str(site))
+    with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
+        history.claim(study.name)
+        runs = history.runs()
+        if not runs:
+            raise InputError("no night has been finished here yet", where=str(site))
+        there = {r.name for r in history.results(run=runs[-1].id) if r.snapshot is not None}
+        for name in names:
+            if name not in there:
+                raise InputError(
+                    f"{one_line(name, 80)!r} has no result in the last night: nothing to approve",
+                    where=study.name,
+                )
+        limits = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
+        history.approve(runs[-1].id, list(names) or None, at=clock(), **limits)
+        return publish(study, site, history, Cache(state / "cache"), use)
+
+
+def _run_row(version: CodeVersion, study: Study, started: str) -> Mapping[str, Any]:
+    return {
+        "started": started,
+        "code": version.hash,
+        "code_commit": version.commit,
+        "study_commit": commit_of(study.origin) if study.origin is not None else "",
+        "libraries": {**version.libraries, "python": platform.python_version()},
+        "host": socket.gethostname(),
+    }
+
+
+def _outcomes(
+    jobs: Sequence[Job],
+    version: CodeVersion,
+    cache: Cache,
+    use: Settings,
+    progress: Progress | None,
+    tell: Say,
+) -> list[Outcome]:
+    """Take from the cache what is there, build the rest."""
+    keys = {job.name: job.key(version.hash) for job in jobs}
+    found: dict[str, Outcome] = {}
+    for job in jobs:
+        outcome = _from_cache(cache, job, keys[job.name], tell)
+        if outcome is not None:
+            found[job.name] = outcome
+    todo = {keys[job.name]: job for job in jobs if job.name not in found}
+    if progress is not None:
+        progress(len(found), len(jobs))
+    pool = Pool(use.build, cache.folder, use.workers, use.time_limit_s)
+    for done in pool.run([Task(key=key, payload=job.payload) for key, job in todo.items()]):
+        job = todo[done.key]
+        found[job.name] = _built(cache, job, done)
+        if progress is not None:
+            progress(len(found), len(jobs))
+    return [found[job.name] for job in jobs]
+
+
+def _from_cache(cache: Cache, job: Job, key: str, tell: Say) -> Outcome | None:
+    try:
+        entry = cache.read(key)
+    except CorruptEntry as error:
+        tell(f"cache entry of {one_line(job.name, 60)!r} is corrupt ({error}): built again")
+        cache.discard(key)
+        return None
+    if entry is None:
+        return None
+    return Outcome(job=job, key=key, status=_status(entry.meta), meta=entry.meta, cached=True)
+
+
+def _built(cache: Cache, job: Job, done: Done) -> Outcome:
+    if done.status == "disk":
+        raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {done.message}")
+    if done.status == "done":
+        entry = cache.read(done.key)
+        if entry is not None:
+            return Outcome(
+                job=job, key=done.key, status=_status(entry.meta), meta=entry.meta, seconds=done.seconds
+            )
+    status = done.status if done.status in ("error", "timeout", "crash") else "crash"
+    message = done.message + (f"\n{done.detail}" if done.detail else "")
+    return Outcome(job=job, key=done.key, status=status, seconds=done.seconds, message=message)  # type: ignore[arg-type]
+
+
+def _status(meta: Mapping[str, Any]) -> Any:
+    return "fail" if meta.get("failed") else "pass"
+
+
+def _new_result(outcome: Outcome) -> NewResult:
+    meta = outcome.meta
+    ranked = [v for v in meta.get("verdicts", ()) if v["relative"] is not None]
+    worst = min(ranked, key=lambda v: v["relative"], default=None)
+    return NewResult(
+        name=outcome.job.name,
+        kind=outcome.job.kind,
+        status=outcome.status,
+        key=outcome.key,
+        figures=[Figure(**f) for f in meta.get("figures", ())],
+        inputs={
+            "parameters": dict(outcome.job.parameters),
+            "settings": _flat_settings(outcome.job.payload),
+            "design_hash": outcome.job.design_hash,
+            "revision": outcome.job.revision,
+        },
+        seconds=outcome.seconds,
+        cached=outcome.cached,
+        failed=int(meta.get("failed", 0)),
+        total=int(meta.get("total", 0)),
+        worst=worst["relative"] if worst else None,
+        worst_id=worst["id"] if worst else "",
+        message=outcome.message,
+    )
+
+
+def _flat_settings(payload: Mapping[str, Any]) -> dict[str, str]:
+    settings = payload.get("settings")
+    if not isinstance(settings, Mapping):
+        return {}
+    return {str(key): one_line(str(value), 200) for key, value in settings.items()}
+
+
+def _silent(_line: str) -> None:
+    return None

@@ -1,0 +1,140 @@
+"""The pages of the site: the index, and one page for each design with its trends and its nights."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+from markupsafe import Markup
+
+from reports.html import asset, environment, security_policy
+from reports.nightly.course import Course, course_of
+from reports.nightly.history import History, Result, Run
+from reports.nightly.machines import STATE_WORDS, cause_lines
+from reports.nightly.text import csv_text, one_line, visible
+from reports.nightly.view import DesignView, Overview, report_folder
+
+MAX_NIGHTS = 400
+MAX_CHANGES = 100
+STATES = {
+    "broken": ("⚠", STATE_WORDS["broken"]),
+    "fail": ("✗", STATE_WORDS["fail"]),
+    "regression": ("▼", STATE_WORDS["regression"]),
+    "pass": ("✓", STATE_WORDS["pass"]),
+}
+NIGHT_SIGNS = {
+    "pass": ("✓", "passed"),
+    "fail": ("✗", "failed"),
+    "error": ("⚠", "raised an error"),
+    "timeout": ("⚠", "did not end in time"),
+    "crash": ("⚠", "its process died"),
+    "absent": ("·", "was not in the study"),
+}
+
+
+def index(night: Overview, folder: str) -> str:
+    """Make the page that stands at the root of the site; its links lead into ``folder``."""
+    return _render("nightly/index.html", night=night, folder=folder, STATE_ORDER=tuple(STATES))
+
+
+def of_night(
+    night: Overview, history: History, folder: str, available: set[str]
+) -> Iterator[tuple[str, str]]:
+    """Return the pages and tables of a night one after the other: file name and text."""
+    for design in night.designs:
+        yield f"{design.slug}.html", design_page(night, design, history, available)
+        if not design.broken:
+            yield f"{design.slug}.csv", figures_csv(design, history)
+
+
+def design_page(night: Overview, design: DesignView, history: History, available: set[str]) -> str:
+    """Make the page of one design."""
+    past = history.results(name=design.name)
+    course = course_of(night, design, history, past)
+    return _render(
+        "nightly/design.html",
+        night=night,
+        design=design,
+        charts=course.charts,
+        steady=course.steady,
+        marks=course.marks,
+        nights=_nights(night, design, past, course, available),
+        more_nights=max(0, len(past) - MAX_NIGHTS),
+        max_changes=MAX_CHANGES,
+    )
+
+
+def figures_csv(design: DesignView, history: History) -> str:
+    """Give every figure of tonight as a table for a spreadsheet."""
+    figures = history.figures(design.result.snapshot)
+    rows = ((f.name, f.value, f.unit, f.kind) for f in figures.values())
+    return csv_text(("figure", "value", "unit", "kind"), rows)
+
+
+def _render(template: str, **context: Any) -> str:
+    script = asset("nightly/nightly.js")
+    counter = itertools.count(1)
+    return (
+        environment()
+        .get_template(template)
+        .render(
+            stylesheet=Markup(asset("style.css") + asset("nightly/nightly.css")),
+            script=Markup(script),
+            security_policy=security_policy(script),
+            unique=lambda letter: f"{letter}{next(counter)}",
+            states=STATES,
+            night_signs=NIGHT_SIGNS,
+            cause_lines=cause_lines,
+            visible=visible,
+            one_line=one_line,
+            number=_number,
+            signed=_signed,
+            **context,
+        )
+    )
+
+
+def _nights(
+    night: Overview, design: DesignView, past: list[Result], course: Course, available: set[str]
+) -> list[dict[str, Any]]:
+    """Rows of the table of nights, the last first, with rows for nights that are missing."""
+    known = {r.run: r for r in past}
+    gaps = {night.runs[i].id: count for i, count in night.missing}
+    first = past[0].run if past else 0
+    rows: list[dict[str, Any]] = []
+    for run in reversed(night.runs):
+        if run.id < first or len(rows) >= MAX_NIGHTS:
+            break
+        if run.id in gaps and run.id != night.run.id:
+            rows.append({"gap": gaps[run.id]})
+        rows.append(_night(run, known.get(run.id), design, course, available))
+    return rows
+
+
+def _night(
+    run: Run, result: Result | None, design: DesignView, course: Course, available: set[str]
+) -> dict[str, Any]:
+    folder = report_folder(design.name, result.key) if result is not None and result.key else ""
+    return {
+        "gap": 0,
+        "run": run,
+        "result": result,
+        "status": "absent" if result is None else result.status,
+        "report": folder if folder in available else "",
+        "moved": course.moved.get(run.id, 0),
+        "marks": course.marks.get(run.id, []),
+        "approved": design.approval is not None and design.approval.run == run.id,
+    }
+
+
+def _number(value: float | None, digits: int = 4) -> str:
+    from reports.numbers import MISSING, significant
+
+    return MISSING if value is None else significant(value, digits)
+
+
+def _signed(value: float | None, digits: int = 3) -> str:
+    from reports.html import show_signed
+
+    return show_signed(value, digits)

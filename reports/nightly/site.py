@@ -1,0 +1,140 @@
+"""The site on disk: everything new is laid beside the old, then one file is put in place.
+
+Layout: ``index.html`` (the only page that is ever replaced), ``nights/<night>/`` (the pages of one night),
+``reports/<design>/<content>/`` (reports, the same ones for as long as nothing changes), and
+``summary.json``, ``junit.xml``, ``summary.md`` for machines.  What ``index.html`` refers to is complete
+before it is put in place, and is removed only when no page of a kept night refers to it.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from actuator_lti.errors import InputError
+from reports.atomic import write_bytes, write_text
+from reports.nightly import machines, pages
+from reports.nightly.cache import Cache, CorruptEntry, Entry
+from reports.nightly.history import History
+from reports.nightly.text import sha256
+from reports.nightly.view import DesignView, Overview, report_folder
+
+MARKER = ".nightly-site"
+KEPT_NIGHTS = 3
+KEPT_CACHE_DAYS = 30.0
+_NIGHT = re.compile(r"\d{6,}-[0-9a-f]{8}\Z")
+_CONTENT = re.compile(r"[0-9a-f]{16}\Z")
+
+
+def check_place(site: Path) -> None:
+    """Refuse a folder that holds something else, or that cannot be written.
+
+    Raises
+    ------
+    InputError
+        In one line that names the folder.
+    """
+    if site.exists() and not site.is_dir():
+        raise InputError("is a file: --site takes a folder", where=str(site))
+    if site.is_dir() and not (site / MARKER).exists() and any(site.iterdir()):
+        raise InputError("is not empty and no site of a nightly: use an empty folder", where=str(site))
+    write_text(site / MARKER, "actuator-lti nightly site 1\n")
+
+
+def remove_leftovers(*folders: Path) -> int:
+    """Delete the half-written files that a killed run left; how many."""
+    count = 0
+    for folder in folders:
+        for leftover in folder.rglob(".*.part"):
+            leftover.unlink(missing_ok=True)
+            count += 1
+    return count
+
+
+def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep_reports: int) -> None:
+    """Lay out a night and switch to it.
+
+    Raises
+    ------
+    InputError
+        Where the site cannot be written; it is as it was then.
+    """
+    folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
+    try:
+        kept = _reports_to_keep(history, night, keep_reports)
+        for design in night.designs:
+            _lay_out_report(site, design, cache)
+        available = {path for path in kept if (site / path / "report.html").exists()}
+        for name, text in pages.of_night(night, history, folder, available):
+            write_text(site / folder / name, text)
+        write_text(site / "index.html", pages.index(night, folder))
+    except InputError:
+        shutil.rmtree(site / folder, ignore_errors=True)
+        raise
+    for name, text in _machine_files(night).items():
+        write_text(site / name, text)
+    _collect_garbage(site, folder, kept)
+    cache.collect_garbage({d.result.key for d in night.designs}, KEPT_CACHE_DAYS)
+
+
+def _machine_files(night: Overview) -> Mapping[str, str]:
+    return {
+        "summary.json": machines.summary_text(night),
+        "junit.xml": machines.junit(night),
+        "summary.md": machines.markdown(night),
+    }
+
+
+def _lay_out_report(site: Path, design: DesignView, cache: Cache) -> None:
+    """Copy a report out of the cache unless the site has it, whole."""
+    if design.broken:
+        return
+    folder = site / design.report
+    wanted: Mapping[str, str] = design.meta.get("files", {})
+    missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
+    if not missing:
+        return
+    entry = _entry(cache, design.result.key)
+    if entry is None:
+        raise InputError(
+            f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
+        )
+    for name in missing:
+        write_bytes(folder / name, entry.file(name))
+
+
+def _is_there(path: Path, digest: str) -> bool:
+    try:
+        return sha256(path.read_bytes()) == digest
+    except OSError:
+        return False
+
+
+def _entry(cache: Cache, key: str) -> Entry | None:
+    try:
+        return cache.read(key)
+    except CorruptEntry:
+        cache.discard(key)
+        return None
+
+
+def _reports_to_keep(history: History, night: Overview, nights: int) -> set[str]:
+    """Folders of the reports of the last nights and of the approved ones."""
+    wanted = {run.id for run in night.runs[-max(1, nights) :]}
+    wanted |= {d.approval.run for d in night.designs if d.approval is not None}
+    return {report_folder(name, key) for name, key in history.contents(wanted)}
+
+
+def _collect_garbage(site: Path, current: str, kept: set[str]) -> None:
+    """Remove the pages of nights long past, and the reports that no kept night refers to."""
+    nights = sorted(p for p in (site / "nights").iterdir() if _NIGHT.match(p.name))
+    old = [p for p in nights if p.name != Path(current).name]
+    for path in old[: -KEPT_NIGHTS or None]:
+        shutil.rmtree(path, ignore_errors=True)
+    reports = site / "reports"
+    for path in sorted(reports.glob("*/*")) if reports.is_dir() else []:
+        if _CONTENT.match(path.name) and path.relative_to(site).as_posix() not in kept:
+            shutil.rmtree(path, ignore_errors=True)

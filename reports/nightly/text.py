@@ -1,0 +1,103 @@
+"""Other people's names made safe: as file names, in XML, in CSV and in one line of text."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Iterable, Sequence
+
+_ILLEGAL_XML = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]"
+)
+_BIDI = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+_NOT_SLUG = re.compile(r"[^A-Za-z0-9]+")
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "|")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+
+
+def sha256(data: bytes | str) -> str:
+    """Hex digest of bytes or of the UTF-8 of a text (lone surrogates kept apart, not refused)."""
+    raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
+    return hashlib.sha256(raw).hexdigest()
+
+
+def slug(name: str) -> str:
+    """File name of a design: readable ASCII of the name and ten digits of its hash.
+
+    Two different names never share a slug by their readable part, and no name can leave a folder.
+
+    Examples
+    --------
+    >>> slug("../../etc/passwd")
+    'etc-passwd-9c58ff9a2b'
+    >>> slug("<b>")[:2]
+    'b-'
+    """
+    readable = _NOT_SLUG.sub("-", name).strip("-")[:40].strip("-").lower() or "design"
+    return f"{readable}-{sha256(name)[:10]}"
+
+
+def visible(text: str) -> str:
+    """Replace what XML and HTML cannot hold, and direction marks, by signs that are seen.
+
+    Examples
+    --------
+    >>> visible("a\\x00b\\u202ec")
+    'a\\ufffdb\\u27e8U+202E\\u27e9c'
+    """
+    clean = _ILLEGAL_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+    return _BIDI.sub(lambda m: f"⟨U+{ord(m.group()):04X}⟩", clean)
+
+
+def one_line(text: str, limit: int = 300) -> str:
+    """Text as one visible line of at most ``limit`` characters.
+
+    Examples
+    --------
+    >>> one_line("a\\n b", 10), one_line("abcdef", 4)
+    ('a b', 'abc…')
+    """
+    line = " ".join(visible(text).split())
+    return line if len(line) <= limit else line[: limit - 1] + "…"
+
+
+def markdown_cell(text: str, limit: int = 80) -> str:
+    """Text that stays text in a Markdown table: markup characters escaped, one line.
+
+    Examples
+    --------
+    >>> markdown_cell("a|b <i>")
+    'a\\\\|b &lt;i&gt;'
+    """
+    line = one_line(text, limit)
+    line = line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return re.sub(r"([\\`*_{}\[\]()#+!|~@])", r"\\\1", line)
+
+
+def csv_cell(value: object) -> str:
+    """One CSV value that no spreadsheet takes for a formula: a quote in front of what could start one.
+
+    Examples
+    --------
+    >>> csv_cell("=1+1"), csv_cell("-3.5"), csv_cell(None), csv_cell(2.0)
+    ("'=1+1", '-3.5', '', '2.0')
+    """
+    if value is None:
+        return ""
+    if isinstance(value, float | int):
+        return repr(value)
+    text = visible(str(value))
+    if text.lstrip(" ").startswith(_FORMULA_STARTS) and not _NUMBER.match(text):
+        return "'" + text
+    return text
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A CSV table (RFC 4180) whose cells are safe to open in a spreadsheet."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer)
+    writer.writerow([csv_cell(h) for h in header])
+    writer.writerows([csv_cell(v) for v in row] for row in rows)
+    return buffer.getvalue()

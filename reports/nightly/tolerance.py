@@ -1,0 +1,81 @@
+"""How far a figure may move before it counts as changed."""
+
+from __future__ import annotations
+
+import fnmatch
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from actuator_lti.errors import InputError
+from reports.nightly.figures import Figure
+from reports.nightly.text import one_line
+
+RELATIVE = 1e-3
+ABSOLUTE = {"dB": 0.01, "deg": 0.05, "%": 0.05, "samples": 0.01, "s": 1e-7}
+MAX_RULES = 200
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One line of the study: figures whose name matches ``pattern``, and their tolerance."""
+
+    pattern: str
+    absolute: float
+    relative: float
+
+    def value(self, size: float) -> float:
+        """Tolerance of a figure of this size, in its own unit."""
+        return max(self.absolute, self.relative * abs(size))
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """The rules of a study in their order; what none matches moves by 0.1 % or a small step of its unit."""
+
+    rules: tuple[Rule, ...] = ()
+
+    def of(self, figure: Figure, size: float) -> float:
+        """Tolerance of a figure whose larger value has this size."""
+        if figure.kind == "verdict":
+            return 0.5
+        for rule in self.rules:
+            if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
+                return rule.value(size)
+        return max(ABSOLUTE.get(figure.unit, 0.0), RELATIVE * abs(size))
+
+
+def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:
+    """Read ``{"*phase_margin*" = "0.5 deg", "*bandwidth*" = "1 %"}``; a bare number is in the figure's unit.
+
+    Raises
+    ------
+    InputError
+        Where a value is no number of at least 0.
+
+    Examples
+    --------
+    >>> read_tolerances({"*bandwidth*": "1 %"}, "study.toml").rules
+    (Rule(pattern='*bandwidth*', absolute=0.0, relative=0.01),)
+    """
+    if len(table) > MAX_RULES:
+        raise InputError(f"tolerance: {len(table)} rules: at most {MAX_RULES} are allowed", where=where)
+    return Tolerances(tuple(_rule(str(pattern), value, where) for pattern, value in table.items()))
+
+
+def _rule(pattern: str, value: object, where: str) -> Rule:
+    text = str(value).strip()
+    digits, _, unit = text.partition(" ")
+    try:
+        amount = float(digits.rstrip("%"))
+    except ValueError:
+        amount = math.nan
+    if isinstance(value, bool) or not (amount >= 0.0 and math.isfinite(amount)):
+        raise InputError(
+            f"tolerance {one_line(pattern, 60)!r} = {one_line(text, 40)!r}: write a number of at least 0 and"
+            " its unit, or a percentage",
+            where=where,
+        )
+    if unit.strip() == "%" or digits.endswith("%"):
+        return Rule(pattern, 0.0, amount / 100.0)
+    return Rule(pattern, amount, 0.0)

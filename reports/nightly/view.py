@@ -1,0 +1,273 @@
+"""What a night looks like from its history: the rows of the index, and one design over the nights."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.changes import Cause, Change, Comparison, cause_of, compare_figures
+from reports.nightly.code_version import commits_between
+from reports.nightly.figures import Figure, Verdict
+from reports.nightly.history import Baseline, History, Result, Run
+from reports.nightly.job import BROKEN
+from reports.nightly.text import slug
+from reports.nightly.trend import WINDOW, flaps, missing_nights
+
+if TYPE_CHECKING:
+    from reports.nightly.night import Study
+
+STRIP = 30
+_RANK = {"timeout": 0, "crash": 0, "error": 0, "fail": 1, "pass": 3}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignView:
+    """One design tonight: its result, what changed, and how it came out over the last nights."""
+
+    result: Result
+    meta: Mapping[str, Any]
+    last_night: Comparison
+    baseline: Comparison
+    approval: Baseline | None
+    strip: tuple[tuple[Run, str], ...]
+    status_flaps: bool
+
+    @property
+    def name(self) -> str:
+        """Name as in the study."""
+        return self.result.name
+
+    @property
+    def slug(self) -> str:
+        """Name as a file."""
+        return slug(self.result.name)
+
+    @property
+    def broken(self) -> bool:
+        """Whether there is no result tonight."""
+        return self.result.status in BROKEN
+
+    @property
+    def title(self) -> str:
+        """Title that the report gives itself; empty where it says no more than the name."""
+        title = str(self.meta.get("title", ""))
+        return "" if title == self.name else title
+
+    @property
+    def revision(self) -> str:
+        """Revision of the design."""
+        return str(self.meta.get("revision", ""))
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files of its report."""
+        return tuple(self.meta.get("files", ()))
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Requirements of tonight's report."""
+        return tuple(Verdict(**v) for v in self.meta.get("verdicts", ()))
+
+    @property
+    def regressions(self) -> tuple[Change, ...]:
+        """Changes for the worse that nobody has approved."""
+        return self.baseline.regressions
+
+    @property
+    def state(self) -> str:
+        """``broken``, ``fail``, ``regression`` or ``pass``."""
+        if self.broken:
+            return "broken"
+        if self.result.status == "fail":
+            return "fail"
+        return "regression" if self.regressions else "pass"
+
+    @property
+    def report(self) -> str:
+        """Folder of its report on the site."""
+        return report_folder(self.name, self.result.key)
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Order of the index: no result first, then the worst distance to a requirement."""
+        worst = np.inf if self.result.worst is None else self.result.worst
+        return (0.0 if self.broken else 1.0, worst)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overview:
+    """A whole night: its designs, the worst first."""
+
+    study: str
+    title: str
+    run: Run
+    designs: tuple[DesignView, ...]
+    runs: tuple[Run, ...]
+    gone: tuple[str, ...]
+    missing: tuple[tuple[int, int], ...]
+    interrupted: tuple[str, ...]
+    tolerances: Any
+
+    def count(self, state: str) -> int:
+        """How many designs are in a state (see `DesignView.state`)."""
+        return sum(d.state == state for d in self.designs)
+
+    @property
+    def exit_status(self) -> int:
+        """0 where every design was built, meets its requirements and is as approved; else 1."""
+        return 0 if all(d.state == "pass" for d in self.designs) else 1
+
+
+def report_folder(name: str, key: str) -> str:
+    """Folder of a report below the site: by design, then by content."""
+    return f"reports/{slug(name)}/{key[:16]}"
+
+
+def overview(history: History, cache: Cache, study: Study) -> Overview:
+    """Put together what the site says about the last finished night."""
+    runs = history.runs()
+    run = runs[-1]
+    reader = _Reader(history, cache, study, runs)
+    tonight = history.results(run=run.id)
+    designs = sorted((reader.design(r) for r in tonight), key=lambda d: d.rank)
+    before = {r.name for r in history.results(run=runs[-2].id)} if len(runs) > 1 else set()
+    return Overview(
+        study=study.name,
+        title=study.title or study.name,
+        run=run,
+        designs=tuple(designs),
+        runs=tuple(runs),
+        gone=tuple(sorted(before - {r.name for r in tonight})),
+        missing=missing_nights([r.started for r in runs]),
+        interrupted=tuple(history.interrupted()),
+        tolerances=study.tolerances,
+    )
+
+
+class _Reader:
+    """Reads what belongs to each design, and what lies between two nights once."""
+
+    def __init__(self, history: History, cache: Cache, study: Study, runs: list[Run]) -> None:
+        self.history = history
+        self.cache = cache
+        self.study = study
+        self.runs = {r.id: r for r in runs}
+        self.last = runs[-1]
+        self.baselines = [b for b in history.baselines() if b.run in self.runs]
+        self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
+        self._table = history.figure_table()
+        self._number = {f.name: i for i, f in self._table.items()}
+
+    def design(self, result: Result) -> DesignView:
+        past = self.history.results(name=result.name, last=2 * STRIP)
+        approval = self._approval(result.name)
+        return DesignView(
+            result=result,
+            meta=self._meta(result),
+            last_night=self._last_night(result, past),
+            baseline=self._baseline(result, past, approval),
+            approval=approval,
+            strip=self._strip(past),
+            status_flaps=_toggles([r.status for r in past[-WINDOW:]]) >= 3,
+        )
+
+    def _meta(self, result: Result) -> Mapping[str, Any]:
+        if not result.key:
+            return {}
+        try:
+            entry = self.cache.read(result.key)
+        except CorruptEntry:
+            return {}
+        return entry.meta if entry else {}
+
+    def _strip(self, past: list[Result]) -> tuple[tuple[Run, str], ...]:
+        known = {r.run: r.status for r in past}
+        shown = list(self.runs.values())[-STRIP:]
+        return tuple((run, known.get(run.id, "absent")) for run in shown)
+
+    def _approval(self, name: str) -> Baseline | None:
+        for baseline in reversed(self.baselines):
+            if baseline.name in (None, name) and self.history.results(run=baseline.run, name=name, good=True):
+                return baseline
+        return None
+
+    def _last_night(self, result: Result, past: list[Result]) -> Comparison:
+        good = [r for r in past if r.snapshot is not None and r.run < result.run]
+        if not any(r.run < result.run for r in past):
+            return Comparison(note="first night of this design")
+        if not good:
+            return Comparison(note="no earlier night has a result")
+        skipped = sum(good[-1].run < i < result.run for i in self.runs)
+        note = (
+            f"{skipped} night(s) without a result before; compared with the last that has one"
+            if skipped
+            else ""
+        )
+        return self._compare(good[-1], result, past, note)
+
+    def _baseline(self, result: Result, past: list[Result], approval: Baseline | None) -> Comparison:
+        if approval is not None:
+            base = self.history.results(run=approval.run, name=result.name, good=True)[0]
+            return self._compare(base, result, past, "")
+        first = self.history.results(name=result.name, good=True, last=-1)
+        if not first:
+            return Comparison(note="no baseline: no night has a result")
+        if first[0].run == result.run:
+            return Comparison(run=self.last, note="this is the first night: nothing to compare with")
+        note = "nobody has approved a baseline yet: compared with the first night"
+        return self._compare(first[0], result, past, note)
+
+    def _compare(self, old: Result, new: Result, past: list[Result], note: str) -> Comparison:
+        run = self.runs[old.run]
+        if new.snapshot is None:
+            return Comparison(run=run, note=note or "no result tonight")
+        if new.snapshot == old.snapshot:
+            return Comparison(run=run, note=note)
+        before, after = self.history.figures(old.snapshot), self.history.figures(new.snapshot)
+        changes = compare_figures(before, after, self.study.tolerances)
+        inputs = (self.history.inputs(old.snapshot or 0), self.history.inputs(new.snapshot))
+        cause = cause_of(run, self.runs[new.run], inputs, self._commits_between(run, self.runs[new.run]))
+        return Comparison(run=run, changes=self._flapping(changes, past), cause=cause, note=note)
+
+    def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
+        if not changes or len(past) < 4:
+            return changes
+        numbers = [self._number[c.figure] for c in changes if c.figure in self._number]
+        values = self.history.matrix(past[-WINDOW:], numbers)
+        place = {number: j for j, number in enumerate(numbers)}
+        return tuple(
+            replace(c, flapping=flaps(values[:, place[self._number[c.figure]]], c.tolerance))
+            if c.figure in self._number
+            else c
+            for c in changes
+        )
+
+    def _commits_between(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
+        key = (old.id, new.id)
+        if key not in self._commits:
+            code_root = Path(__file__).resolve().parents[2]
+            found = [("code", line) for line in commits_between(code_root, old.code_commit, new.code_commit)]
+            origin = self.study.origin
+            if origin is not None and (old.study_commit, new.study_commit) != (
+                old.code_commit,
+                new.code_commit,
+            ):
+                found += [
+                    ("study", line) for line in commits_between(origin, old.study_commit, new.study_commit)
+                ]
+            self._commits[key] = tuple(found)
+        return self._commits[key]
+
+
+def _toggles(statuses: list[str]) -> int:
+    return sum(a != b for a, b in itertools.pairwise(statuses))
+
+
+__all__ = ["Cause", "DesignView", "Figure", "Overview", "overview", "report_folder"]

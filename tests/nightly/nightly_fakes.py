@@ -1,0 +1,108 @@
+"""Quick stand-ins for a report: what the nightly is tested with where the numbers do not matter."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from reports.document import column, document, section, table, verdict, verdicts
+from reports.nightly.code_version import CodeVersion
+from reports.nightly.figures import digest
+from reports.nightly.job import Job
+from reports.nightly.night import Settings, Study
+
+CODE = CodeVersion(sources="s", libraries={"numpy": "2"}, commit="c" * 40)
+BUILD = "nightly_fakes:build"
+INLINE = Settings(workers=0, build=BUILD)
+
+
+def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
+    """A small report: one requirement on ``margin`` (at least ``limit``) and a table of margins."""
+    name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
+    item = verdict(
+        id=str(payload.get("requirement", "GM")),
+        label=str(payload.get("label", "gain margin")),
+        value=margin,
+        limit=limit,
+        comparison="≥",
+        unit="dB",
+        distance=margin - limit,
+        passed=margin >= limit,
+        source="test",
+    )
+    rows = [
+        {"loop": loop, "phase_margin": 40.0 + margin + k, "crossover": 100.0 * (k + 1)}
+        for k, loop in enumerate(["current", "velocity", str(payload.get("loop", "position"))])
+    ]
+    columns = [
+        column("loop", "loop"),
+        column("phase_margin", "phase margin", "deg", format="fix:1"),
+        column("crossover", "crossover", "rad/s", format="sig:4"),
+    ]
+    return document(
+        title=str(payload.get("title", name)),
+        subtitle="",
+        design={"name": name, "revision": str(payload.get("revision", "A"))},
+        provenance={"version": "0", "commit": None, "time": None},
+        sections=[
+            section(
+                "verdicts", "Requirements", [verdicts([item])], status="pass" if item["passed"] else "fail"
+            ),
+            section("margins", "Margins", [table("Margins", columns, rows)]),
+        ],
+    )
+
+
+def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """Do as the payload says: raise, hang, die, or return a report."""
+    mode = payload.get("mode", "")
+    if mode == "raise":
+        raise ValueError(str(payload.get("words", "this design cannot be built")))
+    if mode == "hang":
+        time.sleep(600)
+    if mode == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    if mode == "exit":
+        raise SystemExit(7)
+    if "log" in payload:
+        with Path(str(payload["log"])).open("a", encoding="utf-8") as log:
+            log.write(f"{payload['name']}\n")
+    time.sleep(float(payload.get("pause", 0.0)))
+    made = fake_document(payload)
+    html = f"<!doctype html><meta charset=utf-8><title>report</title><h1>report {len(str(payload))}</h1>"
+    return digest(made), {"report.html": html.encode(), "report.json": b"{}"}
+
+
+def job(name: str, margin: float = 10.0, **more: Any) -> Job:
+    """A job for `build`."""
+    payload = {"name": name, "margin": margin, **more}
+    return Job(
+        name=name,
+        payload=payload,
+        design_hash=f"{margin}",
+        parameters={"control.position.gain": f"{margin:g} 1/s"},
+        title=str(more.get("title", name)),
+    )
+
+
+def study(*jobs: Job, name: str = "fake study", **more: Any) -> Study:
+    """A study of such jobs."""
+    return Study(name=name, jobs=tuple(jobs), title=more.pop("title", "Fin actuators"), **more)
+
+
+class Calendar:
+    """A clock that moves on by a day with every night (it is read twice a night)."""
+
+    def __init__(self, day: int = 1) -> None:
+        self.day = day
+
+    def __call__(self) -> str:
+        return f"2026-{1 + (self.day - 1) // 28:02d}-{1 + (self.day - 1) % 28:02d}T02:00:00Z"
+
+    def next(self, days: int = 1) -> Calendar:
+        self.day += days
+        return self
