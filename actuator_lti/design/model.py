@@ -255,11 +255,17 @@ class ControllerObjects:
     """The controller's own settings that a design was imported from, also those that no key holds.
 
     ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
-    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.
+    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
+    index and subindex.
     """
 
     velocity_gain_factor: float = 1.0
     values: tuple[ControllerObject, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Put the values in order."""
+        ordered = tuple(sorted(self.values, key=lambda item: (item.index, item.subindex)))
+        object.__setattr__(self, "values", ordered)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -199,7 +199,7 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     Returns
     -------
     Exported
-        Objects in the order in which they were imported, unknown ones as they were.
+        Objects in the order of their index, unknown ones as they were.
 
     Raises
     ------

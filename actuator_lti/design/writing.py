@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
 from dataclasses import fields as dataclass_fields
-from dataclasses import is_dataclass
 from math import inf, isfinite
 from typing import Any
 
@@ -45,8 +45,8 @@ def design_tree(design: Design) -> dict[str, Any]:
         if part is not None:
             _put(tree, name, _section(design, part, name, name, structure))
     tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
-    tree["correlation"] = [_plain(item) for item in design.correlations]
-    tree["fact"] = [_plain(item) for item in design.facts]
+    tree["correlation"] = [asdict(item) for item in design.correlations]
+    tree["fact"] = [asdict(item) for item in design.facts]
     if design.objects != ControllerObjects():
         tree["objects"] = {
             "velocity_gain_factor": design.objects.velocity_gain_factor,
@@ -129,14 +129,6 @@ def _requirement(item: Requirement, structure: Structure) -> dict[str, Any]:
     if item.load_Nm is not None:
         tree["load"] = f"{item.load_Nm!r} {'N' if structure.axis == 'linear' else 'N*m'}"
     return tree | {key: getattr(item, key) for key in ("source", "note") if getattr(item, key)}
-
-
-def _plain(item: Any) -> dict[str, Any]:
-    return {
-        part.name: getattr(item, part.name)
-        for part in dataclass_fields(item)
-        if getattr(item, part.name) != ""
-    }
 
 
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:

@@ -1,0 +1,118 @@
+"""Random design files for the property tests: any stages, any spelling of units, any pedigree."""
+
+from typing import Any
+
+from hypothesis import strategies as st
+
+from actuator_lti.design.field import BIG, Field, Structure
+from actuator_lti.design.fields import fields_in
+
+_SPELLINGS = {
+    "kg*m^2": ("kg*m^2", "g*cm^2", "gcm²"),
+    "ohm": ("ohm", "mohm"),
+    "H": ("H", "uH"),
+    "rad/s": ("rad/s", "rpm", "Hz"),
+    "rad": ("rad", "deg"),
+    "s": ("s", "us", "ms"),
+    "N*m": ("N*m", "mNm", "ozf*in"),
+    "A": ("A", "mA"),
+}
+_texts = st.text(st.characters(min_codepoint=32, max_codepoint=0x24F, exclude_categories=("C",)), max_size=20)
+_factors = st.floats(0.25, 4.0).map(lambda x: float(f"{x:.6g}"))
+
+
+@st.composite
+def written_value(draw: st.DrawFn, unit: str, number: float) -> Any:
+    """A number near one given, in some spelling, with or without a pedigree."""
+    spelling = draw(st.sampled_from(_SPELLINGS.get(unit, (unit,))))
+    text = number if unit == "1" else f"{number!r} {spelling}"
+    if draw(st.booleans()):
+        return text
+    pedigree: dict[str, Any] = {"value": text}
+    pedigree |= draw(
+        st.fixed_dictionaries({}, optional={"source": _texts, "grade": st.sampled_from("ABCDX")})
+    )
+    width = st.sampled_from(["5 %", {"kind": "normal", "std": "1 %"}, {"half_width": "0.5 %"}])
+    return pedigree | draw(st.fixed_dictionaries({}, optional={"tolerance": width}))
+
+
+@st.composite
+def _section(draw: st.DrawFn, title: str, structure: Structure, fixed: dict[str, Any]) -> dict[str, Any]:
+    section = dict(fixed)
+    for field in fields_in(title):
+        if field.key in section or not (field.required or draw(st.booleans())):
+            continue
+        section[field.key] = draw(_value(field, structure))
+    return {key: value for key, value in section.items() if value is not None}
+
+
+def _value(field: Field, structure: Structure) -> st.SearchStrategy[Any]:
+    if field.kind == "choice":
+        return st.sampled_from(field.choices)
+    if field.kind == "text":
+        return _texts
+    if field.kind == "integer":
+        return st.integers(1, 4)
+    unit = field.unit(structure)
+    middle = 1.0 if field.high == BIG else min(1.0, field.high / 4)
+    if field.kind == "quantities":
+        items = _factors.map(lambda x: x * middle if unit == "1" else f"{x * middle!r} {unit}")
+        return st.lists(items, min_size=1, max_size=4)
+    low = 4 * field.low if field.low >= 1.0 else 0.0
+    return _factors.flatmap(lambda x: written_value(unit, max(x * middle, low)))
+
+
+@st.composite
+def design_trees(draw: st.DrawFn) -> dict[str, Any]:
+    """A tree of a design file that must be accepted."""
+    axis = draw(st.sampled_from(["rotary", "linear"]))
+    source, has_velocity = draw(st.booleans()), draw(st.booleans())
+    has_current = not source and draw(st.booleans())
+    structure = Structure(axis, has_velocity, has_current)
+    torque, angle = ("N*m", "rad") if axis == "rotary" else ("N", "m")
+    constant = draw(_factors)
+    electrical: dict[str, Any] = {"source_gain": None, "torque_constant": f"{constant} {torque}/A",
+                                  "back_emf_constant": f"{constant * 1.05:.6g} V*s/{angle}",
+                                  "resistance": "1 ohm", "inductance": "1 mH"}  # fmt: skip
+    ideal = {**dict.fromkeys(electrical), "source_gain": draw(written_value(f"{torque}/V", constant))}
+    control = draw(_section("control", structure, {"period": "1 ms", "computing_delay": "1.5 ms"}))
+    n_v = draw(st.integers(1, 3))
+    no_feedforward = {} if has_velocity else {"feedforward": None}
+    n_p = n_v * draw(st.integers(1, 3)) if has_velocity else 1
+    control["position"] = draw(_section("control.position", structure, {"every": n_p, **no_feedforward}))
+    if has_velocity:
+        control["velocity"] = draw(_section("control.velocity", structure, {"every": n_v}))
+    if has_current:
+        control["current"] = draw(_section("control.current", structure, {}))
+    names = draw(
+        st.lists(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,8}", fullmatch=True), unique=True, max_size=3)
+    )
+    tree = {
+        "design": draw(_section("design", structure, {"name": "d", "axis": axis})),
+        "motor": draw(_section("motor", structure, ideal if source else electrical)),
+        "gear": [{"name": name, **draw(_section("gear.*", structure, {}))} for name in names],
+        "limits": draw(_section("limits", structure, {"speed": None, "continuous_current": None})),
+        "control": control,
+    }
+    for name in ("load", "friction", "encoder", "validation"):
+        if draw(st.booleans()):
+            tree[name] = draw(_section(name, structure, {}))
+    tree["requirement"] = draw(_requirements(torque))
+    tree["fact"] = draw(st.lists(st.fixed_dictionaries({"label": _texts, "value": _texts}), max_size=2))
+    return tree
+
+
+@st.composite
+def _requirements(draw: st.DrawFn, torque: str) -> list[dict[str, Any]]:
+    limits = {"gain_margin": "6.5 dB", "bandwidth": "90 rpm", "delay_margin": "3 ms", "overshoot": "12 %",
+              "modulus_margin": 0.4, "motor_current": "400 mA"}  # fmt: skip
+    found = []
+    for i, quantity in enumerate(draw(st.lists(st.sampled_from(sorted(limits)), max_size=4))):
+        item: dict[str, Any] = {"id": f"r{i}", "quantity": quantity, "source": draw(_texts)}
+        item[draw(st.sampled_from(["minimum", "maximum"]))] = limits[quantity]
+        if quantity == "motor_current":
+            item["load"] = f"{draw(_factors)!r} {torque}"
+        else:
+            item["loop"] = draw(st.sampled_from(["every", "position"]))
+        found.append(item)
+    return found

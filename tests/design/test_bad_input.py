@@ -1,0 +1,184 @@
+# ruff: noqa: E501 (a table of cases, one a line)
+"""Every kind of bad design file: one line with file, key, value and what is allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.design import load_design, read_design_text
+from actuator_lti.design.loader import design_text
+from actuator_lti.design.reading import MAX_BYTES, MAX_STRING
+from actuator_lti.errors import InputError
+
+AMBER = design_text("ilr33-amber")
+TOLERANCE = 'tolerance = "50 %"'
+FACTS = "[[fact]]"
+
+
+def refused(text: str) -> str:
+    with pytest.raises(InputError) as caught:
+        read_design_text(text, "my.toml")
+    line = str(caught.value)
+    assert line.startswith("my.toml: ")
+    assert "\n" not in line
+    assert line.isprintable()
+    return line
+
+
+def changed(*replacements: tuple[str, str]) -> str:
+    text = AMBER
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new, 1)
+    return text
+
+
+ROTOR = next(line for line in AMBER.splitlines() if line.startswith("rotor_inertia"))
+RESISTANCE = next(line for line in AMBER.splitlines() if line.startswith("resistance"))
+
+CASES = {
+    "unknown key": ([("resistance =", "resistence =")], ["motor.resistence", 'nearest known: "resistance"']),
+    "unknown section": ([("[motor]", "[mottor]")], ["mottor", 'nearest known: "motor"']),
+    "unknown pedigree": ([('grade = "X"', 'grad = "X"')], ['.grad = "X"', 'nearest known: "grade"']),
+    "missing key": ([(ROTOR, "")], ["motor.rotor_inertia: missing", "g*cm^2"]),
+    "half a motor": ([(RESISTANCE, "")], ["motor.resistance: missing", "motor.source_gain"]),
+    "missing name": ([('name = "worm"\n', "")], ["gear[2].name: missing"]),
+    "wrong dimension": ([('"55 mohm"', '"55 mH"')], ['motor.resistance = "55 mH"', "wrong dimension", "ohm"]),
+    "no unit": ([('"55 mohm"', "55")], ["motor.resistance = 55", "no unit"]),
+    "unknown unit": ([('"55 mohm"', '"55 mohn"')], ["motor.resistance", "unknown unit"]),
+    "angle for a rate": ([('"120 1/s"', '"120 rpm"')], ["control.position.gain", "wrong dimension", "1/s"]),
+    "rate for an angle": ([('"942.5 rad/s"', '"942.5 1/s"')], ["limits.speed", "wrong dimension", "rad/s"]),
+    "NaN": ([('"55 mohm"', "nan")], ["motor.resistance = nan", "finite"]),
+    "infinity": ([('"55 mohm"', "inf")], ["motor.resistance = inf", "finite"]),
+    "overflow": ([('"55 mohm"', '"1e999 ohm"')], ["motor.resistance", "finite"]),
+    "negative inertia": ([('"9.2 g*cm^2"', '"-9.2 g*cm^2"')], ["motor.rotor_inertia", "-9.2", "above 0"]),
+    "zero period": ([('period = { value = "100 us"', 'period = { value = "0 us"')], ["control.period", "1e-07 s"]),
+    "negative friction": ([('"2.25e-3 N*m"', '"-1 N*m"')], ["friction.dry_torque", "at least 0"]),
+    "n_p no multiple of n_v": (
+        [("[control.position]", "[control.position]\nevery = 3"), ("[control.velocity]", "[control.velocity]\nevery = 2")],
+        ["control.position.every = 3", "a multiple of control.velocity.every = 2"],
+    ),
+    "half a tick": ([("[control.position]", "[control.position]\nevery = 1.5")], ["every = 1.5", "whole number"]),
+    "kE against kM": ([('"5.9 mV*s/rad"', '"7 mV*s/rad"')], ["motor.back_emf_constant = 0.007", "within 10 %"]),
+    "speed beyond the supply": ([('"942.5 rad/s"', '"30000 rpm"')], ["limits.speed = 3142", "2034 rad/s"]),
+    "delay of 200 ticks": ([('delay = { value = "100 us"', 'delay = { value = "20 ms"')], ["at most 100 ticks"]),
+    "continuous above peak": ([('"4 A", source', '"14 A", source')], ["limits.continuous_current", "12 A"]),
+    "choice": ([('"self-locking"  #', '"locking"  #')], ['load.path = "locking"', '"back-drivable"']),
+    "truth for a number": ([("value = 66", "value = true")], ["gear.planetary.ratio", "a number"]),
+    "date for a text": ([('revision = "1"', "revision = 1979-05-27")], ["design.revision", "allowed: text"]),
+    "name for paths": ([('name = "ilr33-amber"', 'name = "../x"')], ["design.name", "letters, digits"]),
+    "duplicate gear": ([('name = "worm"', 'name = "planetary"')], ["gear.name", "each name once"]),
+    "duplicate requirement": ([('id = "phase-margin"', 'id = "gain-margin"')], ["requirement.id", "each id once"]),
+    "unknown quantity": ([('"gain_margin"', '"gain_margn"')], ["gain_margn", 'nearest known: "gain_margin"']),
+    "loop that is not there": ([('loop = "position"', 'loop = "spin"')], ['.loop = "spin"', "velocity"]),
+    "limit in a wrong unit": ([('"15 Hz"', '"15 dB"')], ["requirement.position-bandwidth.minimum", "Hz"]),
+    "ratio for decibel": ([('"6 dB"', '"2"')], ["requirement.gain-margin.minimum", "6 dB"]),
+    "no limit": ([('minimum = "15 Hz"', "")], ["requirement.position-bandwidth: missing limit"]),
+    "crossed limits": ([('"15 Hz"', '"15 Hz"\nmaximum = "1 Hz"')], ["minimum = 15.0", "at most maximum"]),
+    "loop for a drive figure": ([('"output_rate"', '"output_rate"\nloop = "every"')], ["output-rate.loop", "no loop"]),
+    "tolerance too wide": ([(TOLERANCE, 'tolerance = "150 %"')], ["input_inertia.tolerance", "at least 0"]),
+    "tolerance of a wrong kind": ([(TOLERANCE, 'tolerance = { kind = "gauss" }')], ["tolerance.kind", '"normal"']),
+    "normal without std": ([(TOLERANCE, 'tolerance = { kind = "normal" }')], ["tolerance", "missing std"]),
+    "uniform with std": ([(TOLERANCE, 'tolerance = { half_width = "5 %", std = "1 %" }')], ["no std"]),
+    "truncated without bounds": (
+        [(TOLERANCE, 'tolerance = { kind = "truncated-normal", std = "1 %" }')], ["lower or upper"],
+    ),
+    "tolerance as a list": ([(TOLERANCE, "tolerance = []")], ["tolerance = a list", '"50 %"']),
+    "correlation of a fixed value": (
+        [(FACTS, '[[correlation]]\nfirst="load.inertia"\nsecond="gear.worm.ratio"\ncoefficient=0.5\n[[fact]]')],
+        ['"gear.worm.ratio"', "keys with a tolerance"],
+    ),
+    "correlation above 1": (
+        [(FACTS, '[[correlation]]\nfirst="load.inertia"\nsecond="gear.worm.input_inertia"\ncoefficient=1.5\n[[fact]]')],
+        ["coefficient = 1.5", "-1 to 1"],
+    ),
+    "terminal escape": ([('title = "ILR', 'title = "\\u001b[31mILR')], ["design.title", "U+001B"]),
+    "text that runs backward": ([('title = "ILR', 'title = "\\u202eILR')], ["design.title", "U+202E"]),
+    "empty loads": ([('loads = ["0 N*m", "8 N*m"]', "loads = []")], ["validation.loads", "1 to 200"]),
+    "wrong loads": ([('"0 N*m", "8 N*m"', '"0 N*m", "8 V"')], ['validation.loads[2] = "8 V"']),
+    "amplitude above full": ([("0.5, 1.0]", "0.5, 2.0]")], ["amplitude_fractions[5] = 2.0"]),
+    "broken TOML": ([("[motor]", "[motor")], ["not TOML", "line 11, column 7"]),
+    "one table for many": ([("[[gear]]", "[gear]"), ("[[gear]]\nname = \"worm\"", "[load2]")], ["load2"]),
+    "long text": ([('title = "ILR', f'title = "{"x" * (MAX_STRING + 1)}')], ["design.title", "at most 10000"]),
+    "many gears": ([("[[gear]]", "[[gear]]\n" * 21)], ["gear: allowed: 1 to 20 items"]),
+    "unknown object": ([(FACTS, "[objects.values]\n\"0x23\" = 1\n[[fact]]")], ["0x23", "0x2344.01"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_bad_value_is_refused_in_one_line(case: str) -> None:
+    replacements, says = CASES[case]
+    line = refused(changed(*replacements))
+    for part in says:
+        assert part in line
+
+
+def test_correlations_that_contradict_each_other_are_refused() -> None:
+    keys = ("load.inertia", "gear.worm.input_inertia", "gear.planetary.input_inertia")
+    pairs = [(keys[0], keys[1], 0.9), (keys[1], keys[2], 0.9), (keys[0], keys[2], -0.9)]
+    tables = "".join(
+        f'[[correlation]]\nfirst = "{a}"\nsecond = "{b}"\ncoefficient = {c}\n' for a, b, c in pairs
+    )
+    assert "contradict" in refused(AMBER + tables)
+
+
+@pytest.mark.parametrize(
+    ("extra", "says"),
+    [
+        ("[control.current]\ngain = '1 ohm'", "control.current"),
+        ("[motor]\nresistance = '1 ohm'", "motor.resistance = 1.0: not allowed beside motor.source_gain"),
+        ("feedforward", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
+    ],
+)
+def test_the_stages_of_a_force_source_are_held_apart(extra: str, says: str) -> None:
+    text = design_text("emps")
+    if extra.startswith("[motor]"):
+        text = text.replace("[motor]", extra)
+    elif extra == "feedforward":
+        text = text.replace('"243.45 V*s/m"', '"1 A*s/m"')
+    else:
+        text = text + extra + "\n"
+        text = text.replace('"243.45 V*s/m"', '"1 A*s/m"')
+    assert says in refused(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "a = 1",
+        "x = " + "[" * 5000,
+        "x = " + "{a=" * 5000,
+        "a." * 50_000 + "b = 1",
+        "[" + "a." * 50_000 + "b]",
+        "x = 1" + "0" * 10_000,
+        "\0",
+        "x = '" + "y" * MAX_BYTES + "'",
+        "x = [" + "1," * 30_000 + "]",
+        "\n".join(f"k{i} = 1" for i in range(30_000)),
+    ],
+    ids=range(11),
+)
+def test_nonsense_is_refused_quickly(text: str) -> None:
+    refused(text)
+
+
+def test_files_that_are_no_design_are_refused(tmp_path: Path) -> None:
+    def line(path: Path) -> str:
+        with pytest.raises(InputError) as caught:
+            load_design(path)
+        return str(caught.value)
+
+    assert "no such file" in line(tmp_path / "missing.toml")
+    assert "is a directory" in line(tmp_path)
+    (tmp_path / "binary.toml").write_bytes(b"[design]\nname = '\xff\xfe'")
+    assert "byte 17 is not UTF-8" in line(tmp_path / "binary.toml")
+    (tmp_path / "large.toml").write_bytes(b"#" * (MAX_BYTES + 1))
+    assert "at most 1 MiB" in line(tmp_path / "large.toml")
+    assert "no regular file" in line(Path("/dev/null"))
+
+
+def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "bom.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + AMBER.replace("\n", "\r\n").encode())
+    assert load_design(path).motor == load_design("ilr33-amber").motor

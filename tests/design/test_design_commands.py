@@ -1,0 +1,90 @@
+"""The commands around design files, as a user calls them."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.design import load_design, shipped_designs, warnings_of
+from reports.cli.main import main
+
+
+def test_designs_lists_all_for_people_and_machines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["designs"]) == 0
+    shown = capsys.readouterr().out
+    assert main(["designs", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)["designs"]
+    assert [row["name"] for row in listed] == list(shipped_designs())
+    assert all(name in shown for name in shipped_designs())
+    assert listed[0]["loops"] == ["current PI", "velocity PI", "position P"]
+
+
+def test_init_writes_a_design_that_reads_without_a_warning_but_its_examples(tmp_path: Path) -> None:
+    path = tmp_path / "fin-1.toml"
+    assert main(["init", str(path)]) == 0
+    design = load_design(path)
+    assert design.name == "fin-1"
+    assert warnings_of(design) == ()
+    assert path.read_text().count("#") > 30
+    assert [item.name for item in tmp_path.iterdir()] == ["fin-1.toml"]
+
+
+@pytest.mark.parametrize("name", shipped_designs())
+def test_init_starts_from_a_shipped_design_with_its_comments(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "copy.toml"
+    assert main(["init", str(path), "--from", name]) == 0
+    copy = load_design(path)
+    assert copy.name == "copy"
+    assert copy.motor == load_design(name).motor
+    assert path.read_text().startswith("# ")
+
+
+def test_init_does_not_overwrite_without_being_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("precious")
+    assert main(["init", str(path)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert path.read_text() == "precious"
+    assert main(["init", str(path), "--force"]) == 0
+    assert load_design(path).name == "mine"
+
+
+def test_a_bad_source_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[design]\nname = 3\n")
+    for source in ("nope", str(bad)):
+        assert main(["init", str(tmp_path / "new.toml"), "--from", source]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert "Traceback" not in error
+    assert not (tmp_path / "new.toml").exists()
+
+
+def test_settings_go_out_and_come_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    xdc, toml = tmp_path / "s.xdc", tmp_path / "d.toml"
+    assert main(["objects", "export", "--out", str(xdc)]) == 0
+    assert "rounded: 0x6080.00 (limits.speed)" in capsys.readouterr().err
+    assert main(["objects", "import", str(xdc), "--out", str(toml)]) == 0
+    assert load_design(toml).controller == load_design("ilr33-amber").controller
+    assert main(["objects", "import", str(xdc), "--velocity-gain-per", "rpm", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert list(report["changed"]) == ["control.velocity.gain"]
+    assert any("9.549" in note for note in report["notes"])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["objects", "export", "emps"],
+        ["objects", "import", "missing.xdc"],
+        ["objects", "export", "--velocity-gain-per", "Hz"],
+        ["init", "."],
+    ],
+)
+def test_bad_use_is_status_2_and_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1

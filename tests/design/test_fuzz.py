@@ -1,0 +1,111 @@
+"""Whatever a loader is given, it accepts it or refuses it in one printable line."""
+
+from typing import Any
+
+import pytest
+import tomli_w
+from design_strategies import design_trees
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from actuator_lti.design import load_design, read_design_text, write_design
+from actuator_lti.design.loader import design_text
+from actuator_lti.design.objects import import_objects
+from actuator_lti.design.settings_file import read_settings_toml, read_settings_xml, write_settings_xml
+from actuator_lti.design.units import parse_quantity
+from actuator_lti.errors import InputError
+
+MANY = settings(deadline=None, max_examples=100, suppress_health_check=list(HealthCheck))
+AMBER = design_text("ilr33-amber")
+SETTINGS = '[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
+SCALARS = st.one_of(
+    st.none().map(lambda _: ""),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=20),
+    st.sampled_from(["1 V", "-1 kg", "nan A", "1e400 s", "5 %", "x" * 11_000, "every", "ilr33-amber"]),
+    st.dates(),
+)
+VALUES = st.recursive(
+    SCALARS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+    max_leaves=6,
+)  # fmt: skip
+
+
+def one_line(call: Any) -> None:
+    try:
+        call()
+    except InputError as error:
+        line = str(error)
+        assert line.isprintable()
+        assert len(line) < 2000
+
+
+@MANY
+@given(st.text(max_size=300))
+def test_any_text(text: str) -> None:
+    one_line(lambda: read_design_text(text, "f"))
+    one_line(lambda: read_settings_toml(text, "f"))
+    one_line(lambda: read_settings_xml(text, "f"))
+
+
+@MANY
+@given(st.binary(max_size=300))
+def test_any_bytes(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.toml"
+    path.write_bytes(data)
+    one_line(lambda: load_design(path))
+
+
+@MANY
+@given(st.integers(0, len(AMBER) - 1), st.integers(0, 12), st.text(max_size=12))
+def test_a_damaged_design_file(start: int, length: int, patch: str) -> None:
+    one_line(lambda: read_design_text(AMBER[:start] + patch + AMBER[start + length :], "f"))
+
+
+@MANY
+@given(design_trees(), st.data())
+def test_any_value_at_any_place(tree: dict[str, Any], data: st.DataObject) -> None:
+    here: Any = tree
+    while True:
+        keys = list(here) if isinstance(here, dict) else list(range(len(here)))
+        if not keys:
+            break
+        key = data.draw(st.sampled_from(keys))
+        deeper = isinstance(here[key], dict | list) and data.draw(st.booleans())
+        if not deeper:
+            here[key] = data.draw(VALUES)
+            break
+        here = here[key]
+    try:
+        text = tomli_w.dumps(tree)
+    except (TypeError, ValueError):
+        return
+    one_line(lambda: write_design(read_design_text(text, "f")))
+
+
+@MANY
+@given(st.text(st.sampled_from("0123456789.eE+-*/^() mkuNVArads%²°_"), max_size=30))
+def test_any_quantity(text: str) -> None:
+    one_line(lambda: parse_quantity(text, "N*m"))
+
+
+@MANY
+@given(st.integers(0, len(SETTINGS) - 1), st.integers(0, 12), st.text(max_size=12))
+def test_damaged_settings(start: int, length: int, patch: str) -> None:
+    base = load_design("ilr33-amber")
+    text = SETTINGS[:start] + patch + SETTINGS[start + length :]
+    one_line(lambda: import_objects(read_settings_toml(text, "f"), base))
+    xml = write_settings_xml(read_settings_toml(SETTINGS, "f"))
+    place = start * len(xml) // len(SETTINGS)
+    one_line(
+        lambda: import_objects(read_settings_xml(xml[:place] + patch + xml[place + length :], "f"), base)
+    )
+
+
+@MANY
+@given(st.text(max_size=40))
+def test_any_name_of_a_design(name: str) -> None:
+    one_line(lambda: load_design(name))

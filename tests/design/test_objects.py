@@ -1,0 +1,263 @@
+"""Settings in the controller's own objects: there and back without loss, and what is refused."""
+
+from dataclasses import replace
+from math import pi
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from actuator_lti.design import load_design, read_design_text, with_values, write_design
+from actuator_lti.design.model import ControllerObject, ControllerObjects
+from actuator_lti.design.object_dictionary import OBJECTS
+from actuator_lti.design.objects import PER_RPM, calibration, export_objects, import_objects
+from actuator_lti.design.settings_file import (
+    parse_label,
+    read_settings,
+    read_settings_toml,
+    read_settings_xml,
+    write_settings_toml,
+    write_settings_xml,
+)
+from actuator_lti.errors import InputError
+
+AMBER = load_design("ilr33-amber")
+
+# What the baseline's data sheet values are in the units of the objects.
+EXPORTED = {
+    "0x2329.02": 4000,
+    "0x2329.03": 12000,
+    "0x2329.04": 5900,
+    "0x2329.05": 6,
+    "0x2329.09": 9200,
+    "0x232A.01": 55,
+    "0x232A.02": 2_250_000,
+    "0x232A.03": 549_779,
+    "0x2342.01": 20,
+    "0x2342.02": 150,
+    "0x2344.01": 120_000,
+    "0x2344.02": 150,
+    "0x2348.01": 120,
+    "0x6080.00": 9000,
+    "0x6083.00": 30000,
+}
+
+
+def objects(values: dict[str, int], factor: float = 1.0) -> ControllerObjects:
+    items = [(parse_label(label, "test"), value) for label, value in values.items()]
+    made = tuple(ControllerObject(index=i, subindex=s, value=v) for (i, s), v in items)
+    return ControllerObjects(velocity_gain_factor=factor, values=made)
+
+
+def test_the_baseline_in_the_units_of_the_objects() -> None:
+    written = {item.label: item.value for item in export_objects(AMBER).objects.values}
+    assert {label: written[label] for label in EXPORTED} == EXPORTED
+
+
+def test_what_was_rounded_is_said() -> None:
+    rounded = {item.label: item for item in export_objects(AMBER).rounded}
+    assert set(rounded) == {"0x2329.0A", "0x232A.03", "0x6080.00"}
+    assert rounded["0x6080.00"].exact == pytest.approx(942.5 * 30 / pi)
+    assert rounded["0x232A.03"].exact == pytest.approx(5.25e-6 * 2 * pi / 60 * 1e12)
+    assert "rounded to 9000 rpm" in str(rounded["0x6080.00"])
+
+
+def test_a_design_survives_export_and_import() -> None:
+    for factor in (1.0, PER_RPM):
+        design = replace(AMBER, objects=ControllerObjects(velocity_gain_factor=factor))
+        settings_text = write_settings_xml(export_objects(design).objects)
+        back = import_objects(read_settings_xml(settings_text, "s", factor), design)
+        assert back.changed == ()
+        assert replace(back.design, objects=design.objects) == design
+
+
+def test_a_real_set_of_another_motor_with_either_calibration() -> None:
+    # 0x2342 1028 mohm, 385 us; 0x2344 344, 371; 0x2348 2: a real export.
+    real = {"0x2342.01": 1028, "0x2342.02": 385, "0x2344.01": 344, "0x2344.02": 371, "0x2348.01": 2}
+    for factor, gain in ((1.0, 344e-6), (PER_RPM, 344e-6 * 30 / pi)):
+        result = import_objects(objects(real, factor), AMBER)
+        control = result.design.controller
+        assert control.current is not None
+        assert control.velocity is not None
+        assert (control.current.gain_V_A, control.current.integral_time_s) == pytest.approx((1.028, 385e-6))
+        assert (control.velocity.gain, control.velocity.integral_time_s) == pytest.approx((gain, 0.0371))
+        assert control.position.gain == 2.0
+        assert export_objects(result.design).objects == objects(real, factor)
+        assert any("calibration factor" in note for note in result.notes)
+
+
+def test_unknown_objects_are_kept_and_written_back() -> None:
+    given_set = objects(
+        {"0x3000.02": -5, "0x2346.01": 7, "0x2348.01": 50, "0x6084.00": 100, "0x6083.00": 200}
+    )
+    result = import_objects(given_set, AMBER)
+    assert [item.label for item in result.kept] == ["0x2346.01", "0x3000.02", "0x6084.00"]
+    stored = read_design_text(write_design(result.design), "stored")
+    assert export_objects(stored).objects == given_set
+    assert any("0x6084" in note for note in result.notes)
+
+
+def test_a_change_after_the_import_is_exported_and_its_followers_with_it() -> None:
+    imported = import_objects(objects({"0x6083.00": 200, "0x6084.00": 200, "0x2348.01": 50}), AMBER).design
+    tuned = with_values(imported, {"control.position.gain": 80.0, "limits.acceleration": 300 * 2 * pi})
+    written = {item.label: item.value for item in export_objects(tuned).objects.values}
+    assert written == {"0x6083.00": 300, "0x6084.00": 300, "0x2348.01": 80}
+    notes = export_objects(tuned).notes
+    assert any("0x2342.01" in note and "not written" in note for note in notes)
+    complete = {item.label for item in export_objects(tuned, complete=True).objects.values}
+    assert "0x2342.01" in complete
+
+
+def test_the_torque_constant_sets_the_back_emf_too() -> None:
+    motor = import_objects(objects({"0x2329.04": 11800}), AMBER).design.motor
+    assert motor.torque_constant_Nm_A == motor.back_emf_constant_Vs_rad == pytest.approx(0.0118)
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"0x2342.02": 149}, "0x2342.02 = 149: allowed: 150 to 2600 us"),
+        ({"0x2342.02": 2601}, "150 to 2600"),
+        ({"0x2344.02": 19}, "20 to 1000"),
+        ({"0x2348.01": 251}, "1 to 250"),
+        ({"0x2348.01": 0}, "1 to 250"),
+        ({"0x6083.00": -1}, "allowed"),
+        ({"0x6080.00": 32767}, "limits.speed"),
+    ],
+)
+def test_an_import_out_of_range_is_refused(values: dict[str, int], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        import_objects(objects(values), AMBER, "my.xdc")
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"control.position.gain": 300.0}, r"control.position.gain = 300 1/s: object 0x2348.01.*1 to 250"),
+        ({"control.current.integral_time": 1e-4}, "150 to 2600"),
+        ({"control.velocity.integral_time": 1e-3}, "20 to 1000"),
+        ({"motor.inductance": 1e-7}, "motor.inductance = 0.1 uH"),
+    ],
+)
+def test_an_export_that_the_controller_cannot_hold_is_refused(values: dict[str, float], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        export_objects(with_values(AMBER, values))
+
+
+@pytest.mark.parametrize("name", ["emps", "ctms-motor-position"])
+def test_a_drive_of_another_kind_has_no_controller_settings(name: str) -> None:
+    with pytest.raises(InputError, match="current, velocity and position"):
+        export_objects(load_design(name))
+
+
+@st.composite
+def any_objects(draw: st.DrawFn) -> ControllerObjects:
+    known = [item for item in OBJECTS.values() if item.index != 0x6080]
+    picked = draw(st.lists(st.sampled_from(known), unique_by=lambda item: item.label))
+    values = {item.label: draw(st.integers(item.low, min(item.high, 10**6))) for item in picked}
+    values.pop("0x2329.04", None)
+    if values.get("0x2329.02", 1) > values.get("0x2329.03", 12000) or values.get("0x2329.02", 1) > 12000:
+        values["0x2329.02"] = values["0x2329.03"] = max(values["0x2329.02"], values.get("0x2329.03", 1))
+    elif "0x2329.03" in values:
+        values["0x2329.02"] = min(values["0x2329.03"], values.get("0x2329.02", 1))
+    strange = draw(st.dictionaries(st.integers(0x3000, 0x5FFF), st.integers(-(2**31), 2**32), max_size=3))
+    made = objects(values).values + tuple(
+        ControllerObject(index=i, subindex=1, value=v, name="a <b> & 'c'", data_type="0007")
+        for i, v in strange.items()
+    )
+    order = draw(st.permutations(made))
+    return ControllerObjects(velocity_gain_factor=draw(st.sampled_from([1.0, PER_RPM])), values=tuple(order))
+
+
+@settings(deadline=None, max_examples=100)
+@given(any_objects())
+def test_settings_survive_design_toml_and_xml(given_set: ControllerObjects) -> None:
+    factor = given_set.velocity_gain_factor
+    if given_set.values:
+        assert read_settings_toml(write_settings_toml(given_set), "t") == given_set
+        assert read_settings_xml(write_settings_xml(given_set), "x", factor) == given_set
+    design = import_objects(given_set, AMBER).design
+    stored = read_design_text(write_design(design), design.origin)
+    assert stored == design
+    if given_set.values:
+        assert export_objects(stored).objects == given_set
+
+
+def test_a_device_configuration_with_more_in_it_is_read(tmp_path: object) -> None:
+    text = """<?xml version="1.0" encoding="utf-8"?>
+    <!-- a device configuration -->
+    <ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.0">
+      <ISO15745Profile><ProfileHeader><ProfileName>x</ProfileName></ProfileHeader></ISO15745Profile>
+      <ISO15745Profile><ProfileBody><ApplicationLayers><CANopenObjectList mandatoryObjects="2">
+        <CANopenObject index="1000" name="Device Type" objectType="7" defaultValue="0x12"/>
+        <CANopenObject index="2348" name="Position Control" objectType="9" subNumber="2">
+          <CANopenSubObject subIndex="00" name="Number of entries" dataType="0005" actualValue="1"/>
+          <CANopenSubObject subIndex="01" name="Kv" dataType="0005" actualValue="0x32"/>
+        </CANopenObject>
+        <CANopenObject index="6083" name="Profile acceleration" dataType="0007" actualValue="250"/>
+      </CANopenObjectList></ApplicationLayers></ProfileBody></ISO15745Profile>
+    </ISO15745ProfileContainer>"""
+    found = {item.label: (item.value, item.name) for item in read_settings_xml(text, "x").values}
+    assert found == {
+        "0x2348.00": (1, "Number of entries"),
+        "0x2348.01": (50, "Kv"),
+        "0x6083.00": (250, "Profile acceleration"),
+    }
+
+
+BOMB = '<!DOCTYPE a [<!ENTITY b "bb"><!ENTITY c "&b;&b;">]><a>&c;</a>'
+OUTSIDE = '<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]><a>&b;</a>'
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (BOMB, "DTD"),
+        (OUTSIDE, "DTD"),
+        ("<a>", "not XML"),
+        ("<a/>", "no CANopenObject"),
+        ("<a>" * 50_000, "not XML"),
+        ("<a>" * 500 + "</a>" * 500, "nested too deeply"),
+        ("<CANopenObject index='xyz'/>", "hexadecimal"),
+        ("<CANopenObject index='2348' actualValue='1.5'/>", "whole number"),
+        ("<CANopenObject index='2348' actualValue='" + "9" * 30 + "'/>", "whole number"),
+        ("<?xml version='1.0' encoding='utf-7'?><a/>", "not XML"),
+    ],
+)
+def test_xml_that_is_no_plain_settings_file_is_refused(text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        read_settings_xml(text, "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[objects]\n", "missing"),
+        ("x = 1", "unknown key"),
+        ('[objects]\n"2348" = 1.5', "whole number"),
+        ('[objects]\n"2348" = true', "whole number"),
+        ('[objects]\n"23481" = 1', "allowed: an object"),
+        ('[objects]\n"2348.01" = { valu = 1 }', "value, name, data_type"),
+        ('velocity_gain_factor = 0\n[objects]\n"2348.01" = 1', "9.549"),
+        ('[objects]\n"0x2348.01" = 1\n"2348.01" = 2', "each object once"),
+        ('[objects]\n"0x3000.01" = 99999999999999999999', "64 bits"),
+    ],
+)
+def test_toml_that_is_no_settings_file_is_refused(text: str, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        read_settings_toml(text, "s")
+
+
+def test_a_settings_file_is_known_by_its_first_sign(tmp_path: object) -> None:
+    folder = __import__("pathlib").Path(str(tmp_path))
+    some = objects({"0x2348.01": 50})
+    (folder / "a.xdc").write_text(write_settings_xml(some))
+    (folder / "b.toml").write_text(write_settings_toml(some))
+    assert read_settings(folder / "a.xdc") == read_settings(folder / "b.toml") == some
+
+
+def test_the_calibration_is_named_by_its_unit() -> None:
+    assert calibration("rad/s") == 1.0
+    assert calibration("rpm") == pytest.approx(9.549, abs=5e-4)
+    with pytest.raises(InputError, match='"rad/s" or "rpm"'):
+        calibration("Hz")

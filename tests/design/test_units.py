@@ -1,0 +1,89 @@
+"""Written quantities: against the definitions of the units, and what must be refused."""
+
+from math import pi
+
+import pytest
+
+from actuator_lti.design.units import parse_quantity, scaled
+from actuator_lti.errors import InputError
+
+WRITTEN = [
+    ("6 uH", "H", 6e-6),
+    ("6 µH", "H", 6e-6),
+    ("9.2 g*cm^2", "kg*m^2", 9.2e-7),
+    ("9.2 gcm²", "kg*m^2", 9.2e-7),
+    ("9.2gcm2", "kg*m^2", 9.2e-7),
+    ("3 kg m2", "kg*m^2", 3.0),
+    ("9000 rpm", "rad/s", 300 * pi),
+    ("150 Hz", "rad/s", 300 * pi),
+    ("5.9 mN*m/A", "N*m/A", 5.9e-3),
+    ("5.9 mNm/A", "N*m/A", 5.9e-3),
+    ("5.9 mV*s/rad", "V*s/rad", 5.9e-3),
+    ("5.9 mN*m/A", "V*s/rad", 5.9e-3),
+    ("1 V/krpm", "V*s/rad", 0.03 / pi),
+    ("30000 rev/s^2", "rad/s^2", 60000 * pi),
+    ("30000 rev/s2", "rad/s^2", 60000 * pi),
+    ("35.15 N/V", "N/V", 35.15),
+    ("50 %", "1", 0.5),
+    ("12 V", "V", 12.0),
+    ("0.12 A*s/rad", "A*s/rad", 0.12),
+    ("0.12 A s", "A*s/rad", 0.12),
+    ("20 mohm", "ohm", 0.02),
+    ("20 mΩ", "V/A", 0.02),
+    ("1.34e-3 N*m/(N*m)", "1", 1.34e-3),
+    ("1.34 mN*m/(N*m)", "N*m/(N*m)", 1.34e-3),
+    ("100 us", "s", 1e-4),
+    ("120 s^-1", "1/s", 120.0),
+    ("10 °", "rad", pi / 18),
+    ("-3.1648 N", "N", -3.1648),
+    ("1 ozf*in", "N*m", 0.00706155181422604),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "value"), WRITTEN)
+def test_a_data_sheet_quantity_is_its_si_value(text: str, unit: str, value: float) -> None:
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize("text", ["100 us", "9.2 g*cm^2", "5.9 mN*m/A", "6 uH", "20 mohm"])
+def test_a_decimal_prefix_costs_no_digit(text: str) -> None:
+    unit = {"us": "s", "g*cm^2": "kg*m^2", "mN*m/A": "N*m/A", "uH": "H", "mohm": "ohm"}[text.split()[1]]
+    exact = {"100 us": 1e-4, "9.2 g*cm^2": 9.2e-7, "5.9 mN*m/A": 5.9e-3, "6 uH": 6e-6, "20 mohm": 0.02}
+    assert parse_quantity(text, unit) == exact[text]
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "says"),
+    [
+        ("120 rad/s", "1/s", "wrong dimension"),
+        ("120 Hz", "1/s", "wrong dimension"),
+        ("942 1/s", "rad/s", "wrong dimension"),
+        ("3 kg", "kg*m^2", "wrong dimension"),
+        ("5.9 mN*m/A", "V*s/m", "wrong dimension"),
+        ("55", "ohm", "no unit"),
+        (55, "ohm", "no unit"),
+        ("3 rpn", "rad/s", 'nearest known: "rpm"'),
+        ("3 mfoo", "m", "unknown unit"),
+        ("nan V", "V", "a number"),
+        ("1e999 V", "V", "finite"),
+        (float("nan"), "1", "finite"),
+        (10**400, "1", "allowed"),
+        ("", "V", "a number"),
+        ("V", "V", "a number"),
+        ("3 V //", "V", "not a unit"),
+        ("3 ((V", "V", "not a unit"),
+        ("3 V^99", "V", "not a unit"),
+        ("3 V^2^2", "V", "not a unit"),
+        ("3 __import__('os')", "V", "not a unit"),
+        ("3 " + "V*" * 100 + "V", "V", "a number"),
+    ],
+)
+def test_what_is_no_quantity_is_refused_with_the_unit_wanted(text: object, unit: str, says: str) -> None:
+    with pytest.raises(InputError, match="allowed: ") as caught:
+        parse_quantity(text, unit)  # type: ignore[arg-type]
+    assert says in str(caught.value)
+
+
+def test_scaling_by_a_large_factor_is_a_product() -> None:
+    assert scaled(2.5, 1000.0) == 2500.0
+    assert scaled(2.0, 0.3) == 0.6
