@@ -5,6 +5,6 @@ Light to import; python-control is loaded when loops are assembled.
 
 from actuator_lti.loops.assemble import assemble_loops
 from actuator_lti.loops.periodic import ExactMargins, exact_margins
-from actuator_lti.loops.result import Form, Loop, Loops
+from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
-__all__ = ["ExactMargins", "Form", "Loop", "Loops", "assemble_loops", "exact_margins"]
+__all__ = ["ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "assemble_loops", "exact_margins"]

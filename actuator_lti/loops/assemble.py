@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from actuator_lti.errors import InputError
 from actuator_lti.loops.cascade import Cascade, cascade
-from actuator_lti.loops.result import Form, Loop, Loops
+from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -21,6 +21,7 @@ def assemble_loops(
     speed_amplitude_rad_s: float | None = None,
     direction: int = 1,
     rotor: RotorState = "free",
+    inner_loops: InnerLoops = "closed",
 ) -> Loops:
     """All loops of a design as named python-control systems (model.md section 3).
 
@@ -42,6 +43,11 @@ def assemble_loops(
     rotor : {"free", "locked"}
         Locked: only the current loop, without back-EMF, so that its closed loop starts at 0 dB.
 
+    inner_loops : {"closed", "open"}
+        Open: `Loops.velocity` and `Loops.position` with the feedback of the loops inside them taken away, the
+        inner controllers still in the path. Break points, limiters and the response to the command are those
+        of the closed drive in any case.
+
     Returns
     -------
     Loops
@@ -60,13 +66,13 @@ def assemble_loops(
     if form not in get_args(Form):
         raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
     wired = cascade(design, operating_point, load_Nm, speed_amplitude_rad_s, direction, rotor)
+    if inner_loops not in get_args(InnerLoops):
+        raise InputError(f"inner_loops = {inner_loops!r}: one of {', '.join(get_args(InnerLoops))}")
     if not wired.stages:
         raise InputError("rotor = 'locked': the design has no current loop")
-    parts = (
-        _sampled(wired)
-        if form == "sampled"
-        else _continuous(wired, "all" if form == "continuous" else "none")
-    )
+    opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
+    delays = "all" if form == "continuous" else "none"
+    parts = _sampled(wired, opened) if form == "sampled" else _continuous(wired, opened, delays)
     stages: dict[str, Loop] = parts.pop("stages")
     return Loops(
         design=design,
@@ -76,6 +82,7 @@ def assemble_loops(
         speed_amplitude_rad_s=speed_amplitude_rad_s,
         direction=direction,
         rotor=rotor,
+        inner_loops=inner_loops,
         current=stages.get("current"),
         velocity=stages.get("velocity"),
         position=stages.get("position"),
@@ -84,13 +91,13 @@ def assemble_loops(
     )
 
 
-def _sampled(wired: Cascade) -> dict[str, Any]:
+def _sampled(wired: Cascade, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]:
     from actuator_lti.loops import sampled
     from actuator_lti.loops.limiter_responses import sampled_limiters
 
     whole = "position" in wired.stages
     return {
-        "stages": {stage: sampled.stage_loop(wired, stage) for stage in wired.stages},
+        "stages": {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages},
         "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
         "limiters": sampled_limiters(wired) if whole else {},
         "reference_to_output": sampled.reference_to_output(wired) if whole else None,
@@ -98,13 +105,15 @@ def _sampled(wired: Cascade) -> dict[str, Any]:
     }
 
 
-def _continuous(wired: Cascade, delays: str) -> dict[str, Any]:
+def _continuous(wired: Cascade, opened: dict[str, tuple[str, ...]], delays: str) -> dict[str, Any]:
     from actuator_lti.loops import continuous
     from actuator_lti.loops.limiter_responses import continuous_limiters
 
     whole = "position" in wired.stages
     return {
-        "stages": {stage: continuous.stage_loop(wired, stage, delays) for stage in wired.stages},
+        "stages": {
+            stage: continuous.stage_loop(wired, stage, delays, opened[stage]) for stage in wired.stages
+        },
         "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
         "limiters": continuous_limiters(wired, delays) if whole else {},
         "reference_to_output": continuous.reference_to_output(wired, delays) if whole else None,

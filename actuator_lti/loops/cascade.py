@@ -75,6 +75,10 @@ class Cascade:
             *(("output",) if "position" in self.stages else ()),
         )
 
+    def inside(self, stage: str) -> tuple[str, ...]:
+        """The stages inside a stage."""
+        return self.stages[: self.stages.index(stage)]
+
     def unit(self, signal: str) -> str:
         """Unit of a signal (motor side, except ``"output"``), for a rotary or a linear axis."""
         angle, speed = ("rad", "rad/s") if self.design.axis == "rotary" else ("m", "m/s")

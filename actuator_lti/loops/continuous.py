@@ -53,9 +53,9 @@ def _loop(wired: Cascade, loop: DelaySystem, name: str, point: str, signals: tup
     )
 
 
-def stage_loop(wired: Cascade, stage: str, delays: str) -> Loop:
-    """The loop of a stage broken at its own error, inner loops closed, outer ones absent."""
-    flow = FlowProgram(wired, stage, ERRORS[stage], delays).flow()
+def stage_loop(wired: Cascade, stage: str, delays: str, opened: tuple[str, ...] = ()) -> Loop:
+    """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent."""
+    flow = FlowProgram(wired, stage, ERRORS[stage], delays, opened).flow()
     loop = delay_system(flow, "cut", MEASURED[stage])
     return _loop(wired, loop, stage, wired.target[stage], (ERRORS[stage], MEASURED[stage]))
 

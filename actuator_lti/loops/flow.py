@@ -47,18 +47,26 @@ class FlowProgram:
     delays : {"all", "none", "no computing", "no computing, no measurement"}
         Which delays are kept: all of them; none (form ``ideal``); all but the computing delay; the holds only
         (for the delay budget).
+    opened : tuple of str
+        Stages whose feedback is taken away; their controllers stay in the path.
     """
 
     cascade: Cascade
     outer: str
     cut: str | None = None
     delays: str = "all"
+    opened: tuple[str, ...] = ()
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
         """Stages that run, innermost first."""
         names = self.cascade.stages
         return names[: names.index(self.outer) + 1]
+
+    @property
+    def measures_speed(self) -> bool:
+        """Whether the velocity feedback is there."""
+        return "velocity" in self.stages and "velocity" not in self.opened
 
     @cached_property
     def delay_table(self) -> dict[str, float]:
@@ -73,11 +81,7 @@ class FlowProgram:
         table["u"] = table.get("u", 0.0) + cascade.tick_s / 2
         if self.delays == "all":
             table["u"] += control.computing_delay_s
-        if (
-            "velocity" in self.stages
-            and encoder.speed == "difference"
-            and "no measurement" not in self.delays
-        ):
+        if self.measures_speed and encoder.speed == "difference" and "no measurement" not in self.delays:
             table["speed"] = encoder.difference_samples * cascade.period_s("velocity") / 2
         return {name: delay for name, delay in table.items() if delay > 0}
 
@@ -88,7 +92,7 @@ class FlowProgram:
         needs_angle = self.outer == "position" or cascade.plant.stiffness_Nm_rad != 0.0
         names = [s for s in cascade.plant.states if s != "th" or needs_angle]
         names += [f"I_{stage}" for stage in self.stages if cascade.pi(stage).integral_time_s is not None]
-        if "velocity" in self.stages and encoder.filter_time_s > 0:
+        if self.measures_speed and encoder.filter_time_s > 0:
             names.append("filter")
         return tuple(names)
 
@@ -150,9 +154,11 @@ class _Run:
         if "position" in self.program.stages:
             reference = self.publish("position", self.position())
         if "velocity" in self.program.stages:
-            reference = self.publish("velocity", self.pi("velocity", reference - self.measured_speed()))
+            error = reference - self.measured_speed() if self.program.measures_speed else reference
+            reference = self.publish("velocity", self.pi("velocity", error))
         if "current" in self.program.stages:
-            reference = self.publish("current", self.pi("current", reference - self.row["i"]))
+            error = reference if "current" in self.program.opened else reference - self.row["i"]
+            reference = self.publish("current", self.pi("current", error))
         return reference
 
     def finish(self) -> Flow:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block, siso
@@ -96,6 +95,8 @@ def _radius(blocks: Sequence[Block], gain: float) -> float:
 
 def _first_border(excess: Callable[[float], float], grid: Sequence[float], none: float) -> float:
     """First root of ``excess`` (negative at grid[0]) along a grid."""
+    from scipy.optimize import brentq
+
     last = grid[0]
     for value in grid[1:]:
         if excess(value) >= 0:

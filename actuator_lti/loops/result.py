@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 Form = Literal["sampled", "continuous", "ideal"]
+InnerLoops = Literal["closed", "open"]
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -58,7 +59,8 @@ class Loops:
     Attributes
     ----------
     current, velocity, position : Loop or None
-        Each broken at its own error, with the loops inside it closed and those outside it open; motor side;
+        Each broken at its own error, with the loops inside it closed (or open, see `inner_loops`) and those
+        outside it open; motor side;
         ``None`` where the design has no such loop.
     break_points : mapping of str to Loop
         ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``, as far as they exist: the loop seen there, all other
@@ -82,6 +84,7 @@ class Loops:
     speed_amplitude_rad_s: float | None
     direction: int
     rotor: RotorState
+    inner_loops: InnerLoops
     current: Loop | None
     velocity: Loop | None
     position: Loop | None

@@ -44,9 +44,9 @@ def _loop(
     )
 
 
-def stage_loop(wired: Cascade, stage: str) -> Loop:
-    """The loop of a stage broken at its own error, inner loops closed, outer ones absent."""
-    program = TickProgram(wired, stage, cut=ERRORS[stage])
+def stage_loop(wired: Cascade, stage: str, opened: tuple[str, ...] = ()) -> Loop:
+    """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent."""
+    program = TickProgram(wired, stage, ERRORS[stage], opened)
     ticks = [program.tick(k) for k in range(program.ticks)]
     block = siso(program, ticks, "cut", MEASURED[stage]).pruned()
     return _loop(wired, block, stage, wired.target[stage], (ERRORS[stage], MEASURED[stage]), periodic=False)

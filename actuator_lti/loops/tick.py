@@ -43,11 +43,14 @@ class TickProgram:
         A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``)
         that is replaced by the input ``cut`` where it is updated; what arrives is the signal of that
         name.
+    opened : tuple of str
+        Stages whose feedback is taken away; their controllers stay in the path.
     """
 
     cascade: Cascade
     outer: str
     cut: str | None = None
+    opened: tuple[str, ...] = ()
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -85,7 +88,7 @@ class TickProgram:
         names += [f"u{j}" for j in range(1, self.hold.memory + 1)]
         names += [f"I_{stage}" for stage in self.stages if cascade.pi(stage).integral_time_s is not None]
         names += [f"hold_{cascade.target[stage]}" for stage in self.stages if cascade.interval[stage] > 1]
-        if "velocity" in self.stages:
+        if "velocity" in self.stages and "velocity" not in self.opened:
             if encoder.speed == "difference":
                 names += ["acc", *(f"D{j}" for j in range(1, encoder.difference_samples))]
             names += ["filter"] if encoder.filter_time_s > 0 else []
@@ -166,6 +169,8 @@ class _Run:
     def velocity(self, reference: np.ndarray) -> np.ndarray | None:
         if self.k % self.cascade.interval["velocity"]:
             return None
+        if "velocity" in self.program.opened:
+            return self.pi("velocity", reference)
         self.signals["w_meas"] = self.measured_speed()
         return self.pi("velocity", reference - self.signals["w_meas"])
 
@@ -176,7 +181,8 @@ class _Run:
         if "velocity" in stages:
             reference = self.publish("velocity", self.velocity(reference))
         if "current" in stages:
-            reference = self.publish("current", self.pi("current", reference - self.row["i"]))
+            error = reference if "current" in self.program.opened else reference - self.row["i"]
+            reference = self.publish("current", self.pi("current", error))
         return reference
 
     def propagate(self, u: np.ndarray) -> None:

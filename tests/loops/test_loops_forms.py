@@ -169,6 +169,26 @@ def test_feedforward_of_a_position_loop_on_a_force_source() -> None:
     np.testing.assert_allclose(response(loops.reference_to_output, omega), expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_inner_loops_opened(form: Any) -> None:
+    """Closing the opened inner loop by hand gives the closed assembly; at u all three add up."""
+    design = amber(encoder=Encoder(speed="difference", difference_samples=2))
+    opened, closed = assemble_loops(design, form, inner_loops="open"), assemble_loops(design, form)
+    omega = np.geomspace(1, 2e4, 20)
+    assert opened.current is not None
+    assert opened.velocity is not None
+    assert closed.velocity is not None
+    inner = response(opened.current.open_loop, omega)
+    by_hand = response(opened.velocity.open_loop, omega) / (1 + inner)
+    np.testing.assert_allclose(by_hand, response(closed.velocity.open_loop, omega), rtol=1e-7)
+    assert opened.position is not None
+    at_u = response(closed.break_points["u"].open_loop, omega)
+    whole = inner + response(opened.velocity.open_loop, omega) + response(opened.position.open_loop, omega)
+    np.testing.assert_allclose(at_u, whole, rtol=1e-7)
+    with pytest.raises(InputError, match="inner_loops"):
+        assemble_loops(design, inner_loops="half")  # type: ignore[arg-type]
+
+
 def test_every_break_point_of_a_series_cascade() -> None:
     loops = assemble_loops(amber())
     assert list(loops.break_points) == ["u", "i_ref", "w_ref", "output"]
