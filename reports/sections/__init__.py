@@ -1,1 +1,1 @@
-"""Under construction."""
+"""Sections of a report: each turns results into plain data, and draws nothing."""

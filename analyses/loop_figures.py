@@ -1,0 +1,105 @@
+"""Everything that is said of a loop in one place: margins, bandwidth, peaks, step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.bandwidth import Bandwidth, Peaks
+    from actuator_lti.loops import Loop, Loops
+    from actuator_lti.margins import StabilityMargins
+    from actuator_lti.step import StepFigures
+
+Figure = TypeVar("Figure")
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """The figures of one loop.
+
+    Attributes
+    ----------
+    loop : Loop
+        The loop itself.
+    response : python-control system
+        What bandwidth and step are taken of: the closed loop; for the position loop the command to the
+        output, feed-forward included.
+    margins : StabilityMargins
+        Of the open loop.
+    bandwidth, peaks, step : Bandwidth, Peaks, StepFigures or None
+        ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why).
+    notes : tuple of str
+        Why a figure of a stable loop is missing.
+    """
+
+    loop: Loop
+    response: Any
+    margins: StabilityMargins
+    bandwidth: Bandwidth | None
+    peaks: Peaks | None
+    step: StepFigures | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def stable(self) -> bool:
+        """Whether the closed loop is known to be stable."""
+        return self.margins.stable is True
+
+
+def loop_figures(
+    loop: Loop, response: Any = None, *, bandwidth: bool = True, step: bool = True
+) -> LoopFigures:
+    """Compute all figures of a loop.
+
+    Parameters
+    ----------
+    loop : Loop
+    response : python-control system, optional
+        Taken instead of the closed loop for bandwidth and step.
+    bandwidth, step : bool
+        Whether these are wanted; the step of a continuous loop with delays takes its time.
+
+    Raises
+    ------
+    NumericalError
+        If a figure cannot be found to its stated accuracy.
+    """
+    from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
+    from actuator_lti.margins import stability_margins
+    from actuator_lti.step import step_figures
+
+    response = loop.closed_loop if response is None else response
+    margins = stability_margins(loop.open_loop)
+    if margins.stable is not True:
+        return LoopFigures(loop, response, margins, None, None, None)
+    notes: list[str] = []
+    return LoopFigures(
+        loop=loop,
+        response=response,
+        margins=margins,
+        bandwidth=_if_there_is(lambda: closed_loop_bandwidth(response), notes) if bandwidth else None,
+        peaks=peaks(loop.open_loop),
+        step=_if_there_is(lambda: step_figures(response), notes) if step else None,
+        notes=tuple(dict.fromkeys(notes)),
+    )
+
+
+def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
+    """Give a figure; where the response has none (no gain at DC, say), note the reason instead."""
+    try:
+        return call()
+    except InputError as error:
+        notes.append(str(error))
+        return None
+
+
+def all_loop_figures(loops: Loops, *, step: bool = True) -> Mapping[str, LoopFigures]:
+    """Compute the figures of every loop that the design has, innermost first, by name."""
+    return {
+        name: loop_figures(loop, loops.reference_to_output if name == "position" else None, step=step)
+        for name, loop in loops.present.items()
+    }

@@ -1,0 +1,199 @@
+"""All that is said of a design's linear loops: forms, break points, operating points, delays, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
+
+if TYPE_CHECKING:
+    from actuator_lti.delay_budget import DelayBudget
+    from actuator_lti.limiters import Onset
+    from actuator_lti.loops import ExactMargins, Loops
+
+Progress = Callable[[int, int], None]
+FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
+DESCRIBED_FRACTIONS = (0.01, 0.1)
+
+
+@dataclass(frozen=True)
+class BreakPoint:
+    """A loop seen at one point with all others closed; ``exact`` where it is periodically time-varying."""
+
+    figures: LoopFigures
+    exact: ExactMargins | None
+
+
+@dataclass(frozen=True)
+class OperatingPointFigures:
+    """The loops at one slope of the friction.
+
+    Attributes
+    ----------
+    label : str
+    load_Nm : float or None
+        ``None`` where it makes no difference.
+    slope_Nms_rad : float
+        Slope of the friction torque over the motor speed.
+    figures : mapping of str to LoopFigures
+    """
+
+    label: str
+    load_Nm: float | None
+    slope_Nms_rad: float
+    figures: Mapping[str, LoopFigures]
+
+
+@dataclass(frozen=True)
+class LoopSurvey:
+    """The loops of a design from every side.
+
+    Attributes
+    ----------
+    loops : Loops
+        Sampled, sliding, no load.
+    forms : mapping of str to mapping of str to LoopFigures
+        By form, then by loop; step figures of the sampled form only.
+    locked : LoopFigures or None
+        The current loop with the rotor locked.
+    break_points : mapping of str to BreakPoint
+    operating_points : tuple of OperatingPointFigures
+    budgets : mapping of str to DelayBudget
+        At the lowest gain crossover of each loop that has one.
+    onset : Onset or None
+        The border of linear validity; ``None`` where nothing limits.
+    """
+
+    design: Design
+    loops: Loops
+    forms: Mapping[str, Mapping[str, LoopFigures]]
+    locked: LoopFigures | None
+    break_points: Mapping[str, BreakPoint]
+    operating_points: tuple[OperatingPointFigures, ...]
+    budgets: Mapping[str, DelayBudget]
+    onset: Onset | None
+
+    @property
+    def figures(self) -> Mapping[str, LoopFigures]:
+        """The sampled, sliding loops: those that requirements are judged by."""
+        return self.forms["sampled"]
+
+
+def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:
+    """Assemble and measure the loops of a design in every form and at every operating point.
+
+    Parameters
+    ----------
+    design : Design
+    progress : callable, optional
+        Called with (steps done, steps in all).
+
+    Raises
+    ------
+    InputError, NumericalError
+        As `assemble_loops` and `loop_figures`.
+    """
+    from actuator_lti.loops import assemble_loops
+
+    def step(done: int) -> None:
+        if progress is not None:
+            progress(done, 6)
+
+    loops = assemble_loops(design)
+    forms = {"sampled": all_loop_figures(loops)}
+    for form in FORMS[1:]:
+        forms[form] = all_loop_figures(assemble_loops(design, form=form), step=False)
+    step(1)
+    locked = None
+    if loops.current is not None:
+        fixed = assemble_loops(design, rotor="locked").current
+        locked = None if fixed is None else loop_figures(fixed)
+    step(2)
+    break_points = {name: _break_point(loops, name) for name in loops.break_points}
+    step(3)
+    points = _operating_points(design)
+    step(4)
+    budgets = _budgets(design, forms["sampled"])
+    step(5)
+    border = _onset(loops, forms["sampled"])
+    step(6)
+    return LoopSurvey(design, loops, forms, locked, break_points, points, budgets, border)
+
+
+def _break_point(loops: Loops, name: str) -> BreakPoint:
+    """Measure the loop at one break point."""
+    from actuator_lti.loops import exact_margins
+
+    loop = loops.break_points[name]
+    return BreakPoint(
+        loop_figures(loop, bandwidth=False, step=False), exact_margins(loops, name) if loop.periodic else None
+    )
+
+
+def _operating_points(design: Design) -> tuple[OperatingPointFigures, ...]:
+    """Measure the loops sliding, at rest, and described at small speeds, at each load."""
+    from actuator_lti.loops import assemble_loops
+    from actuator_lti.plant import friction_slope
+
+    def point(label: str, load: float | None, kind: str, speed: float | None = None) -> OperatingPointFigures:
+        moment = load or 0.0
+        slope = friction_slope(design, kind, moment, speed, 1)  # type: ignore[arg-type]
+        found = assemble_loops(
+            design,
+            operating_point=kind,
+            load_Nm=moment,
+            speed_amplitude_rad_s=speed,  # type: ignore[arg-type]
+        )
+        return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False))
+
+    points = [point("sliding", None, "sliding")]
+    for load in dict.fromkeys(design.validation.loads_Nm):
+        points.append(point("at rest", load, "rest"))
+        for speed in _described_speeds(design):
+            unit = "rad/s" if design.axis == "rotary" else "m/s"
+            label = f"speed amplitude {speed:.3g} {unit}"
+            points.append(point(label, load, "describing-function", speed))
+    return tuple(points)
+
+
+def _described_speeds(design: Design) -> tuple[float, ...]:
+    """Give the speed amplitudes for the describing function: small fractions of the top speed."""
+    from analyses.drive_figures import drive_figures
+
+    top = drive_figures(design).output_rate_rad_s * design.total_ratio
+    if not np.isfinite(top) or top <= 0.0:
+        return ()
+    return tuple(fraction * top for fraction in DESCRIBED_FRACTIONS)
+
+
+def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
+    """Give the delay budget at the lowest gain crossover of each loop."""
+    from actuator_lti.delay_budget import delay_budget
+
+    budgets = {}
+    for name, found in figures.items():
+        crossovers = [m.frequency_rad_s for m in found.margins.phase_margins if m.frequency_rad_s > 0.0]
+        if crossovers:
+            quoted = found.margins.phase_margin
+            at = quoted.frequency_rad_s if quoted and quoted.frequency_rad_s > 0 else min(crossovers)
+            budgets[name] = delay_budget(design, name, at)
+    return budgets
+
+
+def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
+    """Give the border of linear validity around the bandwidth of the position loop."""
+    from actuator_lti.limiters import onset
+
+    if not loops.limiters or "position" not in figures:
+        return None
+    found = figures["position"]
+    crossover = min((m.frequency_rad_s for m in found.margins.phase_margins), default=100.0)
+    nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
+    high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
+    border = onset(loops, np.geomspace(crossover / 100.0, high, 160))
+    return border if np.isfinite(border.amplitude_rad).any() else None

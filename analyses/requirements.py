@@ -1,0 +1,187 @@
+"""Requirements of a design file against what was found: verdict, and distance to the limit in its unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.errors import InputError
+from analyses.drive_figures import DriveFigures, drive_figures
+from analyses.loop_figures import LoopFigures, all_loop_figures
+
+LOOPS = ("current", "velocity", "position")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequirementVerdict:
+    """One requirement at one place.
+
+    Attributes
+    ----------
+    id : str
+        Of the requirement, with ``/loop`` where it holds for every loop.
+    requirement : Requirement
+    loop : str or None
+        The loop that was judged; ``None`` for the whole drive.
+    value : float or None
+        What was found, in ``requirement.unit``; ``inf`` where there is no such bound.
+    distance : float or None
+        To the limit in ``requirement.unit``, positive on the good side.
+    passed : bool or None
+        ``None`` where it cannot be judged; ``reason`` says why.
+    reason : str
+        What has to be known to read it.
+    """
+
+    id: str
+    requirement: Requirement
+    loop: str | None
+    value: float | None
+    distance: float | None
+    passed: bool | None
+    reason: str = ""
+
+
+def evaluate_requirements(
+    design: Design, figures: Mapping[str, LoopFigures] | None = None
+) -> tuple[RequirementVerdict, ...]:
+    """Judge every requirement of a design.
+
+    Parameters
+    ----------
+    design : Design
+    figures : mapping of str to LoopFigures, optional
+        Of the sampled, sliding loops; computed where left out.
+
+    Raises
+    ------
+    InputError
+        If a requirement names a quantity or a loop that is not known.
+    """
+    if figures is None:
+        from actuator_lti.loops import assemble_loops
+
+        figures = all_loop_figures(assemble_loops(design))
+    return tuple(
+        verdict for requirement in design.requirements for verdict in _judge(design, requirement, figures)
+    )
+
+
+def all_pass(verdicts: tuple[RequirementVerdict, ...]) -> bool:
+    """Whether no requirement failed; one that could not be judged does not fail."""
+    return not any(verdict.passed is False for verdict in verdicts)
+
+
+def _judge(
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures]
+) -> list[RequirementVerdict]:
+    """Judge one requirement wherever it holds."""
+    if requirement.quantity in DRIVE_QUANTITIES:
+        found = drive_figures(design, requirement.load_Nm or 0.0)
+        value = DRIVE_QUANTITIES[requirement.quantity](found, design)
+        reason = "" if value is not None else "the design has no such figure"
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    if requirement.quantity not in LOOP_QUANTITIES:
+        known = ", ".join([*LOOP_QUANTITIES, *DRIVE_QUANTITIES])
+        raise InputError(
+            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are {known}",
+            where=design.origin or None,
+        )
+    if requirement.loop in (None, "every"):
+        names = [(f"{requirement.id}/{name}", name) for name in figures]
+    else:
+        names = [(requirement.id, str(requirement.loop))]
+    return [_judge_loop(design, requirement, id, name, figures) for id, name in names]
+
+
+def _judge_loop(
+    design: Design, requirement: Requirement, id: str, name: str, figures: Mapping[str, LoopFigures]
+) -> RequirementVerdict:
+    """Judge one requirement on one loop; an unstable loop meets none."""
+    if name not in LOOPS:
+        raise InputError(
+            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
+            where=design.origin or None,
+        )
+    if name not in figures:
+        return _verdict(requirement, id, name, None, f"the design has no {name} loop")
+    found = figures[name]
+    if found.margins.stable is None:
+        return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
+    if not found.stable:
+        reason = f"the {name} loop is {found.margins.verdict}"
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
+        )
+    value = LOOP_QUANTITIES[requirement.quantity](found)
+    reason = "" if value is not None else "not found in the band of this loop"
+    return _verdict(requirement, id, name, value, reason)
+
+
+def _verdict(
+    requirement: Requirement, id: str, loop: str | None, value: float | None, reason: str
+) -> RequirementVerdict:
+    """Compare a value with the limits."""
+    if value is None or math.isnan(value):
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=loop, value=None, distance=None, passed=None, reason=reason
+        )
+    room = distance(requirement, value)
+    if math.isinf(value):
+        reason = "no crossing: not limited" if value > 0 else reason
+    return RequirementVerdict(
+        id=id,
+        requirement=requirement,
+        loop=loop,
+        value=value,
+        distance=room,
+        passed=room >= 0.0,
+        reason=reason,
+    )
+
+
+def distance(requirement: Requirement, value: float) -> float:
+    """Give the distance of a value to the nearer limit, in its unit, positive on the good side.
+
+    Examples
+    --------
+    >>> distance(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0), 9.4)
+    3.4000000000000004
+    """
+    below = math.inf if requirement.minimum is None else value - requirement.minimum
+    above = math.inf if requirement.maximum is None else requirement.maximum - value
+    return min(below, above)
+
+
+def _magnitude(value: float | None) -> float | None:
+    """A margin counts in either direction: gain down as gain up, lead as lag."""
+    return None if value is None else abs(value)
+
+
+LOOP_QUANTITIES: dict[str, Callable[[LoopFigures], float | None]] = {
+    "gain_margin": lambda found: _magnitude(found.margins.gain_margin_db),
+    "phase_margin": lambda found: _magnitude(found.margins.phase_margin_deg),
+    "delay_margin": lambda found: found.margins.delay_margin_s,
+    "modulus_margin": lambda found: found.margins.modulus_margin,
+    "sensitivity_peak": lambda found: found.margins.sensitivity_peak_db,
+    "bandwidth": lambda found: found.bandwidth and found.bandwidth.minus3db_hz,
+    "bandwidth_90deg": lambda found: found.bandwidth and found.bandwidth.minus90deg_hz,
+    "resonance_peak": lambda found: found.bandwidth and found.bandwidth.resonance_peak_db,
+    "overshoot": lambda found: found.step and found.step.overshoot_percent,
+    "rise_time": lambda found: found.step and found.step.rise_time_s,
+    "settling_time": lambda found: found.step and found.step.settling_time_s,
+}
+
+
+def _at_output(value: float, design: Design) -> float:
+    """Give an output-side figure in degrees (linear axis: metres)."""
+    return value if design.axis == "linear" else math.degrees(value)
+
+
+DRIVE_QUANTITIES: dict[str, Callable[[DriveFigures, Design], float | None]] = {
+    "output_rate": lambda found, design: _at_output(found.output_rate_rad_s, design),
+    "motor_current": lambda found, design: found.motor_current_A,
+    "acceleration": lambda found, design: _at_output(found.acceleration_rad_s2, design),
+}

@@ -1,0 +1,127 @@
+"""Frequency responses on a grid that suits the loop, for tables and figures; no margin is read from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from analyses.loop_figures import LoopFigures
+
+DECADES_BELOW = 1.6
+DECADES_ABOVE = 1.3
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A frequency response.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (K,)
+    values : ndarray of complex, shape (K,)
+    phase_deg : ndarray, shape (K,)
+        Unwrapped per factor, so that it does not depend on the grid.
+    """
+
+    omega_rad_s: np.ndarray
+    values: np.ndarray
+    phase_deg: np.ndarray
+
+    @property
+    def frequency_hz(self) -> np.ndarray:
+        """The grid in Hz."""
+        return self.omega_rad_s / (2.0 * np.pi)
+
+    @property
+    def magnitude_db(self) -> np.ndarray:
+        """Magnitude in dB; -inf where the response is zero."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20.0 * np.log10(np.abs(self.values)))
+
+
+def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
+    """Evaluate a system over frequency.
+
+    Parameters
+    ----------
+    system : python-control system or DelaySystem
+    omega_rad_s : ndarray, shape (K,)
+        Positive; at most Nyquist for a sampled system.
+    """
+    from actuator_lti.phase import unwrapped_phase_deg
+
+    values = response_at(system, omega_rad_s)
+    return Curve(omega_rad_s, values, np.asarray(unwrapped_phase_deg(system, omega_rad_s)))
+
+
+def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
+    """Evaluate a system on the border of stability: at s = jw, or z = exp(jwT) where it is sampled."""
+    omega = np.asarray(omega_rad_s, dtype=float)
+    points = np.exp(1j * omega * system.dt) if system.dt else 1j * omega
+    return np.atleast_1d(np.asarray(system(points), dtype=complex))
+
+
+def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
+    """Give a logarithmic grid around the crossovers of a loop, up to Nyquist where it is sampled.
+
+    The crossovers themselves are points of it.
+    """
+    margins = figures.margins
+    marks = [m.frequency_rad_s for m in (*margins.gain_margins, *margins.phase_margins)]
+    marks = [mark for mark in marks if math.isfinite(mark) and mark > 0.0]
+    nyquist = math.pi / margins.period_s if margins.period_s else None
+    crossings = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0] or marks
+    centre = min(crossings, default=(nyquist or 1e3) / 30.0)
+    low = min([centre, *marks[:3]]) / 10**DECADES_BELOW
+    high = nyquist or max(centre, *marks[:3], centre) * 10**DECADES_ABOVE
+    grid = np.geomspace(low, high, points)
+    inside = [mark for mark in marks if low < mark < high]
+    grid = np.unique(np.concatenate([grid, np.array(inside, dtype=float)]))
+    if nyquist is not None:
+        grid[-1] = nyquist * (1.0 - 1e-12)
+    return grid
+
+
+def nyquist_curve(system: Any, omega_rad_s: np.ndarray, reach: float, passes: int = 7) -> np.ndarray:
+    """Sample L(jw) closely enough for a figure of that reach around -1; NaN where it leaves the frame.
+
+    Parameters
+    ----------
+    reach : float
+        Half width of the frame around -1.
+    passes : int
+        How often intervals that are too long on paper are halved.
+
+    Returns
+    -------
+    ndarray of complex, shape (K,)
+    """
+    omega, values = omega_rad_s, response_at(system, omega_rad_s)
+    for _ in range(passes):
+        near = np.abs(values + 1.0) < 2.5 * reach
+        long = (np.abs(np.diff(values)) > 0.04 * reach) & (near[1:] | near[:-1])
+        if not long.any() or len(omega) > 3000:
+            break
+        middle = np.sqrt(omega[1:] * omega[:-1])[long]
+        order = np.argsort(np.concatenate([omega, middle]))
+        values = np.concatenate([values, response_at(system, middle)])[order]
+        omega = np.concatenate([omega, middle])[order]
+    return _framed(values, reach)
+
+
+def _framed(values: np.ndarray, reach: float) -> np.ndarray:
+    """Replace what lies outside the frame by NaN, and drop points too near to be told apart."""
+    shown = np.where(np.abs(values + 1.0) < 2.5 * reach, values, np.nan + 0j)
+    kept: list[complex] = []
+    for value in shown:
+        if not kept:
+            kept.append(value)
+        elif np.isnan(value) and np.isnan(kept[-1]):
+            continue
+        elif np.isnan(value) or np.isnan(kept[-1]) or abs(value - kept[-1]) > 0.006 * reach:
+            kept.append(value)
+    return np.array(kept)

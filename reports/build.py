@@ -1,0 +1,135 @@
+"""From a design to the document of its report; drawing and writing come after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.design.model import Design
+from reports import document as doc
+from reports.atomic import write_together
+
+if TYPE_CHECKING:
+    from analyses.loop_survey import LoopSurvey
+    from analyses.requirements import RequirementVerdict
+
+Progress = Callable[[int, int], None]
+COMPUTING, DRAWING = 40, 60  # shares of the progress bar
+
+
+def design_report(
+    design: Design, validation: Sequence[doc.Section] = (), progress: Progress | None = None
+) -> dict[str, Any]:
+    """Compute the report of a design as a document.
+
+    Parameters
+    ----------
+    design : Design
+    validation : sequence of section, optional
+        Sections of the validator, put after those of the loops; their verdicts count.
+    progress : callable, optional
+        Called with (steps done, steps in all).
+
+    Returns
+    -------
+    dict
+        The document of `reports.document`: plain JSON.
+
+    Raises
+    ------
+    InputError, NumericalError
+        From the computations.
+    """
+    from actuator_lti.design import design_hash, warnings_of
+    from analyses.loop_survey import survey_loops
+    from analyses.requirements import evaluate_requirements
+    from reports.provenance import provenance
+
+    survey = survey_loops(design, progress)
+    verdicts = evaluate_requirements(design, survey.figures)
+    origin, head = provenance(design_hash(design)), design_head(design)
+    sections = [
+        *loop_sections(survey, verdicts),
+        *validation,
+        *closing_sections(design, head, origin, warnings_of(design)),
+    ]
+    return doc.document(
+        title=design.title or design.name,
+        subtitle=design.description,
+        design=head,
+        provenance=origin,
+        sections=sections,
+    )
+
+
+def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
+    """Make the sections about the linear loops, verdicts first."""
+    from reports.sections import (
+        break_points,
+        delays,
+        forms,
+        limits,
+        loop,
+        margins,
+        operating_points,
+        requirements,
+    )
+
+    design, figures = survey.design, survey.figures
+    sections = [requirements.section(verdicts), margins.section(figures, survey.locked)]
+    for name, found in figures.items():
+        locked = survey.locked if name == "current" else None
+        status = "info" if found.stable else "fail"
+        sections.append(loop.section(name, design, found, locked, status))
+    sections.append(forms.section(survey.forms))
+    sections.append(break_points.section(survey.break_points, figures))
+    sections.append(operating_points.section(survey.operating_points, _load_unit(design)))
+    if survey.budgets:
+        sections.append(delays.section(survey.budgets))
+    if survey.onset is not None:
+        sections.append(limits.section(design, survey.onset))
+    return sections
+
+
+def closing_sections(
+    design: Design, head: Mapping[str, Any], origin: Mapping[str, Any], warnings: Sequence[str]
+) -> list[doc.Section]:
+    """Make the sections that every report of a design ends with."""
+    from reports.sections import parameters, provenance
+
+    return [parameters.section(design, warnings), provenance.section(head, origin)]
+
+
+def design_head(design: Design) -> dict[str, Any]:
+    """Give what a document says of its design."""
+    return {
+        "name": design.name,
+        "title": design.title,
+        "revision": design.revision,
+        "origin": design.origin,
+        "axis": design.axis,
+    }
+
+
+def write_report(
+    made: Mapping[str, Any], folder: str | Path, *, processes: int = 1, progress: Progress | None = None
+) -> tuple[Path, Path]:
+    """Write ``report.html`` and ``report.json``; both or neither.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    from reports.html import page
+
+    content = doc.dumps(made)
+    html = page(doc.loads(content), processes=processes, progress=progress)
+    paths = (Path(folder) / "report.html", Path(folder) / "report.json")
+    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
+    return paths
+
+
+def _load_unit(design: Design) -> str:
+    return "N" if design.axis == "linear" else "N m"

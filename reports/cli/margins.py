@@ -1,0 +1,89 @@
+"""`actuator-lti margins`: the margins of every loop on the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports.cli.options import (
+    DEFAULT_DESIGN,
+    DesignArgument,
+    FormOption,
+    JsonOption,
+    LoadOption,
+    OperatingPointOption,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from analyses.loop_figures import LoopFigures
+    from analyses.requirements import RequirementVerdict
+
+
+def margins(
+    design: DesignArgument = DEFAULT_DESIGN,
+    form: FormOption = "sampled",
+    operating_point: OperatingPointOption = "sliding",
+    load: LoadOption = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Print margins, bandwidths and verdicts of every loop.
+
+    Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
+    """
+    from actuator_lti.design import load_design
+    from actuator_lti.loops import assemble_loops
+    from analyses.loop_figures import all_loop_figures
+    from analyses.requirements import all_pass, evaluate_requirements
+    from reports.cli.errors import leave_with
+
+    drive = load_design(design)
+    loops = assemble_loops(
+        drive,
+        form=form,  # type: ignore[arg-type]
+        operating_point=operating_point,  # type: ignore[arg-type]
+        load_Nm=load,
+    )
+    figures = all_loop_figures(loops, step=form != "continuous")
+    judged = figures if (form, operating_point) == ("sampled", "sliding") else None
+    verdicts = evaluate_requirements(drive, judged)
+    where = {"design": drive.name, "form": form, "operating_point": operating_point, "load_Nm": load}
+    if as_json:
+        _print_json(where, figures, verdicts)
+    else:
+        _print_tables(where, figures, verdicts)
+    leave_with(all_pass(verdicts) and all(found.stable for found in figures.values()))
+
+
+def _print_json(
+    where: Mapping[str, Any], figures: Mapping[str, LoopFigures], verdicts: Sequence[RequirementVerdict]
+) -> None:
+    """Print everything for a machine."""
+    from analyses.requirements import all_pass
+    from reports.cli.output import print_json
+    from reports.loop_json import loop_json
+    from reports.sections.requirements import item
+
+    loops = {name: loop_json(found) for name, found in figures.items()}
+    passed = all_pass(tuple(verdicts)) and all(found.stable for found in figures.values())
+    print_json({**where, "passed": passed, "loops": loops, "verdicts": [item(v) for v in verdicts]})
+
+
+def _print_tables(
+    where: Mapping[str, Any], figures: Mapping[str, LoopFigures], verdicts: Sequence[RequirementVerdict]
+) -> None:
+    """Print the tables of the report for people."""
+    from reports.sections.margins import crossing_table, margin_table, response_table
+    from reports.sections.names import LOOPS
+    from reports.sections.requirements import section
+    from reports.terminal import print_blocks, side_by_side
+
+    named = {LOOPS[name]: found for name, found in figures.items()}
+    head = f"{where['design']}: {where['form']}, {where['operating_point']}, load {where['load_Nm']:g} N m"
+    blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
+    if any(
+        len(found.margins.gain_margins) + len(found.margins.phase_margins) > 2 for found in figures.values()
+    ):
+        blocks.append(crossing_table(named))
+    notes = [note for found in figures.values() for note in (*found.margins.notes, *found.notes)]
+    print_blocks([*blocks, *section(verdicts)["blocks"]], notes)

@@ -1,0 +1,66 @@
+"""`actuator-lti report`: the whole report of a design as one page and one JSON file."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from reports.cli.options import (
+    DEFAULT_DESIGN,
+    DEFAULT_OUT,
+    DesignArgument,
+    JsonOption,
+    OutOption,
+    QuietOption,
+)
+
+ProcessesOption = Annotated[
+    int, typer.Option("--processes", min=1, max=64, metavar="N", help="Processes that draw the figures.")
+]
+
+
+def report(
+    design: DesignArgument = DEFAULT_DESIGN,
+    out: OutOption = DEFAULT_OUT,
+    processes: ProcessesOption = 2,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Write report.html and report.json of a design.
+
+    The page needs no network and opens from disk. With --json the document also goes to standard output.
+    """
+    from actuator_lti.design import load_design
+    from reports.build import design_report, write_report
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_line
+    from reports.cli.progress import progress
+    from reports.document import dumps
+
+    drive = load_design(design)
+    with progress(f"computing {drive.name}", quiet=quiet) as computing:
+        made = design_report(drive, progress=computing)
+    with progress("drawing figures", quiet=quiet) as drawing:
+        page, data = write_report(made, out, processes=processes, progress=drawing)
+    if as_json:
+        print_line(dumps(made).rstrip("\n"))
+    else:
+        print_line(f"{_summary(made['verdict'])}\n{page}\n{data}")
+    leave_with(made["verdict"]["passed"] and not _unstable(made))
+
+
+def _summary(verdict: dict[str, int]) -> str:
+    """Say in one line how the requirements came out."""
+    if not verdict["total"]:
+        return "no requirement in the design file"
+    judged = verdict["total"] - verdict["not_judged"]
+    met = f"{judged - verdict['failed']} of {verdict['total']} requirements met"
+    return met + (f", {verdict['not_judged']} not judged" if verdict["not_judged"] else "")
+
+
+def _unstable(made: dict[str, object]) -> bool:
+    """Whether a section reports a failure that no requirement states, such as an unstable loop."""
+    sections = made["sections"]
+    assert isinstance(sections, list)
+    return any(part["status"] == "fail" for part in sections)

@@ -1,0 +1,41 @@
+"""The figures of a loop as plain data for machines, under the names of the Python interface."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from analyses.loop_figures import LoopFigures
+
+
+def loop_json(found: LoopFigures) -> dict[str, Any]:
+    """Give everything known of one loop; a figure that does not exist is null."""
+    m, band, peaks, step = found.margins, found.bandwidth, found.peaks, found.step
+    return {
+        "stable": m.stable,
+        "verdict": m.verdict,
+        "gain_margin_db": m.gain_margin_db,
+        "phase_margin_deg": m.phase_margin_deg,
+        "delay_margin_s": m.delay_margin_s,
+        "modulus_margin": m.modulus_margin,
+        "modulus_frequency_rad_s": m.modulus_frequency_rad_s,
+        "disk_margin": m.disk_margin.alpha if m.disk_margin else None,
+        "gain_margins": [
+            {"ratio": g.ratio, "db": g.db, "frequency_rad_s": g.frequency_rad_s} for g in m.gain_margins
+        ],
+        "phase_margins": [{"deg": p.deg, "frequency_rad_s": p.frequency_rad_s} for p in m.phase_margins],
+        "delay_margins": [
+            {"seconds": d.seconds, "samples": d.samples, "frequency_rad_s": d.frequency_rad_s}
+            for d in m.delay_margins
+        ],
+        "bandwidth_hz": band.minus3db_hz if band else None,
+        "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
+        "resonance_peak_db": band.resonance_peak_db if band else None,
+        "sensitivity_peak_db": peaks.sensitivity_db if peaks else None,
+        "complementary_peak_db": peaks.complementary_db if peaks else None,
+        "rise_time_s": step.rise_time_s if step else None,
+        "overshoot_percent": step.overshoot_percent if step else None,
+        "settling_time_s": step.settling_time_s if step else None,
+        "period_s": m.period_s,
+        "band_rad_s": list(m.band_rad_s),
+        "notes": [*m.notes, *found.notes],
+    }

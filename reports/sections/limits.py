@@ -1,0 +1,82 @@
+"""What the linear model says about its own limits: the amplitude at which each limiter is reached."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.limiters import Onset
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.names import hertz
+
+NAMES = {
+    "speed": "speed limit",
+    "acceleration": "acceleration limit",
+    "current": "peak current",
+    "voltage": "voltage",
+}
+
+
+def section(design: Design, border: Onset) -> dict[str, Any]:
+    """Make the section from the onset amplitudes."""
+    scale, unit = (1.0, "m") if design.axis == "linear" else (math.degrees(1.0), "deg")
+    series = [
+        {"label": NAMES.get(name, name), "amplitude": rounded(scale * np.asarray(values), 4)}
+        for name, values in border.each_rad.items()
+        if np.isfinite(values).any()
+    ]
+    full = design.validation.full_deflection_rad * scale
+    data = {
+        "frequency_hz": rounded(border.omega_rad_s / (2.0 * np.pi)),
+        "series": series,
+        "unit": unit,
+        "full_deflection": full,
+    }
+    caption = (
+        "Amplitude of a sinusoidal command at the output (peak) at which each limit is just reached. "
+        "Below the lowest line every linear figure of this report holds, dry friction apart."
+    )
+    blocks = [
+        doc.figure("onset", data, caption=caption, alt=caption),
+        _table(design, border, scale, unit),
+    ]
+    intro = "A linear prediction ends where a limiter is reached; which one, and when, depends on frequency."
+    return doc.section("limits", "Border of the linear model", blocks, intro=intro)
+
+
+def _table(design: Design, border: Onset, scale: float, unit: str) -> dict[str, Any]:
+    """List the highest frequency at which each command amplitude still passes unlimited."""
+    columns = [
+        doc.column("amplitude", "Command amplitude", unit, format="sig:3"),
+        doc.column("fraction", "of full deflection", "%", format="fix:0"),
+        doc.column("hz", "linear up to", "Hz", format="sig:3"),
+        doc.column("limiter", "then limited by"),
+    ]
+    rows = []
+    for fraction in design.validation.amplitude_fractions:
+        amplitude = fraction * design.validation.full_deflection_rad
+        reached = np.nonzero(border.amplitude_rad < amplitude)[0]
+        first = int(reached[0]) if len(reached) else None
+        rows.append(
+            {
+                "amplitude": amplitude * scale,
+                "fraction": 100.0 * fraction,
+                "hz": None if first is None else hertz(_crossing(border, first, amplitude)),
+                "limiter": "none in this range" if first is None else NAMES.get(border.active[first], ""),
+            }
+        )
+    return doc.table("How far the linear model reaches", columns, rows)
+
+
+def _crossing(border: Onset, first: int, amplitude: float) -> float:
+    """Interpolate, on logarithmic scales, where the border falls to an amplitude."""
+    if first == 0 or not math.isfinite(border.amplitude_rad[first - 1]):
+        return float(border.omega_rad_s[first])
+    above, below = border.amplitude_rad[first - 1], border.amplitude_rad[first]
+    part = math.log(above / amplitude) / math.log(above / below)
+    low, high = border.omega_rad_s[first - 1], border.omega_rad_s[first]
+    return float(low * (high / low) ** part)

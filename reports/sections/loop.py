@@ -1,0 +1,261 @@
+"""One loop: open and closed loop over frequency, Nyquist, S and T, step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.loop_figures import LoopFigures
+from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.margins import finite, margin_row, response_row
+from reports.sections.names import LOOPS, hertz
+
+REACH = 1.6
+STEP_POINTS = 300
+
+
+def section(
+    name: str, design: Design, found: LoopFigures, locked: LoopFigures | None = None, status: str = "info"
+) -> dict[str, Any]:
+    """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
+    grid = frequency_grid(found)
+    title = LOOPS[name]
+    blocks = [_facts(found), open_bode(title, found, grid)]
+    if found.bandwidth is not None:
+        blocks.append(closed_bode(title, found, grid, locked))
+    blocks.append(nyquist(title, found, grid))
+    if found.peaks is not None:
+        blocks.append(sensitivity(title, design, name, found, grid))
+    if found.step is not None:
+        blocks.append(step(title, found, locked))
+    blocks += [doc.text(note) for note in (*found.margins.notes, *found.notes)]
+    return doc.section(f"loop-{name}", title, blocks, intro=_intro(name, found), status=status)
+
+
+def _intro(name: str, found: LoopFigures) -> str:
+    period = found.loop.period_s
+    rate = "" if period is None else f", every {period * 1e6:g} µs"
+    inner = "no loop inside it" if name == "current" else "the loops inside it closed"
+    words = f"Cut at its error ({found.loop.unit_in}){rate}, with {inner}."
+    return f"{words} Stability found twice: {found.margins.agreement}."
+
+
+def _facts(found: LoopFigures) -> dict[str, Any]:
+    """Give the figures to remember of this loop."""
+    margins, response = margin_row(found), response_row(found)
+    chosen = [
+        ("Gain margin", margins["gain_margin_db"], "dB", 1),
+        ("Phase margin", margins["phase_margin_deg"], "deg", 1),
+        ("Gain crossover", margins["crossover_hz"], "Hz", None),
+        ("Delay margin", margins["delay_margin_ms"], "ms", None),
+        ("Peak of S", margins["s_peak_db"], "dB", 2),
+        ("Bandwidth, −3 dB", response["minus3db_hz"], "Hz", None),
+    ]
+    return doc.facts(doc.fact(label, _short(value, places), unit) for label, value, unit, places in chosen)
+
+
+def _short(value: float | None, places: int | None) -> float | None:
+    """Cut a figure to what a reader remembers; the tables hold every digit."""
+    if value is None:
+        return None
+    return round(value, places) if places is not None else float(f"{value:.3g}")
+
+
+def open_bode(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
+    """Make the open-loop Bode figure with every margin on it."""
+    margins = found.margins
+    data = {
+        **bode_data([("open loop", curve(found.loop.open_loop, grid))]),
+        "nyquist_hz": nyquist_hz(found),
+        "gain_margins": [
+            {"frequency_hz": hertz(m.frequency_rad_s), "db": m.db}
+            for m in margins.gain_margins
+            if math.isfinite(m.frequency_rad_s) and m.frequency_rad_s > 0
+        ],
+        "phase_margins": [
+            {"frequency_hz": hertz(m.frequency_rad_s), "deg": m.deg}
+            for m in margins.phase_margins
+            if m.frequency_rad_s > 0
+        ],
+    }
+    caption = (
+        f"{title}, open loop: gain margins at the phase crossovers (■), "
+        "phase margins at the gain crossovers (●)."
+    )
+    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, found))
+
+
+def closed_bode(
+    title: str, found: LoopFigures, grid: np.ndarray, locked: LoopFigures | None
+) -> dict[str, Any]:
+    """Make the closed-loop Bode figure with the bandwidths."""
+    band = found.bandwidth
+    assert band is not None
+    series = [("rotor free" if locked else "closed loop", curve(found.response, grid))]
+    if locked is not None and locked.stable:
+        series.append(("rotor locked", curve(locked.response, grid)))
+    dc_db = 20.0 * math.log10(abs(band.dc_gain)) if band.dc_gain else None
+    data = {
+        **bode_data(series),
+        "nyquist_hz": nyquist_hz(found),
+        "bandwidth": {
+            "minus3db_hz": finite(band.minus3db_hz),
+            "minus90deg_hz": finite(band.minus90deg_hz),
+            "resonance_hz": finite(band.resonance_hz),
+            "resonance_db": finite(band.resonance_peak_db),
+            "level_db": None if dc_db is None else dc_db - 20.0 * math.log10(math.sqrt(2.0)),
+            "dc_db": dc_db,
+        },
+    }
+    lag = _hz(band.minus90deg_hz)
+    words = f"{title}, closed loop: −3 dB at {_hz(band.minus3db_hz)}, −90° at {lag}."
+    return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}")
+
+
+def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
+    """Make the Nyquist figure."""
+    margins, system = found.margins, found.loop.open_loop
+    points = nyquist_curve(system, grid, REACH)
+    closest = margins.modulus_frequency_rad_s
+    at = None
+    if closest is not None and math.isfinite(closest) and closest > 0:
+        value = response_at(system, np.array([closest]))[0]
+        at = [float(value.real), float(value.imag)]
+    phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
+    on_circle = response_at(system, np.array(phases)) if phases else []
+    data = {
+        "real": rounded(points.real, 4),
+        "imag": rounded(points.imag, 4),
+        "modulus": margins.modulus_margin,
+        "modulus_point": at,
+        "gain_points": [-1.0 / m.ratio for m in margins.gain_margins if m.ratio > 0],
+        "phase_points": [[float(v.real), float(v.imag)] for v in on_circle],
+        "reach": REACH,
+    }
+    modulus = "withheld" if margins.modulus_margin is None else f"{margins.modulus_margin:.3f}"
+    caption = (
+        f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "
+        "(modulus margin, 1 over the peak of S)."
+    )
+    return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}")
+
+
+def sensitivity(
+    title: str, design: Design, name: str, found: LoopFigures, grid: np.ndarray
+) -> dict[str, Any]:
+    """Make the figure of S and T."""
+    peaks = found.peaks
+    assert peaks is not None
+    limits = [
+        item.maximum
+        for item in design.requirements
+        if item.quantity == "sensitivity_peak"
+        and item.loop in (name, "every", None)
+        and item.maximum is not None
+    ]
+    data = {
+        "frequency_hz": rounded(grid / (2 * np.pi)),
+        "s_db": rounded(_db(response_at(found.loop.sensitivity, grid)), 4),
+        "t_db": rounded(_db(response_at(found.loop.closed_loop, grid)), 4),
+        "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
+        "t_peak": _peak(peaks.complementary_db, peaks.complementary_rad_s),
+        "limit_db": min(limits, default=None),
+        "nyquist_hz": nyquist_hz(found),
+    }
+    caption = (
+        f"{title}: sensitivity S = 1/(1 + L), peak {peaks.sensitivity_db:.2f} dB, "
+        f"and closed loop T = L/(1 + L), peak {peaks.complementary_db:.2f} dB."
+    )
+    return doc.figure("sensitivity", data, caption=caption, alt=caption)
+
+
+def step(title: str, found: LoopFigures, locked: LoopFigures | None) -> dict[str, Any]:
+    """Make the step figure."""
+    figures = found.step
+    assert figures is not None
+    series = [_step_series("rotor free" if locked else "closed loop", found)]
+    if locked is not None and locked.step is not None:
+        series.append(_step_series("rotor locked", locked, end_s=series[0]["time_s"][-1]))
+    data = {
+        "time_s": series[0]["time_s"],
+        "series": series,
+        "final": finite(figures.final_value),
+        "rise": _rise(figures),
+        "settling_s": finite(figures.settling_time_s),
+        "overshoot_percent": finite(figures.overshoot_percent),
+        "held": found.loop.period_s is not None,
+    }
+    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
+    return doc.figure("step", data, caption=caption, alt=f"Step response. {caption}")
+
+
+def bode_data(series: Sequence[tuple[str, Curve]]) -> dict[str, Any]:
+    """Give the curves of a Bode figure, on the grid of the first."""
+    return {
+        "frequency_hz": rounded(series[0][1].frequency_hz),
+        "series": [
+            {
+                "label": label,
+                "magnitude_db": rounded(found.magnitude_db),
+                "phase_deg": rounded(found.phase_deg),
+            }
+            for label, found in series
+        ],
+    }
+
+
+def nyquist_hz(found: LoopFigures) -> float | None:
+    """Give the Nyquist frequency of a sampled loop."""
+    return None if found.loop.period_s is None else 0.5 / found.loop.period_s
+
+
+def _step_series(label: str, found: LoopFigures, end_s: float | None = None) -> dict[str, Any]:
+    """Give a step response, cut where nothing happens any more and thinned."""
+    figures = found.step
+    assert figures is not None
+    time, response = np.asarray(figures.time_s), np.asarray(figures.response)
+    settled = figures.settling_time_s
+    if end_s is None and settled is not None and math.isfinite(settled) and settled > 0:
+        end_s = 2.2 * settled
+    if end_s is not None:
+        keep = max(int(np.searchsorted(time, end_s, side="right")), 8)
+        time, response = time[:keep], response[:keep]
+    stride = max(1, math.ceil(len(time) / STEP_POINTS))
+    return {"label": label, "time_s": rounded(time[::stride]), "response": rounded(response[::stride])}
+
+
+def _rise(figures: Any) -> list[float] | None:
+    """Give the times at which the response first has 10 and 90 % of its final value."""
+    part = np.asarray(figures.response) / figures.final_value
+    if not (part >= 0.9).any():
+        return None
+    start = float(figures.time_s[int(np.argmax(part >= 0.1))])
+    return [start, start + float(figures.rise_time_s)]
+
+
+def _peak(db: float | None, omega_rad_s: float | None) -> dict[str, Any] | None:
+    known = finite(db)
+    return None if known is None else {"db": known, "frequency_hz": finite(hertz(omega_rad_s))}
+
+
+def _db(values: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore"):
+        return np.asarray(20.0 * np.log10(np.abs(values)))
+
+
+def _hz(value: float | None) -> str:
+    known = finite(value)
+    return "no frequency in the band" if known is None else f"{known:.4g} Hz"
+
+
+def _margin_words(title: str, found: LoopFigures) -> str:
+    row = margin_row(found)
+    gain = "none" if row["gain_margin_db"] is None else f"{row['gain_margin_db']:.1f} dB"
+    phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"
+    return f"Open-loop Bode diagram of the {title.lower()}: gain margin {gain}, phase margin {phase}."

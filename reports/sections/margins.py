@@ -1,0 +1,183 @@
+"""Margins and bandwidths of every loop: the tables that a reader looks for first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from analyses.loop_figures import LoopFigures
+from reports import document as doc
+from reports.sections.names import LOOPS, hertz
+
+MARGIN_COLUMNS = [
+    doc.column("loop", "Loop"),
+    doc.column("stable", "Closed loop"),
+    doc.column("gain_margin_db", "Gain margin", "dB", format="fix:2"),
+    doc.column("gain_margin_hz", "at", "Hz", format="sig:4"),
+    doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
+    doc.column("crossover_hz", "at", "Hz", format="sig:4"),
+    doc.column("delay_margin_ms", "Delay margin", "ms", format="sig:3"),
+    doc.column("delay_margin_samples", "", "samples", format="sig:3"),
+    doc.column("modulus_margin", "Modulus margin", format="fix:3"),
+    doc.column("s_peak_db", "Peak of S", "dB", format="fix:2"),
+    doc.column("disk_margin", "Disk margin", format="fix:3"),
+]
+RESPONSE_COLUMNS = [
+    doc.column("loop", "Loop"),
+    doc.column("minus3db_hz", "−3 dB", "Hz", format="sig:4"),
+    doc.column("minus90deg_hz", "−90°", "Hz", format="sig:4"),
+    doc.column("resonance_db", "Resonance", "dB", format="fix:2"),
+    doc.column("resonance_hz", "at", "Hz", format="sig:4"),
+    doc.column("t_peak_db", "Peak of T", "dB", format="fix:2"),
+    doc.column("rise_ms", "Rise 10–90 %", "ms", format="sig:3"),
+    doc.column("overshoot_percent", "Overshoot", "%", format="fix:1"),
+    doc.column("settling_ms", "Settling 2 %", "ms", format="sig:3"),
+    doc.column("dc", "Gain at DC", format="sig:4"),
+]
+CROSSING_COLUMNS = [
+    doc.column("loop", "Loop"),
+    doc.column("kind", "Crossing"),
+    doc.column("value", "Margin", format="sig:5"),
+    doc.column("unit", "Unit"),
+    doc.column("rad_s", "at", "rad/s", format="sig:5"),
+    doc.column("hz", "at", "Hz", format="sig:4"),
+    doc.column("delay_ms", "Delay margin", "ms", format="sig:4"),
+    doc.column("samples", "", "samples", format="sig:4"),
+    doc.column("note", "Remark"),
+]
+
+
+def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> dict[str, Any]:
+    """Make the section from the figures of the sampled, sliding loops."""
+    named = {LOOPS[name]: found for name, found in figures.items()}
+    if locked is not None:
+        named["Current loop, rotor locked"] = locked
+    unstable = any(not found.stable for found in figures.values())
+    blocks = [
+        margin_table(named),
+        response_table(named),
+        doc.details("Every crossing of every loop", [crossing_table(named)]),
+    ]
+    intro = (
+        "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
+        "Sampled form: exact hold and computing delay, no approximation; sliding friction."
+    )
+    status = "fail" if unstable else "info"
+    return doc.section("margins", "Margins and bandwidths", blocks, intro=intro, status=status)
+
+
+def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+    """Make the table of the margins to quote."""
+    note = (
+        "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
+        "to 0°; all of them are listed below. A dash means that there is no such crossing. "
+        "Disk margin: α, balanced (S + T)."
+    )
+    rows = [{"loop": name, **margin_row(found)} for name, found in named.items()]
+    return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
+
+
+def response_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+    """Make the table of bandwidths and step figures."""
+    note = (
+        "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
+        "−90°. The step of the position loop is from the command to the output shaft."
+    )
+    rows = [{"loop": name, **response_row(found)} for name, found in named.items()]
+    return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
+
+
+def crossing_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+    """Make the table of every crossing."""
+    rows = [row for name, found in named.items() for row in _crossings(name, found)]
+    return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
+
+
+def margin_row(found: LoopFigures) -> dict[str, Any]:
+    """Give the margins of one loop by column."""
+    m = found.margins
+    gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
+    return {
+        "stable": {"text": m.verdict, "status": "pass" if m.stable else "fail"},
+        "gain_margin_db": finite(m.gain_margin_db),
+        "gain_margin_hz": hertz(gain.frequency_rad_s) if gain else None,
+        "phase_margin_deg": finite(m.phase_margin_deg),
+        "crossover_hz": hertz(phase.frequency_rad_s) if phase else None,
+        "crossover_rad_s": phase.frequency_rad_s if phase else None,
+        "delay_margin_ms": times(m.delay_margin_s, 1e3),
+        "delay_margin_samples": delay.samples if delay and m.stable else None,
+        "modulus_margin": m.modulus_margin,
+        "s_peak_db": finite(m.sensitivity_peak_db),
+        "disk_margin": disk.alpha if disk else None,
+    }
+
+
+def response_row(found: LoopFigures) -> dict[str, Any]:
+    """Give bandwidth, resonance and step of one loop by column."""
+    band, peaks, step = found.bandwidth, found.peaks, found.step
+    row: dict[str, Any] = dict.fromkeys((column["key"] for column in RESPONSE_COLUMNS[1:]), None)
+    if band is not None:
+        row |= {
+            "minus3db_hz": finite(band.minus3db_hz),
+            "minus90deg_hz": finite(band.minus90deg_hz),
+            "resonance_db": finite(band.resonance_peak_db),
+            "resonance_hz": finite(band.resonance_hz),
+        }
+    if peaks is not None:
+        row["t_peak_db"] = finite(peaks.complementary_db)
+    if step is not None:
+        row |= {
+            "rise_ms": times(step.rise_time_s, 1e3),
+            "overshoot_percent": finite(step.overshoot_percent),
+            "settling_ms": times(step.settling_time_s, 1e3),
+            "dc": finite(step.final_value),
+        }
+    return row
+
+
+def _crossings(name: str, found: LoopFigures) -> list[dict[str, Any]]:
+    """List every crossing of one loop."""
+    m = found.margins
+    rows = [
+        _crossing(name, "phase crossover", margin.db, "dB", margin.frequency_rad_s)
+        | {"note": _gain_note(margin.ratio, margin.tangent)}
+        for margin in m.gain_margins
+    ]
+    delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
+    for margin in m.phase_margins:
+        row = _crossing(name, "gain crossover", margin.deg, "deg", margin.frequency_rad_s)
+        delay = delays.get(margin.frequency_rad_s)
+        row["note"] = "touches, does not cross" if margin.tangent else ""
+        row["delay_ms"] = None if delay is None else delay.seconds * 1e3
+        row["samples"] = None if delay is None else delay.samples
+        rows.append(row)
+    return rows
+
+
+def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> dict[str, Any]:
+    row = {
+        "loop": name,
+        "kind": kind,
+        "value": finite(value),
+        "unit": unit,
+        "delay_ms": None,
+        "samples": None,
+    }
+    return {**row, "rad_s": finite(omega_rad_s), "hz": finite(hertz(omega_rad_s)), "note": ""}
+
+
+def _gain_note(ratio: float, tangent: bool) -> str:
+    limit = "upper limit of the gain" if ratio >= 1.0 else "lower limit of the gain"
+    return limit + (", touches, does not cross" if tangent else "")
+
+
+def finite(value: float | None) -> float | None:
+    """Give a number, or nothing where there is none or no bound."""
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def times(value: float | None, factor: float) -> float | None:
+    """Give a number in another unit, or nothing."""
+    known = finite(value)
+    return None if known is None else known * factor

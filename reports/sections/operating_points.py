@@ -1,0 +1,49 @@
+"""The loops at every operating point of the friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from analyses.loop_survey import OperatingPointFigures
+from reports import document as doc
+from reports.sections.margins import margin_row, response_row
+
+
+def section(points: Sequence[OperatingPointFigures], unit: str = "N m") -> dict[str, Any]:
+    """Make the section; one line an operating point, three figures a loop."""
+    names = list(points[0].figures)
+    columns = [
+        doc.column("point", "Operating point"),
+        doc.column("load", "Load", unit, format="sig:3"),
+        doc.column("slope", "Friction slope", "mN m s/rad", format="sig:3"),
+    ]
+    for name in names:
+        label = name.capitalize()
+        columns += [
+            doc.column(f"{name}_phase", f"{label} PM", "deg", format="fix:1"),
+            doc.column(f"{name}_gain", f"{label} GM", "dB", format="fix:1"),
+            doc.column(f"{name}_band", f"{label} −3 dB", "Hz", format="sig:3"),
+        ]
+    rows = [_row(point) for point in points]
+    note = (
+        "Sliding: the dry part is a constant torque and leaves no trace in the loops, whatever the load. "
+        "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
+        "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
+    )
+    blocks = [doc.table("PM: phase margin, GM: gain margin, −3 dB: closed loop", columns, rows, note)]
+    intro = "Friction is no constant: what it does to small motions depends on speed and load."
+    return doc.section("operating-points", "Operating points", blocks, intro=intro)
+
+
+def _row(point: OperatingPointFigures) -> dict[str, Any]:
+    row: dict[str, Any] = {"point": point.label, "slope": point.slope_Nms_rad * 1e3}
+    row["load"] = "any" if point.load_Nm is None else point.load_Nm
+    for name, found in point.figures.items():
+        margins, response = margin_row(found), response_row(found)
+        row[f"{name}_phase"] = margins["phase_margin_deg"] if found.stable else "unstable"
+        row[f"{name}_gain"] = margins["gain_margin_db"]
+        row[f"{name}_band"] = response["minus3db_hz"]
+    if not all(found.stable for found in point.figures.values()):
+        row["_status"] = "fail"
+    return row

@@ -1,0 +1,25 @@
+"""What the report was made of and with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from reports import document as doc
+
+
+def section(design: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Make the section from the document's own head."""
+    rows = [
+        {"what": "design", "value": f"{design['name']}, revision {design['revision'] or 'none'}"},
+        {"what": "design file", "value": design["origin"] or "none"},
+        {"what": "hash of the design (SHA-256)", "value": provenance["design_hash"]},
+        {"what": "actuator-lti", "value": provenance["version"]},
+        {"what": "commit", "value": provenance["commit"] or "not built from a git tree"},
+        {"what": "built", "value": provenance["time"]},
+        {"what": "Python", "value": f"{provenance['python']}, {provenance['platform']}"},
+        *({"what": name, "value": version} for name, version in provenance["libraries"].items()),
+    ]
+    columns = [doc.column("what", "What"), doc.column("value", "Value")]
+    blocks = [doc.table("To build this report again", columns, rows)]
+    return doc.section("provenance", "Provenance", blocks)

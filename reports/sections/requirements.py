@@ -1,0 +1,69 @@
+"""Verdicts on the requirements of the design file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from analyses.requirements import RequirementVerdict, all_pass
+from reports import document as doc
+from reports.sections.names import QUANTITIES
+
+
+def section(verdicts: Sequence[RequirementVerdict]) -> dict[str, Any]:
+    """Make the section from the verdicts."""
+    if not verdicts:
+        blocks = [doc.text("The design file states no requirement.")]
+        return doc.section("verdicts", "Verdicts", blocks, status="info")
+    failed = sum(verdict.passed is False for verdict in verdicts)
+    intro = (
+        "Requirements of the design file, judged on the sampled loops with sliding friction. "
+        "Distance is what is left to the limit, negative where it is missed."
+    )
+    items = [item(verdict) for verdict in verdicts]
+    status = "pass" if all_pass(tuple(verdicts)) else "fail"
+    title = "Verdicts" if not failed else f"Verdicts: {failed} not met"
+    return doc.section("verdicts", title, [doc.verdicts(items)], intro=intro, status=status)
+
+
+def item(verdict: RequirementVerdict) -> dict[str, Any]:
+    """Make one line of the verdicts."""
+    requirement = verdict.requirement
+    limit, comparison = _limit(verdict)
+    reason = verdict.reason
+    if verdict.value is not None and math.isinf(verdict.value):
+        reason = reason or "unlimited"
+    source = requirement.source + (f" ({requirement.note})" if requirement.note else "")
+    return doc.verdict(
+        verdict.id,
+        label(verdict),
+        value=verdict.value,
+        limit=limit,
+        comparison=comparison,
+        unit="" if requirement.unit == "1" else requirement.unit,
+        distance=verdict.distance,
+        passed=verdict.passed,
+        source=source,
+        reason=reason,
+    )
+
+
+def label(verdict: RequirementVerdict) -> str:
+    """Say what is required of what, in words."""
+    requirement = verdict.requirement
+    what = QUANTITIES.get(requirement.quantity, requirement.quantity)
+    if verdict.loop is not None:
+        return f"{verdict.loop.capitalize()} loop: {what}"
+    load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} N m"
+    return f"Drive: {what}{load}"
+
+
+def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
+    """Give the limit that is nearer, and the side that is good."""
+    low, high = verdict.requirement.minimum, verdict.requirement.maximum
+    if low is None:
+        return high, "≤"
+    if high is None or verdict.value is None:
+        return low, "≥"
+    return (low, "≥") if verdict.value - low <= high - verdict.value else (high, "≤")

@@ -1,0 +1,115 @@
+"""Blocks of a document as tables on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from reports.cli.output import console
+from reports.html import show_signed
+from reports.numbers import show
+
+COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
+WORDS = {True: ("pass", "✓ met"), False: ("fail", "✗ not met"), None: ("info", "– not judged")}
+
+
+def print_blocks(blocks: Sequence[Mapping[str, Any] | Table], notes: Sequence[str] = ()) -> None:
+    """Print the tables and verdicts among the blocks; figures are for pages."""
+    out = console()
+    for block in blocks:
+        if isinstance(block, Table):
+            out.print(block)
+        else:
+            _print(block, out)
+    for note in dict.fromkeys(notes):
+        out.print(Text(f"note: {note}", style="yellow"))
+
+
+def _print(block: Mapping[str, Any], out: Console) -> None:
+    """Print one block."""
+    if block["kind"] == "table":
+        out.print(table(block))
+    elif block["kind"] == "verdicts":
+        out.print(verdict_table(block))
+    elif block["kind"] == "text":
+        out.print(Text(block["text"]))
+    elif block["kind"] == "details":
+        for inner in block["blocks"]:
+            _print(inner, out)
+
+
+def table(block: Mapping[str, Any]) -> Table:
+    """Lay a table block out."""
+    made = _empty(block["caption"])
+    for column in block["columns"]:
+        label = " ".join(
+            part for part in (column["label"], f"[{column['unit']}]" if column["unit"] else "") if part
+        )
+        made.add_column(Text(label), justify=_side(column["align"]), no_wrap=column["align"] == "right")
+    for row in block["rows"]:
+        made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
+    return made
+
+
+def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> Table:
+    """Lay tables of the same rows out as one: a line a figure, a column a row of the blocks."""
+    made = _empty(title)
+    made.add_column("")
+    rows = {row[block["columns"][0]["key"]]: None for block in blocks for row in block["rows"]}
+    for name in rows:
+        made.add_column(Text(str(name)), justify="right")
+    for block in blocks:
+        for column in block["columns"][1:]:
+            own = [row.get(column["key"]) for row in block["rows"]]
+            made.add_row(Text(_label(column)), *(_cell(value, column["format"]) for value in own))
+    return made
+
+
+def _label(column: Mapping[str, Any]) -> str:
+    """Write a column's label and unit in one line; a continuation is set back."""
+    name = column["label"] if column["label"] not in ("", "at") else f"  {column['label']}".rstrip() or " "
+    return f"{name}, {column['unit']}" if column["unit"] and name.strip() else f"{name} {column['unit']}"
+
+
+def verdict_table(block: Mapping[str, Any]) -> Table:
+    """Lay verdicts out."""
+    made = _empty("Requirements")
+    for label in ("Requirement", "Verdict"):
+        made.add_column(label)
+    for label in ("Found", "Limit", "Distance"):
+        made.add_column(label, justify="right", no_wrap=True)
+    made.add_column("Unit")
+    for item in block["items"]:
+        status, word = WORDS[item["passed"]]
+        word += f" ({item['reason']})" if item["reason"] else ""
+        limit = f"{item['comparison']} {show(item['limit'], 'sig:4')}"
+        cells = [show(item["value"], "sig:4"), limit, show_signed(item["distance"]), item["unit"]]
+        made.add_row(Text(item["label"]), Text(word, style=COLOURS[status]), *map(Text, cells))
+    return made
+
+
+def _empty(caption: str) -> Table:
+    return Table(
+        title=Text(caption),
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        padding=(0, 1),
+    )
+
+
+def _cell(value: Any, format: str) -> Text:
+    """Write a cell; one with a status has its colour."""
+    if isinstance(value, Mapping):
+        return Text(show(value["text"], format), style=COLOURS.get(value.get("status") or "", ""))
+    return Text(show(value, format))
+
+
+def _side(align: str) -> Literal["left", "center", "right"]:
+    return "right" if align == "right" else "center" if align == "center" else "left"
