@@ -12,8 +12,8 @@ constants ``ELECTRICAL`` ... ``FILTER``.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ._compiled import kernel
 from ._linalg import exponential, multiply
 
 R, L, K_M, K_E, J, SLOPE, STIFFNESS, PERIOD, DELAY, KP_C, TN_C, KP_V, TN_V, KP_P, T_F = range(15)
@@ -23,7 +23,7 @@ NONE, PROPORTIONAL, PI = 0, 1, 2
 TINY_DELAY = 1e-9  # fraction of a tick below which a delay counts as a whole number of ticks
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def plant(kind, p, a, b):
     """Write the slipping plant dx/dt = a x + b u; return its order (angle last, speed before it)."""
     a[:] = 0.0
@@ -42,7 +42,7 @@ def plant(kind, p, a, b):
     return 2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _hold(m, a, b, time_s, phi, gamma, work):
     """Transition matrix and held-input vector over time_s of an m-state plant."""
     s, e, t, w = work[0], work[1], work[2], work[3]
@@ -60,7 +60,7 @@ def _hold(m, a, b, time_s, phi, gamma, work):
         gamma[i] = e[i, m]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def sampled_plant(kind, p, space, a, b):
     """Write the fast system from u_k: plant, then voltages on their way; return (order, plant order)."""
     pa, phi0, phi1, work = space[0], space[1], space[2], space[3:]
@@ -107,7 +107,7 @@ def sampled_plant(kind, p, space, a, b):
     return n, m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def close(n, a, b, c):
     """Close negative unit feedback in place: a - b c."""
     for i in range(n):
@@ -115,7 +115,7 @@ def close(n, a, b, c):
             a[i, j] -= b[i] * c[j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def add_controller(n, a, b, c, gain, step_over_time):
     """Put a PI (P where step_over_time is 0) in front of the input; return the number of states.
 
@@ -137,7 +137,7 @@ def add_controller(n, a, b, c, gain, step_over_time):
     return size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def held(n, times, a, b, power, work):
     """Hold the input for a number of ticks: a <- a^n, b <- (I + a + ... + a^(n-1)) b."""
     if times == 1:
@@ -163,7 +163,7 @@ def held(n, times, a, b, power, work):
             a[i, j] = power[i, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def add_speed_measurement(n, angle, kind, p, a, b, c):
     """Write the measured speed as c over the states, with the states that the measurement needs; return n.
 
@@ -201,7 +201,7 @@ def add_speed_measurement(n, angle, kind, p, a, b, c):
     return n
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def without_state(n, skip, a, b, c, out_a, out_b, out_c):
     """Copy a system without one state that the output does not see (skip < 0 keeps all); return its order."""
     r = 0
@@ -220,7 +220,7 @@ def without_state(n, skip, a, b, c, out_a, out_b, out_c):
     return r
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def open_loops(kind, p, space, a, b, c, loops_a, loops_b, loops_c, orders):
     """Write the open current, velocity and position loops (order 0 where there is none)."""
     n, m = sampled_plant(kind, p, space, a, b)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ._compiled import kernel
 from ._response import (
     BANDWIDTH,
     GAIN,
@@ -42,7 +42,7 @@ FIRST_PHASE = FIRST_GAIN + 2 * LISTED  # pairs (angle per sample, gain margin as
 COLUMNS = FIRST_PHASE + 2 * LISTED
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _list(row, counter, first, x, value):
     """Add a crossover to its list; the count goes on past what is kept."""
     k = int(row[counter])
@@ -52,12 +52,12 @@ def _list(row, counter, first, x, value):
     row[counter] = k + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _phase_margin(response):
     return np.arctan2(-response.imag, -response.real)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _hidden(mode, k, xs, rs, ss):
     """Whether the cubic through both ends, of one sign, comes near zero between them."""
     f1 = quantity(mode, rs[k], ss[k], 1.0)
@@ -84,7 +84,7 @@ def _hidden(mode, k, xs, rs, ss):
     return lowest < 0.1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     """The angle between two scanned points where the quantity of a mode is extreme, by golden section."""
     shrink = 0.6180339887498949
@@ -113,7 +113,7 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     return left if f_left < f_right else right
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
     """Refine one bracketed gain or phase crossover and list it."""
     x, response = root(mode, 1.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
@@ -123,7 +123,7 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / response.real)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
     for k in range(count - 1):
@@ -142,7 +142,7 @@ def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged)
                 _crossing(mode, x, f, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def ends(response_dc, response_nyquist, count, xs, rs, row):
     """A loop that is negative real at DC or at Nyquist crosses the negative axis there.
 
@@ -158,7 +158,7 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, np.pi, -1.0 / response_nyquist)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def modulus(count, xs, rs, ss, nyquist, row, n, h, b, c, work, state, exchanged):
     """The smallest |1 + L| and where."""
     best = 0
@@ -183,7 +183,7 @@ def modulus(count, xs, rs, ss, nyquist, row, n, h, b, c, work, state, exchanged)
                 row[MODULUS_X] = x
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def resonance(count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
     best = 0
@@ -205,7 +205,7 @@ def resonance(count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
                 row[PEAK_T_X] = x
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def bandwidths(count, xs, rs, ss, dc, row, n, h, b, c, work, state, exchanged):
     """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
     level = abs(dc)

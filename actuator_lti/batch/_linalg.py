@@ -10,12 +10,13 @@ Reinsch (1969).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ._compiled import kernel
 
 _EPS = 2.220446049250313e-16
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def multiply(n, a, b, out):
     """Write a @ b into out, all n by n (leading block)."""
     for i in range(n):
@@ -26,7 +27,7 @@ def multiply(n, a, b, out):
             out[i, j] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def exponential(n, m, out, term, work):
     """Write expm(m) into out: Taylor series after halving to norm 1/2, then squaring (m is kept)."""
     norm = 0.0
@@ -62,7 +63,7 @@ def exponential(n, m, out, term, work):
                 out[i, j] = work[i, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def balance(n, a, b, c):
     """Scale the states by powers of two until rows and columns of a weigh the same."""
     for _ in range(30):
@@ -89,7 +90,7 @@ def balance(n, a, b, c):
             return
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def hessenberg(n, a, b, c, v):
     """Bring a to upper Hessenberg form by Householder reflections, b and c in the same coordinates."""
     for k in range(n - 2):
@@ -133,7 +134,7 @@ def hessenberg(n, a, b, c, v):
             a[i, k] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def eigenvalues(n, a, wr, wi):
     """Eigenvalues of an upper Hessenberg matrix (destroyed) into wr, wi; status 1 if QR does not end."""
     norm = 0.0
@@ -181,7 +182,7 @@ def eigenvalues(n, a, wr, wi):
     return 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _two_by_two(end, x, y, w, shift, wr, wi):
     """The two eigenvalues of a deflated 2 by 2 block."""
     p = 0.5 * (y - x)
@@ -203,7 +204,7 @@ def _two_by_two(end, x, y, w, shift, wr, wi):
         wi[end] = -z
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _double_shift(a, low, end, x, y, w):
     """One Francis step with two shifts on rows and columns low to end."""
     p = 0.0

@@ -8,13 +8,14 @@ nothing cancels: ``z - 1 = -2 sin(x/2)^2 + j sin x`` at the angle x = w T.  Deri
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ._compiled import kernel
 
 GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE, EXTREMUM = range(7)
 HALF_LOG_2 = 0.34657359027997264
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
     sine = np.sin(0.5 * x)
@@ -52,7 +53,7 @@ def evaluate(n, h, b, c, x, work, state, exchanged):
     return response, complex(1.0 + delta.real, delta.imag) * 1j * -_again(n, c, work, state, exchanged)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _again(n, c, work, state, exchanged):
     """c (z I - A)^-1 state with the factors that evaluate left behind."""
     carry = state[0]
@@ -73,7 +74,7 @@ def _again(n, c, work, state, exchanged):
     return total_response
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def quantity(mode, response, slope, level):
     """The function whose zero is looked for, from L and dL/dx."""
     if mode == GAIN:
@@ -92,7 +93,7 @@ def quantity(mode, response, slope, level):
     return (slope / (response * (1.0 + response))).real  # RESONANCE: d ln|T| / dx
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def root(mode, level, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
     """The zero between x1 and x2 (signs differ), to rounding (Chandrupatla 1997), and L there."""
     t = 0.5
@@ -125,7 +126,7 @@ def root(mode, level, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
     return x, response
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _keep(count, x, response, slope, xs, rs, ss):
     xs[count] = x
     rs[count] = response
@@ -133,7 +134,7 @@ def _keep(count, x, response, slope, xs, rs, ss):
     return count + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, exchanged):
     """Responses on a grid of angles, refined until log L is a cubic between neighbours; return the count.
 

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ._assemble import open_loops
+from ._compiled import kernel
 from ._figures import (
     DC_GAIN,
     FINAL,
@@ -29,7 +29,7 @@ CAPACITY = 1200
 SMOOTH = 0.05
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _grid(n, wr, wi, open_wr, open_wi, points):
     """Angles to start from: seven a decade, linear above, and around every lightly damped pole."""
     low = LOWEST
@@ -67,7 +67,7 @@ def _grid(n, wr, wi, open_wr, open_wi, points):
     return kept
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _closed_dc(n, h, b, c, system):
     """T at DC: c (I - A + b c)^-1 b by elimination with pivoting (h is A - I)."""
     for i in range(n):
@@ -97,7 +97,7 @@ def _closed_dc(n, h, b, c, system):
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _poles(n, a, b, c, closed, scratch, wr, wi):
     """Eigenvalues of a - closed * b c into wr, wi; the largest modulus (nan if the iteration fails)."""
     for i in range(n):
@@ -114,7 +114,7 @@ def _poles(n, a, b, c, closed, scratch, wr, wi):
     return radius
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _one_loop(n, a, b, c, time_figures, arrays, row):
     """Every figure of one open loop into its row."""
     points, stack, xs, rs, ss, work, state, exchanged, scratch, poles = arrays
@@ -149,7 +149,7 @@ def _one_loop(n, a, b, c, time_figures, arrays, row):
         step_figures(n, a, b, c, row)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def many_designs(kind, rows, first, last, size, time_figures, out):
     """Fill out[k, loop, :] for designs k in first to last; every design by itself, whatever the split."""
     space = np.zeros((8, size + 1, size + 1))

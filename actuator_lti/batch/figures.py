@@ -68,7 +68,7 @@ class LinearFigures:
 
     Definitions are those of `actuator_lti.stability_margins`, `actuator_lti.bandwidth` and
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
-    are NaN, its delay margin is 0.
+    are NaN, its delay margin is 0. Closed-loop figures of the position loop do not contain a feed-forward.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class LinearFigures:
 
     def _resonance_peak(self, loop: str) -> np.ndarray:
         ratio = self._column(loop, 5) / np.abs(self._column(loop, 9))
-        return self._where_stable(loop, 20.0 * np.log10(ratio))
+        return self._where_stable(loop, np.maximum(20.0 * np.log10(ratio), 0.0))
 
     def _bandwidth(self, loop: str) -> np.ndarray:
         return self._where_stable(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))

@@ -62,6 +62,8 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     """Value, distance to the limit and verdict of one requirement for every design."""
     names = source_columns(requirement, design)
     values = np.stack([columns[name] for name in names])
+    if requirement.quantity in ("gain_margin", "phase_margin"):
+        values = np.abs(values)  # a margin counts in either direction
     low = -np.inf if requirement.minimum is None else requirement.minimum
     high = np.inf if requirement.maximum is None else requirement.maximum
     with np.errstate(invalid="ignore"):

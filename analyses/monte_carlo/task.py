@@ -105,7 +105,7 @@ class SampleTask:
         drive = {"output_rate": f"{shown}/s", "motor_current": "A", "acceleration": f"{shown}/s^2"}
         units |= {drive_column(q, load): drive[q] for q, load in self._drive_wanted}
         if self.step is not None:
-            units |= step_units(self.step)
+            units |= step_units()
         return units
 
     def identity(self) -> dict[str, Any]:

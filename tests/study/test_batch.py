@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import (
+    assemble_loops,
+    closed_loop_bandwidth,
+    load_design,
+    stability_margins,
+    step_figures,
+)
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_values
 from actuator_lti.errors import InputError
@@ -57,6 +63,33 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
                     quantity.removesuffix("_db").removesuffix("_deg").removesuffix("_s"), loop
                 )
                 assert mine[k] == pytest.approx(getattr(truth, quantity), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
+    population = scattered(name, 5, seed=8)
+    figures = linear_figures(population)
+    for k in range(population.count):
+        changed = {path: float(array[k]) for path, array in population.values.items()}
+        loops = assemble_loops(with_values(population.design, changed))
+        for loop in figures.loops:
+            if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
+                continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
+            closed = getattr(loops, loop).closed_loop
+            width, step = closed_loop_bandwidth(closed), step_figures(closed)
+            pairs = {
+                "bandwidth": width.minus3db_hz,
+                "bandwidth_90deg": width.minus90deg_hz,
+                "overshoot": step.overshoot_percent,
+                "rise_time": step.rise_time_s,
+                "settling_time": step.settling_time_s,
+            }
+            for quantity, truth in pairs.items():
+                mine = figures.quantity(quantity, loop)[k]
+                expected = np.nan if truth is None else truth
+                assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)
+            peak = figures.quantity("resonance_peak", loop)[k]
+            assert peak == pytest.approx(width.resonance_peak_db, abs=1e-6)
 
 
 def test_an_unstable_loop_is_called_so_and_takes_no_delay():
