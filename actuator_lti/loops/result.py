@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from actuator_lti.plant import OperatingPoint, RotorState
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Loop:
     """A loop seen at one place, as python-control systems.
 
@@ -51,8 +51,13 @@ class Loop:
     unit_out: str
     periodic: bool = False
 
+    def __repr__(self) -> str:
+        kind = "continuous" if self.period_s is None else f"every {1e3 * self.period_s:g} ms"
+        periodic = ", fundamental of a periodic loop" if self.periodic else ""
+        return f"Loop({self.name}, broken at {self.break_point}, in {self.unit_in}, {kind}{periodic})"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Loops:
     """All loops of a design in one form at one operating point.
 
@@ -99,3 +104,8 @@ class Loops:
         """The loops that exist, innermost first, by name."""
         named = {"current": self.current, "velocity": self.velocity, "position": self.position}
         return {name: loop for name, loop in named.items() if loop is not None}
+
+    def __repr__(self) -> str:
+        names = ", ".join(self.present)
+        where = f"{self.operating_point}, {self.load_Nm:g} N m, rotor {self.rotor}"
+        return f"Loops({self.design.name}: {names}; {self.form}, {where})"

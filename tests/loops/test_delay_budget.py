@@ -12,7 +12,7 @@ from actuator_lti import InputError, assemble_loops, delay_budget
 from actuator_lti.design.model import Design
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(designs(), st.floats(0.01, 0.8))
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
     loops = assemble_loops(design)

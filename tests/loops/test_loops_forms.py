@@ -335,7 +335,7 @@ def test_stiffness_of_a_back_drivable_load() -> None:
     np.testing.assert_array_equal(held.open_loop.A, plain.open_loop.A)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(designs())
 def test_sensitivities_sum_to_one_in_every_form(design: Design) -> None:
     omega = np.geomspace(1, 0.9 * np.pi / (design.controller.position.every * 1e-4), 12)
@@ -366,3 +366,11 @@ def test_importing_the_package_is_cheap() -> None:
     code = "import sys, actuator_lti; print('control' in sys.modules, 'numpy' in sys.modules)"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.split() == ["False", "False"]
+
+
+def test_printing_says_what_it_is() -> None:
+    loops = assemble_loops(amber(2, 10))
+    assert repr(loops) == "Loops(amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)"
+    expected = "Loop(at u, broken at u, in V, every 0.1 ms, fundamental of a periodic loop)"
+    assert repr(loops.break_points["u"]) == expected
+    assert repr(assemble_loops(amber(), "ideal").velocity).endswith("in rad/s, continuous)")
