@@ -140,9 +140,9 @@ def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None 
     except DefusedXmlException:
         raise InputError("holds a DTD or an entity; allowed: plain XML", where=where) from None
     except ParseError as error:
-        raise InputError(f"not XML: {error}", where=where) from None
+        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
     except (ValueError, LookupError, RecursionError) as error:
-        raise InputError(f"not XML: {shown(str(error), 200)}", where=where) from None
+        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
     values = tuple(_objects_in(root, where))
     if not values:
         raise InputError("holds no CANopenObject with an actualValue", where=where)

@@ -15,6 +15,7 @@ from functools import lru_cache
 from math import isfinite
 from typing import Any
 
+from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
 
 _DEFINITIONS = """
@@ -32,7 +33,7 @@ second = [time] = s = sec
 kilogram = [mass] = kg
 ampere = [current] = A = amp
 radian = [angle] = rad
-percent = 0.01 = percent
+percent = 0.01
 gram = 1e-3 * kilogram = g
 inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
@@ -51,7 +52,7 @@ ohm = volt / ampere = Ω = Ohm
 henry = volt * second / ampere = H
 degree = 0.017453292519943295 * radian = deg
 turn = 6.283185307179586 * radian = rev = _ = revolution
-rpm = 0.10471975511965977 * radian / second = rpm
+rpm = 0.10471975511965977 * radian / second
 hertz = 6.283185307179586 * radian / second = Hz
 """
 
@@ -105,19 +106,19 @@ def _expression(unit: str) -> str:
     while position < len(text):
         match = _TOKEN.match(text, position)
         if match is None or len(parts) > 40:
-            raise ValueError(f'"{unit}" is not a unit')
+            raise ValueError(f"{shown(unit)} is not a unit")
         kind, token = str(match.lastgroup), match.group().strip()
         operand, ended = kind == "name" or token == "(", last in ("name", ")", "power")
         depth += {"(": 1, ")": -1}.get(token, 0)
         if depth < 0 or not (operand or ended) or (kind == "power" and last == "power"):
-            raise ValueError(f'"{unit}" is not a unit')
+            raise ValueError(f"{shown(unit)} is not a unit")
         if operand and ended:
             parts.append("*")
         parts.append(token.replace("^", "**"))
         last = token if kind == "sign" else kind
         position = match.end()
     if depth or last in ("*", "/", "("):
-        raise ValueError(f'"{unit}" is not a unit')
+        raise ValueError(f"{shown(unit)} is not a unit")
     return " ".join(parts)
 
 
@@ -224,7 +225,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     except (ValueError, OverflowError) as error:
         raise InputError(f"{error}; allowed: {example}") from None
     if not compatible(found, wanted):
-        missing = "has no unit" if not written else f'has the dimension of "{written}"'
+        missing = "has no unit" if not written else f"has the dimension of {shown(written)}"
         raise InputError(f"wrong dimension, {missing}; allowed: {example}")
     value = scaled(number, found.factor)
     if not isfinite(value):
