@@ -206,7 +206,7 @@ def _rational_falls(loop: RationalLoop, level: float) -> list[float]:
         d=loop.d / level,
         numerator=None if loop.numerator is None else loop.numerator / level,
     )
-    return gain_crossings(scaled, Circles(scaled, sorted_poles(loop.A, loop.sampled).values)).tolist()
+    return gain_crossings(scaled, Circles(scaled, sorted_poles(loop.A, loop.in_z).values)).tolist()
 
 
 def _first_turn(form: DelayForm, dc: float) -> float | None:

@@ -64,7 +64,7 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
         system = system.to_state_space()
     loop = rational_loop(system)
     x = flat if loop.period_s is None else flat * loop.period_s
-    if loop.sampled and (x > math.pi * (1.0 + 1e-12)).any():
+    if loop.in_z and (x > math.pi * (1.0 + 1e-12)).any():
         raise InputError(
             f"omega_rad_s: up to the Nyquist frequency {math.pi / (loop.period_s or 1.0):.6g} rad/s"
         )
@@ -74,8 +74,8 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
 def rational_phase(loop: RationalLoop, x: Real) -> Real:
     """Unwrapped phase of a rational loop in rad; x as in `RationalLoop`."""
     roots, p = zeros(loop), poles(loop)
-    at_dc = 1.0 + 0j if loop.sampled else 0j
-    border = [pole for pole in sorted_poles(loop.A, loop.sampled).border if pole.x == 0.0]
+    at_dc = 1.0 + 0j if loop.in_z else 0j
+    border = [pole for pole in sorted_poles(loop.A, loop.in_z).border if pole.x == 0.0]
     if border:  # a cluster of eigenvalues about the exact multiple pole
         nearest = np.argsort(np.abs(p - at_dc))[: border[0].multiplicity]
         p = p.copy()
@@ -83,10 +83,10 @@ def rational_phase(loop: RationalLoop, x: Real) -> Real:
     near = np.abs(np.concatenate((roots, p)) - at_dc)
     size = float(near.max()) if near.size else 1.0
     first = 1e-3 * float(
-        min(near[near > 1e-7 * size].min(initial=1.0 if loop.sampled else size or 1.0), 1e300)
+        min(near[near > 1e-7 * size].min(initial=1.0 if loop.in_z else size or 1.0), 1e300)
     )
     everywhere = np.append(x, first)
-    factors = factor_phase(roots, everywhere, loop.sampled) - factor_phase(p, everywhere, loop.sampled)
+    factors = factor_phase(roots, everywhere, loop.in_z) - factor_phase(p, everywhere, loop.in_z)
     exact = np.angle(loop.response(everywhere))
     sign = -np.pi if abs(_wrapped(exact[-1:] - factors[-1:])[0]) > 0.5 * np.pi else 0.0
     factors = factors + sign

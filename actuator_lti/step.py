@@ -91,7 +91,7 @@ def step_figures(system: Any) -> StepFigures:
             return _figures(time, response, final, _straight(time, response), None)
         system = system.to_state_space()
     loop = rational_loop(system)
-    poles = sorted_poles(loop.A, loop.sampled)
+    poles = sorted_poles(loop.A, loop.in_z)
     final = _final_value(loop, poles)
     if loop.period_s is not None:
         return _sampled(loop, poles, final, loop.period_s)
@@ -113,7 +113,7 @@ def _final_value(loop: RationalLoop, poles: SortedPoles) -> float:
     if not at_dc:
         final = float(loop.response(np.zeros(1))[0].real)
     else:  # allowed only where neither driven nor seen
-        away = np.abs(poles.values - 1.0) if loop.sampled else np.abs(poles.values)
+        away = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
         r = 1e-6 * float(np.sort(away)[1]) if away.size > 1 else 1e-6
         L = loop.response(np.array([r, 0.1 * r]))
         if abs(L[1]) > 2.0 * abs(L[0]):

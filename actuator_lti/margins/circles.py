@@ -21,17 +21,16 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 NEAR_AXIS = 0.1
 _DEGENERATE = 1e-9
-_MULTIPLIERS = np.array([1.0, 0.61, 1.57, 0.35, 2.9, 0.19, 5.3])
 
 
-def warped(x: Real, sampled: bool) -> Real:
+def warped(x: Real, in_z: bool) -> Real:
     """Frequency in the s-plane of the bilinear map: x itself, or tan(x/2) for a sampled loop."""
-    return np.tan(0.5 * x) if sampled else x
+    return np.tan(0.5 * x) if in_z else x
 
 
-def unwarped(w: Real, sampled: bool) -> Real:
+def unwarped(w: Real, in_z: bool) -> Real:
     """Inverse of `warped`."""
-    return 2.0 * np.arctan(w) if sampled else w
+    return 2.0 * np.arctan(w) if in_z else w
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def shifted(loop: RationalLoop, shift: float) -> ShiftedLoop:
     """Apply sigma = 1/(s - shift) to L(s) and L(-s)."""
     A, b, c, d = loop.A, loop.b, loop.c, loop.d
     eye = np.eye(loop.order)
-    if loop.sampled:
+    if loop.in_z:
         plus = np.linalg.inv((1.0 - shift) * A - (1.0 + shift) * eye)
         minus = np.linalg.inv((1.0 + shift) * A - (1.0 - shift) * eye)
         gain, scale_plus, scale_minus = np.sqrt(2.0), 1.0 - shift, 1.0 + shift
@@ -129,7 +128,7 @@ class Circles:
 
     def __init__(self, loop: RationalLoop, poles: Complex) -> None:
         self._loop = loop
-        self._shifts = _shifts(poles, loop.sampled)
+        self._shifts = _shifts(loop, poles)
         self._tried: list[ShiftedLoop] = []
 
     def _system(self, k: int) -> ShiftedLoop:
@@ -161,12 +160,25 @@ def on_axis(zeros: Complex) -> Complex:
     return near[near.imag.argsort()]
 
 
-def _shifts(poles: Complex, sampled: bool) -> Real:
-    if sampled:
+def _shifts(loop: RationalLoop, poles: Complex) -> Real:
+    """Shifts in order of merit: L(+-shift) not above one, far from the poles, near their mean frequency.
+
+    Where \|L(shift)\| were large, the one of \|L\| = 1 would be lost beside it in rounding.
+    """
+    if loop.in_z:
         poles = (poles - 1.0) / np.where(poles == -1.0, 1e-300, poles + 1.0)
     size = np.abs(poles)
-    usable = size[(size > 1e-12 * min(size.max(), 1e12)) & (size < 1e12)] if size.size else size
-    centre = float(np.exp(np.log(usable).mean())) if usable.size else 1.0
-    shifts = centre * _MULTIPLIERS
+    usable = size[(size > 1e-9 * min(size.max(), 1e9)) & (size < 1e9)]
+    logs = np.log(usable) if usable.size else np.zeros(1)
+    centre = float(logs.mean())
+    spread = float(logs.max()) - float(logs.min())
+    position = np.linspace(-0.5 * spread - 7.0, 0.5 * spread + 7.0, 23) + 0.077
+    shifts = np.exp(centre + position)
+    points = np.concatenate((shifts, -shifts)).astype(complex)
+    if loop.in_z:
+        points = (1.0 + points) / (1.0 - points)
+    with np.errstate(over="ignore", invalid="ignore"):
+        gain = np.log(np.maximum(np.abs(loop.at(points)), 1.0)).reshape(2, -1).max(axis=0)
     distance = np.abs(np.abs(poles.real)[:, None] + 1j * poles.imag[:, None] - shifts).min(axis=0) / shifts
-    return shifts[np.argsort(-np.minimum(distance, 0.25), kind="stable")]
+    cost = gain + 0.5 * np.abs(position) - 3.0 * np.log(np.minimum(distance, 0.2) + 1e-30)
+    return shifts[np.argsort(np.nan_to_num(cost, nan=1e9, posinf=1e9), kind="stable")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
@@ -15,6 +16,7 @@ TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve cou
 _POSSIBLE_TOUCH = 1e-3
 _NEWTON_STEP = 1e-9
 _NEWTON_STEPS = 8
+_NONE = np.empty(0, dtype=complex)
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,8 @@ class Crossings:
     real_x, real_L, real_touch : arrays
         The same for the real axis, positive side included.
     between_x, between_L : arrays
-        One point between any two neighbours of ``real_x`` and border poles, one before and one after.
+        Points in order, with at least one between any two neighbours of ``real_x`` and border poles, one
+        before and one after.
     """
 
     gain_x: Real
@@ -53,7 +56,7 @@ class _Candidates:
         return self.x.size
 
 
-def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical_x: float) -> Crossings:
+def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical_x: Real) -> Crossings:
     """Find every crossing of the unit circle and of the real axis with 0 < x < end.
 
     Parameters
@@ -62,8 +65,8 @@ def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical
         At least one state.
     border_x : array
         Poles on the border, 0 < x < end.
-    typical_x : float
-        A frequency to look at where there is no candidate at all.
+    typical_x : array
+        Further frequencies at which to look at the signs.
 
     Raises
     ------
@@ -74,60 +77,70 @@ def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical
     if gain_zeros is None:
         raise NumericalError("the gain of the loop is one at every frequency: it has no phase margin")
     real_zeros = circles.real_axis()
-    gain = _candidates(gain_zeros, border_x, loop.sampled, typical_x)
-    real = _candidates(
-        np.empty(0, dtype=complex) if real_zeros is None else real_zeros, border_x, loop.sampled, typical_x
-    )
-    L = loop.response(np.concatenate((gain.samples, real.samples)))
-    L_gain, L_real = L[: gain.samples.size], L[gain.samples.size :]
-    above, upper = np.abs(L_gain) > 1.0, L_real.imag > 0.0
-    if real_zeros is None:
-        upper = np.zeros(L_real.size, dtype=bool)
-    gain_hit = (above[1:] != above[:-1]) & ~gain.is_pole
-    real_hit = (upper[1:] != upper[:-1]) & ~real.is_pole
-    x, values = _polish(
-        loop,
-        np.concatenate((gain.x[gain_hit], real.x[real_hit])),
-        np.concatenate((gain.samples[:-1][gain_hit], real.samples[:-1][real_hit])),
-        np.concatenate((gain.samples[1:][gain_hit], real.samples[1:][real_hit])),
-        int(np.count_nonzero(gain_hit)),
-    )
-    k = int(np.count_nonzero(gain_hit))
-    gain_x, gain_L, gain_touch = _with_touches(loop, gain, gain_hit, x[:k], values[:k], True)
-    real_x, real_L, real_touch = _with_touches(loop, real, real_hit, x[k:], values[k:], False)
-    return Crossings(gain_x, gain_L, gain_touch, real_x, real_L, real_touch, real.samples, L_real)
+    gain = _candidates(gain_zeros, border_x, loop.in_z)
+    real = _candidates(_NONE if real_zeros is None else real_zeros, border_x, loop.in_z)
+    x = np.concatenate((gain.samples, real.samples, typical_x))
+    x.sort()
+    L = loop.response(x)
+    gain_hit = _changes(np.abs(L) > 1.0)
+    real_hit = np.zeros(x.size - 1, dtype=bool) if real_zeros is None else _changes(L.imag > 0.0)
+    if border_x.size:
+        at_pole = np.searchsorted(x, border_x) - 1
+        gain_hit[at_pole] = real_hit[at_pole] = False
+    gain_hit, real_hit = np.flatnonzero(gain_hit), np.flatnonzero(real_hit)
+    both = np.concatenate((gain_hit, real_hit))
+    k = gain_hit.size
+    start = np.concatenate((_start(gain, x, gain_hit), _start(real, x, real_hit)))
+    root, values = _polish(loop, start, x[both], x[both + 1], k)
+    gain_x, gain_L, gain_touch = _with_touches(loop, gain, root[:k], values[:k], True)
+    real_x, real_L, real_touch = _with_touches(loop, real, root[k:], values[k:], False)
+    return Crossings(gain_x, gain_L, gain_touch, real_x, real_L, real_touch, x, L)
 
 
 def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
-    """Only the crossings of the unit circle, 0 < x < end, points of touch left out; border poles allowed."""
+    """Only the crossings of the unit circle, 0 < x < end, points of touch left out; no border poles."""
     zeros = circles.circle(1.0, 0.0, -1.0)
     if zeros is None:
         return np.empty(0)
-    found = _candidates(zeros, np.empty(0), loop.sampled, 1.0)
-    above = np.abs(loop.response(found.samples)) > 1.0
-    hit = above[1:] != above[:-1]
-    k = int(np.count_nonzero(hit))
-    x, values = _polish(loop, found.x[hit], found.samples[:-1][hit], found.samples[1:][hit], k)
-    x, _, touch = _with_touches(loop, found, hit, x, values, True)
-    return x[~touch]
+    found = _candidates(zeros, np.empty(0), loop.in_z)
+    if not found.count:
+        return np.empty(0)
+    x = found.samples
+    hit = np.flatnonzero(_changes(np.abs(loop.response(x)) > 1.0))
+    root, values = _polish(loop, found.x[hit], x[hit], x[hit + 1], hit.size)
+    root, _, touch = _with_touches(loop, found, root, values, True)
+    return root[~touch]
 
 
-def _candidates(zeros: Complex, border_x: Real, sampled: bool, typical_x: float) -> _Candidates:
+def _changes(side: Mask) -> Mask:
+    return side[1:] != side[:-1]
+
+
+def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
+    """Where Newton starts in each interval [x[k], x[k + 1]]: its candidate, or its middle."""
+    low, high = x[hit], x[hit + 1]
+    if not found.count:
+        return np.sqrt(low * high)
+    k = np.minimum(np.searchsorted(found.x, low), found.count - 1)
+    at = found.x[k]
+    return np.where((at > low) & (at < high) & ~found.is_pole[k], at, np.sqrt(low * high))
+
+
+def _candidates(zeros: Complex, border_x: Real, in_z: bool) -> _Candidates:
     near = on_axis(zeros)
     w, touch = near.imag, np.abs(near.real) <= _POSSIBLE_TOUCH * near.imag
     pole = np.zeros(w.size, dtype=bool)
     if border_x.size:
-        w = np.concatenate((w, warped(border_x, sampled)))
+        w = np.concatenate((w, warped(border_x, in_z)))
         pole = np.concatenate((pole, np.ones(border_x.size, dtype=bool)))
         touch = np.concatenate((touch, np.zeros(border_x.size, dtype=bool)))
         order = w.argsort()
         w, pole, touch = w[order], pole[order], touch[order]
-    if not w.size:
-        return _Candidates(w, touch, pole, np.array([typical_x]))
-    samples = np.empty(w.size + 1)
-    samples[0], samples[-1] = 0.5 * w[0], 2.0 * w[-1]
-    samples[1:-1] = np.sqrt(w[:-1] * w[1:])
-    return _Candidates(unwarped(w, sampled), touch, pole, unwarped(samples, sampled))
+    samples = np.empty(w.size + 1 if w.size else 0)
+    if w.size:
+        samples[0], samples[-1] = 0.5 * w[0], 2.0 * w[-1]
+        samples[1:-1] = np.sqrt(w[:-1] * w[1:])
+    return _Candidates(unwarped(w, in_z), touch, pole, unwarped(samples, in_z))
 
 
 def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> tuple[Real, Complex]:
@@ -164,32 +177,34 @@ def _function(loop: RationalLoop, x: float, gain: bool) -> float:
 
 
 def _bracketed(loop: RationalLoop, low: float, high: float, gain: bool) -> float:
+    ends = _function(loop, low, gain), _function(loop, high, gain)
+    if ends[0] * ends[1] >= 0.0:  # the change of sign is within rounding: it is at the smaller one
+        return low if abs(ends[0]) < abs(ends[1]) else high
     root = brentq(lambda x: _function(loop, x, gain), low, high, xtol=1e-300, rtol=1e-15, maxiter=300)
     return float(root)
 
 
 def _with_touches(
-    loop: RationalLoop, found: _Candidates, hit: Mask, x: Real, L: Complex, gain: bool
+    loop: RationalLoop, found: _Candidates, x: Real, L: Complex, gain: bool
 ) -> tuple[Real, Complex, Mask]:
     """Add pairs of crossings that are too close for the samples, and points of touch."""
     flat = np.zeros(x.size, dtype=bool)
-    if not (found.possible_touch & ~hit).any():
+    if not found.possible_touch.any():
+        return x, L, flat
+    known = np.zeros(found.count, dtype=bool)
+    if x.size:
+        nearest = np.clip(np.searchsorted(x, found.x), 1, max(x.size - 1, 1))
+        pair = np.stack((x[nearest - 1], x[np.minimum(nearest, x.size - 1)]))
+        known = (np.abs(pair - found.x) <= 1e-6 * found.x).any(axis=0)
+    open_question = found.possible_touch & ~known
+    if not open_question.any():
         return x, L, flat
     more: list[float] = []
     touch: list[bool] = []
-    k = 0
-    while k < found.count:
-        if hit[k] or not found.possible_touch[k]:
-            k += 1
-            continue
-        first = k
-        while k + 1 < found.count and found.possible_touch[k + 1] and not hit[k + 1]:
-            k += 1
-        for low, high in zip(found.samples[first : k + 1], found.samples[first + 1 : k + 2], strict=True):
-            _near_touch(loop, float(low), float(high), gain, more, touch)
-        if k > first:
-            _near_touch(loop, float(found.samples[first]), float(found.samples[k + 1]), gain, more, touch)
-        k += 1
+    for k in np.flatnonzero(open_question):
+        _near_touch(loop, float(found.samples[k]), float(found.samples[k + 1]), gain, more, touch)
+        if k + 1 < found.count and open_question[k + 1]:
+            _near_touch(loop, float(found.samples[k]), float(found.samples[k + 2]), gain, more, touch)
     return _merged(loop, x, L, np.array(more), np.array(touch, dtype=bool))
 
 

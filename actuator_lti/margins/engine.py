@@ -23,7 +23,9 @@ def stability_margins(
         if system.delays_s.size or delay_s:
             return delayed_margins(delay_form(system, delay_s), band_rad_s)
         system = system.to_state_space()
-    loop = rational_loop(system)
     if delay_s:
-        return delayed_margins(from_rational(loop, delay_s), band_rad_s)
+        return delayed_margins(from_rational(rational_loop(system), delay_s), band_rad_s)
+    loop = rational_loop(system, warp=True)
+    if loop.period_s is not None and not loop.in_z and abs(1.0 + loop.d) <= 1e-9:
+        loop = rational_loop(system)  # a closed-loop pole at z = -1, at infinity of the s-plane
     return rational_margins(loop)

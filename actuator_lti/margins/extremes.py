@@ -93,7 +93,7 @@ def smallest(
         if not w.size:
             return value, best
         w = np.concatenate((w, np.sqrt(w[1:] * w[:-1])))
-        at = unwarped(w, loop.sampled)
+        at = unwarped(w, loop.in_z)
         lower, place = _refined(loop, criterion, at, loop.response(at), top)
         if lower >= value * (1.0 - _BELOW):
             return value, best

@@ -34,7 +34,7 @@ def poles(loop: RationalLoop) -> Complex:
     return eigenvalues(loop.A)
 
 
-def factor_phase(roots: Complex, x: Real, sampled: bool) -> Real:
+def factor_phase(roots: Complex, x: Real, in_z: bool) -> Real:
     """Sum of the phases of the factors (s - a) or (z - a), each continuous in x and zero at x = 0, rad.
 
     A factor of a root at zero frequency itself starts at 90 deg; a root on the border turns by 180 deg as
@@ -43,7 +43,7 @@ def factor_phase(roots: Complex, x: Real, sampled: bool) -> Real:
     if not roots.size:
         return np.zeros(x.shape)
     x = x[..., None]
-    if sampled:
+    if in_z:
         return _sampled_phase(roots, x)
     inside = roots.real <= 0.0
     at = np.where(

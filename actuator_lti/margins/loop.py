@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,10 +19,11 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class RationalLoop:
-    """L = d + c (x I - A)^-1 b with x = s or z, real and balanced.
+    """L = d + c (p I - A)^-1 b with p = s or z, real and balanced.
 
-    The argument of every response is ``x``: for a continuous loop the angular frequency in rad/s
-    (s = j x), for a sampled loop the angle in rad, 0 to pi (z = exp(j x)).
+    The argument of every response is ``x``: in the s-plane the angular frequency (s = j x), in the z-plane
+    the angle in rad, 0 to pi (z = exp(j x)). A sampled loop that was given by coefficients is held in the
+    s-plane of s = (z - 1)/(z + 1), to which its coefficients are brought exactly; x is tan(angle/2) then.
 
     Attributes
     ----------
@@ -29,6 +31,8 @@ class RationalLoop:
         State space, scaled by a diagonal similarity so that rows and columns weigh the same.
     period_s : float or None
         Sampling period, ``None`` for a continuous loop.
+    in_z : bool
+        Whether the matrices are those of the z-plane.
     numerator, denominator : array or None
         Coefficients, where the loop was given by them: they are then evaluated directly.
     """
@@ -38,6 +42,7 @@ class RationalLoop:
     c: Real
     d: float
     period_s: float | None
+    in_z: bool = False
     numerator: Real | None = None
     denominator: Real | None = None
 
@@ -47,13 +52,19 @@ class RationalLoop:
         return self.b.size
 
     @property
-    def sampled(self) -> bool:
-        """Whether x is the angle of z."""
-        return self.period_s is not None
+    def end(self) -> float:
+        """The end of the axis: infinity, or pi in the z-plane."""
+        return math.pi if self.in_z else math.inf
+
+    def frequency(self, x: float) -> float:
+        """Angular frequency in rad/s for x."""
+        if self.period_s is None:
+            return float(x)
+        return float(x if self.in_z else 2.0 * math.atan(x)) / self.period_s
 
     def point(self, x: Real) -> Complex:
         """Point of the border of stability: j x, or exp(j x)."""
-        return np.exp(1j * x) if self.sampled else 1j * x
+        return np.exp(1j * x) if self.in_z else 1j * x
 
     def at(self, points: Complex) -> Complex:
         """L at any complex points s or z, shape kept (1-D)."""
@@ -71,7 +82,7 @@ class RationalLoop:
     def response_and_slope(self, x: Real) -> tuple[Complex, Complex]:
         """L and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), from c (x I - A)^-2 b."""
         points = self.point(x)
-        turn = 1j * points if self.sampled else 1j
+        turn = 1j * points if self.in_z else 1j
         if self.numerator is not None and self.denominator is not None:
             num, den = self.numerator, self.denominator
             below = np.polyval(den, points)
@@ -98,7 +109,7 @@ class RationalLoop:
         third = np.linalg.solve(matrix, second)
         d_point, dd_point = -(second[..., 0] @ self.c), 2.0 * (third[..., 0] @ self.c)
         L = self.d + first[..., 0] @ self.c
-        if self.sampled:
+        if self.in_z:
             return L, 1j * points * d_point, -points * (d_point + points * dd_point)
         return L, 1j * d_point, -dd_point
 
@@ -111,8 +122,15 @@ class RationalLoop:
         return matrix
 
 
-def rational_loop(system: Any) -> RationalLoop:
+def rational_loop(system: Any, warp: bool = False) -> RationalLoop:
     """Bring a SISO python-control state space or transfer function into the form of the engine.
+
+    Parameters
+    ----------
+    system : StateSpace or TransferFunction
+        One input, one output.
+    warp : bool
+        Hold a sampled transfer function in the s-plane of s = (z - 1)/(z + 1), where it has no pole at z = -1.
 
     Raises
     ------
@@ -127,7 +145,7 @@ def rational_loop(system: Any) -> RationalLoop:
     if hasattr(system, "num"):
         num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
         den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
-        return from_coefficients(num, den, period_s)
+        return from_coefficients(num, den, period_s, warp)
     A = np.asarray(system.A, dtype=float)
     b = np.asarray(system.B, dtype=float)[:, 0]
     c = np.asarray(system.C, dtype=float)[0]
@@ -143,10 +161,10 @@ def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -
         raise InputError("the loop holds a value that is not finite")
     if n:
         whole = _balanced(whole)
-    return RationalLoop(whole[:n, :n], whole[:n, n], whole[n, :n], d, period_s)
+    return RationalLoop(whole[:n, :n], whole[:n, n], whole[n, :n], d, period_s, period_s is not None)
 
 
-def from_coefficients(num: Real, den: Real, period_s: float | None) -> RationalLoop:
+def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool = False) -> RationalLoop:
     """Companion form of num/den (highest power first), which is exact, then balanced."""
     if not den.size:
         raise InputError("the denominator of the loop is zero")
@@ -156,6 +174,11 @@ def from_coefficients(num: Real, den: Real, period_s: float | None) -> RationalL
             "it needs at least as many poles as zeros"
         )
     n = den.size - 1
+    if warp and period_s is not None and n and np.isfinite(num).all() and np.isfinite(den).all():
+        warped_den = warped_coefficients(den, n)
+        if warped_den[0]:
+            loop = from_coefficients(warped_coefficients(num, n), warped_den, None)
+            return replace(loop, period_s=period_s)
     above = np.zeros(n + 1)
     above[n + 1 - num.size :] = num / den[0]
     below = den / den[0]
@@ -167,7 +190,27 @@ def from_coefficients(num: Real, den: Real, period_s: float | None) -> RationalL
     b[:1] = 1.0
     d = float(above[0])
     loop = from_matrices(A, b, above[1:] - d * below[1:], d, period_s)
-    return RationalLoop(loop.A, loop.b, loop.c, d, period_s, above, below)
+    return replace(loop, numerator=above, denominator=below)
+
+
+def warped_coefficients(p: Real, degree: int) -> Real:
+    """Coefficients of (1 - s)^degree p((1 + s)/(1 - s)), computed exactly and rounded once.
+
+    Poles and zeros near z = 1, where those of a fast sampled loop crowd, keep their relative accuracy.
+    """
+    ratios = [float(c).as_integer_ratio() for c in p]
+    common = max(below for _, below in ratios)
+    total, power = [0], [1]  # lowest power first
+    for k in range(degree + 1):  # Horner in z, homogeneous: total (1 + s) + coefficient (1 - s)^k
+        at = k - (degree + 1 - len(ratios))
+        total = [a + b for a, b in zip([*total, 0], [0, *total], strict=True)]
+        if at >= 0:
+            coefficient = ratios[at][0] * (common // ratios[at][1])
+            total = total[: k + 1] if k + 1 < len(total) else total + [0] * (k + 1 - len(total))
+            total = [a + coefficient * b for a, b in zip(total, power, strict=True)]
+        power = [a - b for a, b in zip([*power, 0], [0, *power], strict=True)]
+    total = (total + [0] * (degree + 1))[: degree + 1]
+    return np.array([c / common for c in reversed(total)])
 
 
 def _balanced(whole: Real) -> Real:

@@ -34,7 +34,7 @@ def nyquist_count(
     L_dc, L_end : complex
         L at the ends of the axis, where it has no pole there.
     """
-    end = np.pi if loop.sampled else np.inf
+    end = loop.end
     inner = [pole for pole in poles.border if 0.0 < pole.x < end]
     stops: list[tuple[float, complex, BorderPole | None]] = [
         (float(x), 1.0 + complex(L), None) for x, L in zip(found.between_x, found.between_L, strict=True)
@@ -79,7 +79,7 @@ def _start(
         return 0.0, 1.0 + L_dc.real
     r = 1e-2 * first[0]
     while r > _SMALLEST * first[0]:
-        real_point = np.array([np.exp(r) if loop.sampled else r + 0j], dtype=complex)
+        real_point = np.array([np.exp(r) if loop.in_z else r + 0j], dtype=complex)
         on_real, on_axis = complex(loop.at(real_point)[0]), complex(loop.response(np.array([r]))[0])
         if min(abs(on_real), abs(on_axis)) > _FAR:
             return _arc(1.0 + on_real.real, 1.0 + on_axis, -0.5 * np.pi * order), 1.0 + on_axis

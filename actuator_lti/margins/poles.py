@@ -54,55 +54,60 @@ def eigenvalues(A: Real) -> Complex:
     return re + 1j * im
 
 
-def sorted_poles(A: Real, sampled: bool) -> SortedPoles:
+def sorted_poles(A: Real, in_z: bool) -> SortedPoles:
     """Sort the eigenvalues of A (balanced) by the border of stability.
 
     An eigenvalue is on the border where its distance is below its own error bound,
-    10 n eps norm(A) / |v* w| with the left and right eigenvectors v and w.
+    10 n eps (|v|* |A| |w|) / |v* w| with the left and right eigenvectors v and w, entry by entry.
     """
     values = eigenvalues(A)
     if not values.size:
         return SortedPoles(values, 0, ())
-    distance = np.abs(values) - 1.0 if sampled else values.real
-    scale = max(float(np.abs(A).max()), _EPS) if not sampled else 1.0
+    distance = np.abs(values) - 1.0 if in_z else values.real
+    scale = max(float(np.abs(A).max()), _EPS) if not in_z else 1.0
     suspicious = np.abs(distance) <= _SUSPICIOUS * scale
     if not suspicious.any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)), ())
-    exact = (values == 1.0) if sampled else (values == 0.0)
+    exact = (values == 1.0) if in_z else (values == 0.0)
     if (exact == suspicious).all():
         on_border, radius = exact, np.zeros(values.size)
     else:
         values, radius = _with_error_bounds(A)
-        distance = np.abs(values) - 1.0 if sampled else values.real
+        distance = np.abs(values) - 1.0 if in_z else values.real
         on_border = np.abs(distance) <= radius
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     return SortedPoles(
-        values, unstable, _clusters(values, radius, on_border, sampled), int(np.count_nonzero(on_border))
+        values, unstable, _clusters(values, radius, on_border, in_z), int(np.count_nonzero(on_border))
     )
 
 
 def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
-    re, im, vl, vr, info = dgeev(A, compute_vl=1, compute_vr=1)
+    """Eigenvalues sharpened by a Rayleigh quotient v* A w / v* w, and their bounds from v* abs(A) w."""
+    re, im, left, right, info = dgeev(A, compute_vl=1, compute_vr=1)
     if info:
         raise NumericalError("the poles did not converge: rescale the states of the loop")
-    n = re.size
-    overlap = np.empty(n)
-    for k in range(n):
-        if im[k] > 0.0:
-            left, right = vl[:, k] + 1j * vl[:, k + 1], vr[:, k] + 1j * vr[:, k + 1]
-            overlap[k] = overlap[k + 1] = abs(np.vdot(left, right))
-        elif im[k] == 0.0:
-            overlap[k] = abs(float(vl[:, k] @ vr[:, k]))
+    V, W = _complex_vectors(left, im), _complex_vectors(right, im)
+    overlap = (V.conj() * W).sum(axis=0)
+    weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=0)
     values = re + 1j * im
-    norm = float(np.abs(A).sum(axis=1).max())
-    with np.errstate(divide="ignore"):
-        radius = 10.0 * n * _EPS * norm / overlap
-    return values, np.minimum(radius, 1e-4 * norm)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = 10.0 * re.size * _EPS * weight / np.abs(overlap)
+        sharper = (V.conj() * (A @ W)).sum(axis=0) / overlap
+    good = np.abs(sharper - values) <= np.minimum(10.0 * radius, 1e-3 * np.abs(values))
+    return np.where(good, sharper, values), np.minimum(radius, 1e-4 * np.abs(A).sum(axis=1).max())
 
 
-def _clusters(values: Complex, radius: Real, on_border: Mask, sampled: bool) -> tuple[BorderPole, ...]:
+def _complex_vectors(packed: Real, im: Real) -> Complex:
+    out = packed.astype(complex)
+    for k in np.flatnonzero(im > 0.0):
+        out[:, k] = packed[:, k] + 1j * packed[:, k + 1]
+        out[:, k + 1] = out[:, k].conj()
+    return out
+
+
+def _clusters(values: Complex, radius: Real, on_border: Mask, in_z: bool) -> tuple[BorderPole, ...]:
     """Group the border poles of the upper half plane; a group at 0 or pi keeps all of its members."""
-    x = np.abs(np.angle(values[on_border])) if sampled else np.abs(values[on_border].imag)
+    x = np.abs(np.angle(values[on_border])) if in_z else np.abs(values[on_border].imag)
     r = radius[on_border]
     order = np.argsort(x)
     groups: list[list[int]] = []
@@ -116,7 +121,7 @@ def _clusters(values: Complex, radius: Real, on_border: Mask, sampled: bool) -> 
         centre, width = float(np.mean(x[group])), float(np.max(r[group]))
         if centre <= 2.0 * width:
             out.append(BorderPole(0.0, len(group)))
-        elif sampled and np.pi - centre <= 2.0 * width + 4.0 * _EPS:
+        elif in_z and np.pi - centre <= 2.0 * width + 4.0 * _EPS:
             out.append(BorderPole(float(np.pi), len(group)))
         else:
             out.append(BorderPole(centre, max(len(group) // 2, 1)))

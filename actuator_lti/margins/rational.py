@@ -28,6 +28,9 @@ _HIDDEN = (
     "one mode at zero frequency that the loop neither drives nor sees is left out (it is no instability)"
 )
 
+_BELOW = np.array([0.01, 0.05, 0.2, 0.5])
+_ABOVE = np.array([2.0, 5.0, 20.0, 100.0])
+
 
 @dataclass(frozen=True)
 class Ends:
@@ -56,12 +59,12 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     if not loop.order or not loop.b.any() or not loop.c.any():
         return _constant(loop)
-    poles = sorted_poles(loop.A, loop.sampled)
-    closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.sampled)
-    end_x = math.pi if loop.sampled else math.inf
+    poles = sorted_poles(loop.A, loop.in_z)
+    closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
+    end_x = loop.end
     inner = np.array([pole.x for pole in poles.border if 0.0 < pole.x < end_x])
     circles = Circles(loop, poles.values)
-    found = find_crossings(loop, circles, inner, _typical(poles, loop.sampled))
+    found = find_crossings(loop, circles, inner, _typical(poles, loop.in_z))
     ends = _ends(loop, poles, found)
     count = nyquist_count(loop, found, poles, ends.dc_order, ends.dc or 0j, ends.end or 0j)
     border = closed.border_count - ends.hidden
@@ -84,20 +87,20 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     """Smallest value of a criterion over the whole axis, ends included, and where (x of `RationalLoop`)."""
     if not loop.order:
         return float(criterion.distance(np.array([loop.d + 0j]))[0]), 0.0
-    poles = sorted_poles(loop.A, loop.sampled)
-    end_x = math.pi if loop.sampled else math.inf
-    size = np.abs(np.angle(poles.values)) if loop.sampled else np.abs(poles.values)
+    poles = sorted_poles(loop.A, loop.in_z)
+    end_x = loop.end
+    size = np.abs(np.angle(poles.values)) if loop.in_z else np.abs(poles.values)
     around = size[(size > 1e-9 * size.max()) & (size < end_x)] if size.size else size
     x = np.concatenate((around * 0.7, np.minimum(around * 1.4, 0.5 * (around + min(end_x, 1e300)))))
     L = loop.response(x)
-    x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.sampled else loop.d)
+    x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
     if not any(pole.x == 0.0 for pole in poles.border):
         x, L = np.append(x, 0.0), np.append(L, loop.response(np.zeros(1)))
     return smallest(loop, Circles(loop, poles.values), criterion, x, L, end_x)
 
 
 def _constant(loop: RationalLoop) -> StabilityMargins:
-    poles = sorted_poles(loop.A, loop.sampled)
+    poles = sorted_poles(loop.A, loop.in_z)
     stable = not poles.unstable and not poles.border_count
     agreement = Agreement(poles.unstable, poles.unstable, poles.border_count)
     gains = (GainMargin(-1.0 / loop.d, 0.0),) if loop.d < 0.0 else ()
@@ -117,7 +120,6 @@ def _assembled(
     notes: tuple[str, ...],
 ) -> StabilityMargins:
     T = loop.period_s
-    unit = 1.0 if T is None else 1.0 / T
     band = (0.0, math.inf if T is None else math.pi / T)
     way = "Hamiltonian matrix" if T is None else "symplectic pencil"
     method = f"eigenvalues of a {way}, polished by Newton; no grid"
@@ -135,8 +137,8 @@ def _assembled(
         phase_margins=phase_margins,
         delay_margins=delay_margins(phase_margins, T),
         modulus_margin=modulus[0],
-        modulus_frequency_rad_s=modulus[1] * unit,
-        disk_margin=DiskMargin(disk[0], disk[1] * unit),
+        modulus_frequency_rad_s=loop.frequency(modulus[1]),
+        disk_margin=DiskMargin(disk[0], loop.frequency(disk[1])),
         period_s=T,
         delay_s=0.0,
         band_rad_s=band,
@@ -171,38 +173,39 @@ def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None
 
 
 def _gain_margins(loop: RationalLoop, found: Crossings, ends: Ends) -> tuple[GainMargin, ...]:
-    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
     out = []
     if ends.dc is not None and ends.dc.real < 0.0:
         out.append(GainMargin(-1.0 / ends.dc.real, 0.0))
     for x, L, touch in zip(found.real_x, found.real_L, found.real_touch, strict=True):
         if L.real < 0.0:
-            out.append(GainMargin(float(1.0 / abs(L)), float(x) * unit, bool(touch)))
+            out.append(GainMargin(float(1.0 / abs(L)), loop.frequency(x), bool(touch)))
     if ends.end is not None and ends.end.real < 0.0:
-        out.append(GainMargin(-1.0 / ends.end.real, math.pi * unit if loop.sampled else math.inf))
+        out.append(GainMargin(-1.0 / ends.end.real, loop.frequency(loop.end)))
     return tuple(out)
 
 
 def _phase_margins(loop: RationalLoop, found: Crossings) -> tuple[PhaseMargin, ...]:
-    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
     margins = np.degrees(np.angle(-found.gain_L))
     return tuple(
-        PhaseMargin(float(deg) if deg > -180.0 else 180.0, float(x) * unit, bool(touch))
+        PhaseMargin(float(deg) if deg > -180.0 else 180.0, loop.frequency(x), bool(touch))
         for deg, x, touch in zip(margins, found.gain_x, found.gain_touch, strict=True)
     )
 
 
-def _typical(poles: SortedPoles, sampled: bool) -> float:
-    if sampled:
-        return 0.5
-    size = np.abs(poles.values)
-    size = size[size > 0.0]
-    return float(np.exp(np.log(size).mean())) if size.size else 1.0
+def _typical(poles: SortedPoles, in_z: bool) -> Real:
+    """Frequencies at which to look at the signs besides: about every pole, and a decade to both sides."""
+    size = np.abs(np.angle(poles.values)) if in_z else np.abs(poles.values)
+    size = size[(size > 1e-9 * size.max()) & (size < 3.1)] if in_z else size[size > 1e-9 * size.max()]
+    if not size.size:
+        return np.array([0.1, 0.3, 1.0, 3.0])
+    low, high = float(size.min()), float(size.max())
+    x = np.concatenate((size * 1.03, low * _BELOW, high * _ABOVE))
+    return x[x < math.pi] if in_z else x
 
 
 def _ends(loop: RationalLoop, poles: SortedPoles, found: Crossings) -> Ends:
     at_dc = sum(pole.multiplicity for pole in poles.border if pole.x == 0.0)
-    at_pi = sum(pole.multiplicity for pole in poles.border if loop.sampled and pole.x == math.pi)
+    at_pi = sum(pole.multiplicity for pole in poles.border if loop.in_z and pole.x == math.pi)
     dc, order = None, 0
     if at_dc:
         order, value = _order_at_dc(loop, poles, float(found.between_x[0]))
@@ -213,13 +216,13 @@ def _ends(loop: RationalLoop, poles: SortedPoles, found: Crossings) -> Ends:
         raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
     end = None
     if not at_pi:
-        end = complex(loop.response(np.array([math.pi]))[0].real) if loop.sampled else complex(loop.d)
+        end = complex(loop.response(np.array([math.pi]))[0].real) if loop.in_z else complex(loop.d)
     return Ends(dc, end, order, at_pi, at_dc - order)
 
 
 def _order_at_dc(loop: RationalLoop, poles: SortedPoles, first_x: float) -> tuple[int, complex]:
     """Multiplicity of the pole at zero frequency that L shows, from the slope of its gain."""
-    distance = np.abs(poles.values - 1.0) if loop.sampled else np.abs(poles.values)
+    distance = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
     away = distance[distance > 1e-4 * distance.max()]
     r = 1e-3 * min(first_x, float(away.min()) if away.size else first_x)
     for _ in range(12):
@@ -234,14 +237,14 @@ def _order_at_dc(loop: RationalLoop, poles: SortedPoles, first_x: float) -> tupl
 def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: Ends) -> tuple[Real, Complex]:
     """Where to look for the smallest distance first: crossings, and the resonances of the closed loop."""
     values = closed.values
-    own = np.abs(np.angle(values)) if loop.sampled else np.abs(values)
+    own = np.abs(np.angle(values)) if loop.in_z else np.abs(values)
     own = own[
-        (values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.sampled else own > 0.0)
+        (values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.in_z else own > 0.0)
     ]
     x = np.concatenate((found.gain_x, found.real_x, found.between_x, own))
     L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own)))
     if ends.dc is not None:
         x, L = np.append(x, 0.0), np.append(L, ends.dc)
     if ends.end is not None:
-        x, L = np.append(x, math.pi if loop.sampled else math.inf), np.append(L, ends.end)
+        x, L = np.append(x, loop.end), np.append(L, ends.end)
     return x, L
