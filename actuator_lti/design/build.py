@@ -94,10 +94,16 @@ class Builder:
         return kind(**values)
 
     def name(self, path: str, name: str) -> str:
-        """A name that may stand in dotted keys and file names."""
+        """A name that may stand in dotted keys."""
         if not _NAME.match(name):
             raise self.refuse(path, name, "allowed: 1 to 64 letters, digits, - and _, no dot or space")
         return name
+
+    def label(self, path: str, text: str) -> str:
+        """A free text that names something; only reports show it."""
+        if not text.strip():
+            raise self.refuse(path, text, "allowed: a text")
+        return text
 
     def gears(self) -> tuple[model.Gear, ...]:
         """All reduction stages, motor side first."""
@@ -126,7 +132,7 @@ class Builder:
 
     def requirement(self, raw: Any) -> model.Requirement:
         """One requirement, its limits in the unit in which its quantity is reported."""
-        path = f"requirement.{self.name('requirement.id', raw.id)}"
+        path = f"requirement.{shown(self.label('requirement.id', raw.id))[1:-1]}"
         quantity = QUANTITIES.get(raw.quantity)
         if quantity is None:
             hint = nearest(raw.quantity, tuple(QUANTITIES)).strip()
@@ -188,7 +194,7 @@ class Builder:
             "validation": self.validation(),
         }
         return model.Design(
-            name=self.name("design.name", head.name),
+            name=self.label("design.name", head.name),
             title=head.title or head.name,
             axis=self.structure.axis,
             revision=head.revision or "",

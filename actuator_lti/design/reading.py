@@ -95,20 +95,21 @@ def _walk(tree: dict[str, Any], where: str) -> None:
             raise InputError(f"more values than allowed: at most {MAX_VALUES}", where=where)
         if isinstance(value, dict):
             for key, item in value.items():
-                _check_string(key, f"a key of {path or 'the file'}", where)
+                _check_string(key, f"a key of {path or 'the file'}", where, ("Cc", "Cf", "Cs"))
                 stack.append((f"{path}.{key}" if path else key, item, depth + 1))
         elif isinstance(value, list):
             stack.extend((f"{path}[{i + 1}]", item, depth + 1) for i, item in enumerate(value))
         elif isinstance(value, str):
-            _check_string(value, path, where)
+            _check_string(value, path, where, ("Cc", "Cs"))
 
 
-def _check_string(text: str, path: str, where: str) -> None:
+def _check_string(text: str, path: str, where: str, refused: tuple[str, ...]) -> None:
+    """Refuse a long text, and characters of some Unicode categories; line break and tab may stand."""
     path = shown(path)[1:-1]
     if len(text) > MAX_STRING:
         raise InputError(f"{path}: {len(text)} characters; allowed: at most {MAX_STRING}", where=where)
     for character in text:
-        if unicodedata.category(character) in ("Cc", "Cf", "Cs") and character not in "\n\t":
+        if unicodedata.category(character) in refused and character not in "\n\t":
             raise InputError(
                 f"{path} = {shown(text)}: holds the control character U+{ord(character):04X}; "
                 "allowed: printable text",
