@@ -163,8 +163,6 @@ def run_rows(
     progress: Progress | None = None,
 ) -> BatchResult:
     """Run parameter rows, shape (n, layout.SIZE); see the module's text."""
-    from nonlinear._kernels.run import run_rows as kernel
-
     rows = np.ascontiguousarray(rows, dtype=float)
     series = np.zeros(1) if tables is None else np.ascontiguousarray(tables, dtype=float)
     n = rows.shape[0]
@@ -172,7 +170,7 @@ def run_rows(
     spans = _spans(rows[:, at.TICKS], available_threads() if threads is None else threads)
     done = 0
     with ThreadPoolExecutor(max_workers=max(1, threads or available_threads())) as pool:
-        waiting = [pool.submit(kernel, rows, series, a, b, outs, statuses) for a, b in spans]
+        waiting = [pool.submit(_run_span, rows, series, a, b, outs, statuses) for a, b in spans]
         sizes = {future: b - a for future, (a, b) in zip(waiting, spans, strict=True)}
         try:
             for future in as_completed(waiting):
@@ -185,6 +183,17 @@ def run_rows(
                 future.cancel()
             raise
     return BatchResult(rows=rows, outs=outs, status=statuses)
+
+
+def _run_span(
+    rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray
+) -> None:
+    """Run rows start to stop in this thread; the kernel runs without the GIL."""
+    from nonlinear._kernels.run import run
+
+    history, flags, shared = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(2)
+    for r in range(start, stop):
+        statuses[r] = run(rows[r], tables, history, flags, outs[r], shared)
 
 
 def available_threads() -> int:

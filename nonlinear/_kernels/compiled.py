@@ -27,7 +27,24 @@ def source_stamp() -> str:
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call: without the GIL, arithmetic as written (no fastmath), cached on disk."""
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    return _stamped(numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=True)(function))
+
+
+def scalar(function: Callable[..., Any]) -> Any:
+    """The same for a function that makes no arrays.
+
+    It needs no reference counts, whose atomic operations would cost more than its arithmetic.
+    """
+    return _stamped(numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """The same for a small function of the tick loop: its code is copied into its callers."""
+    options = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}
+    return _stamped(numba.njit(**options)(function))
+
+
+def _stamped(dispatcher: Any) -> Any:
     cache_file: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(cache_file, "_source_stamp"):
         cache_file._source_stamp = source_stamp()

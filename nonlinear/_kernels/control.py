@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import inlined, scalar
 
 
-@kernel
+@inlined
 def clamp(value, limit):  # type: ignore[no-untyped-def]
     """Value held within +-limit."""
     return min(max(value, -limit), limit)
 
 
-@kernel
+@inlined
 def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
     """PI with conditional integration: output, new integral, and whether the limit acts.
 
@@ -31,14 +31,14 @@ def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
     return clamp(gain * e + integral, limit), integral, True
 
 
-@kernel
+@inlined
 def measured_angle(p, th):  # type: ignore[no-untyped-def]
     """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
     scale = p[layout.COUNTS_PER_RAD]
     return math.floor(th * scale) / scale if scale > 0.0 else th
 
 
-@kernel
+@inlined
 def measured_speed(p, th, w, angles, place, filtered, period):  # type: ignore[no-untyped-def]
     """Speed as the velocity controller sees it (also the filter's state); ``angles`` is a ring of m."""
     x = w
@@ -49,7 +49,7 @@ def measured_speed(p, th, w, angles, place, filtered, period):  # type: ignore[n
     return filtered + p[layout.FILTER_COEFFICIENT] * (x - filtered)
 
 
-@kernel
+@scalar
 def count_limits(flags, k, out):  # type: ignore[no-untyped-def]
     """Count the ticks in which each limiter acts, and note the first."""
     for j in range(4):

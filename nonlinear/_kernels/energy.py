@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.modal import M11, M12, M21, M22, slip_at
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -19,7 +19,7 @@ NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 E = layout.OUT_ENERGY
 
 
-@kernel
+@scalar
 def energy_slip(p, modal, at, reverse, t, s, i, w, u, T, Tb, out):  # type: ignore[no-untyped-def]
     """Add the energies of slipping for t in direction s from (i, w)."""
     rate = abs(modal[at + M11]) + abs(modal[at + M22]) + math.sqrt(abs(modal[at + M12] * modal[at + M21]))
@@ -50,7 +50,7 @@ def energy_slip(p, modal, at, reverse, t, s, i, w, u, T, Tb, out):  # type: igno
     out[E + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
 
 
-@kernel
+@scalar
 def energy_stick(p, t, i, u, out):  # type: ignore[no-untyped-def]
     """Add the energies of a locked rotor over t: i = i1 + (i0 - i1) exp(-R t/L)."""
     if p[layout.SOURCE] > 0.0 or t <= 0.0:
@@ -65,7 +65,7 @@ def energy_stick(p, t, i, u, out):  # type: ignore[no-untyped-def]
     out[E + layout.ENERGY_COPPER] += R * (final * final * t + 2.0 * final * d * one + d * d * two)
 
 
-@kernel
+@scalar
 def energy_tanh(p, h, i0, w0, i1, w1, u, Tb, f0, f1, angle, out):  # type: ignore[no-untyped-def]
     """Add the energies of a short step by Simpson's rule with a cubic middle point (fourth order)."""
     kM, J, kE = p[layout.TORQUE_CONSTANT], p[layout.INERTIA], p[layout.BACK_EMF]

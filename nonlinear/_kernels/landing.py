@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.modal import COMPLEX, KIND, ROOT, derivative, first_extremum, slip_at
 
 NONE_IN_SEGMENT = -1.0
@@ -12,7 +12,7 @@ NEVER_LEFT = -2.0
 ITERATIONS = 200
 
 
-@kernel
+@scalar
 def first_landing(p, modal, at, reverse, s, i, w, th, u, T, dt):  # type: ignore[no-untyped-def]
     """First time in (0, dt] at which s w falls to zero.
 
@@ -36,7 +36,7 @@ def first_landing(p, modal, at, reverse, s, i, w, th, u, T, dt):  # type: ignore
         end = min(first_extremum(p, modal, at, i, w, u, T, begin + gap), dt)
 
 
-@kernel
+@scalar
 def refine(p, modal, at, reverse, s, i, w, th, u, T, begin, end):  # type: ignore[no-untyped-def]
     """Root of w in a bracket where s w falls through zero once: Newton inside bisection."""
     low, high = begin, end

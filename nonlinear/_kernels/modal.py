@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import kernel, scalar
 from nonlinear._kernels.expm import exponential, plant
 
 REAL, COMPLEX, SINGLE = range(3)
@@ -22,22 +22,25 @@ KIND, CLOSE, MEAN, ROOT, M11, M12, M21, M22, MODAL = range(9)
 NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
 
 
-@kernel
+@scalar
 def describe(p, reverse, out, at):  # type: ignore[no-untyped-def]
     """Write kind, mean and half difference of the eigenvalues and A at ``out[at]``."""
-    a = plant(p, reverse, 5)
-    mean = 0.5 * (a[0, 0] + a[1, 1])
-    half = 0.5 * (a[0, 0] - a[1, 1])
-    d = half * half + a[0, 1] * a[1, 0]
+    J, L = p[layout.INERTIA], p[layout.INDUCTANCE]
+    source = p[layout.SOURCE] > 0.0
+    a11, a12 = (0.0, 0.0) if source else (-p[layout.RESISTANCE] / L, -p[layout.BACK_EMF] / L)
+    a21 = 0.0 if source else p[layout.TORQUE_CONSTANT] / J
+    a22 = -(p[layout.VISCOUS_REVERSE] if reverse else p[layout.VISCOUS]) / J
+    mean, half = 0.5 * (a11 + a22), 0.5 * (a11 - a22)
+    d = half * half + a12 * a21
     root = math.sqrt(abs(d))
-    out[at + KIND] = SINGLE if p[layout.SOURCE] > 0.0 else (COMPLEX if d < 0.0 else REAL)
+    out[at + KIND] = SINGLE if source else (COMPLEX if d < 0.0 else REAL)
     out[at + CLOSE] = 1.0 if root < NEARLY_DOUBLE * abs(mean) else 0.0
     out[at + MEAN], out[at + ROOT] = mean, root
-    out[at + M11], out[at + M12] = a[0, 0], a[0, 1]
-    out[at + M21], out[at + M22] = a[1, 0], a[1, 1]
+    out[at + M11], out[at + M12] = a11, a12
+    out[at + M21], out[at + M22] = a21, a22
 
 
-@kernel
+@scalar
 def phi12(x):  # type: ignore[no-untyped-def]
     """(exp(x) - 1)/x and (exp(x) - 1 - x)/x^2."""
     if abs(x) < 0.5:
@@ -50,26 +53,27 @@ def phi12(x):  # type: ignore[no-untyped-def]
     return first, (first - 1.0) / x
 
 
-@kernel
+@scalar
 def phi12_complex(x, y):  # type: ignore[no-untyped-def]
-    """The same for x + j y; returns the two real and imaginary parts."""
-    z = complex(x, y)
-    if abs(z) < 0.5:
-        total, term = complex(0.5, 0.0), complex(0.5, 0.0)
+    """The same for z = x + j y; returns the two real and imaginary parts."""
+    size = x * x + y * y
+    if size < 0.25:
+        re, im, term_re, term_im = 0.5, 0.0, 0.5, 0.0
         for j in range(3, 18):
-            term = term * z / j
-            total += term
-        first, second = 1.0 + z * total, total
-    else:
-        half = math.sin(0.5 * y)
-        grown = math.exp(x)
-        difference = complex(math.expm1(x) * math.cos(y) - 2.0 * half * half, grown * math.sin(y))
-        first = difference / z
-        second = (first - 1.0) / z
-    return first.real, first.imag, second.real, second.imag
+            term_re, term_im = (term_re * x - term_im * y) / j, (term_re * y + term_im * x) / j
+            re += term_re
+            im += term_im
+        return 1.0 + x * re - y * im, x * im + y * re, re, im
+    half = math.sin(0.5 * y)
+    # exp(z) - 1, then divided by z twice
+    re = math.expm1(x) * math.cos(y) - 2.0 * half * half
+    im = math.exp(x) * math.sin(y)
+    first_re, first_im = (re * x + im * y) / size, (im * x - re * y) / size
+    re, im = first_re - 1.0, first_im
+    return first_re, first_im, (re * x + im * y) / size, (im * x - re * y) / size
 
 
-@kernel
+@scalar
 def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
     """a(t), b(t) and their integrals (real distinct or complex eigenvalues m +- s, m +- j s)."""
     if kind == REAL:
@@ -82,6 +86,20 @@ def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def slip_close(p, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+    """The same for nearly double eigenvalues."""
+    space = np.empty((4, 5, 5))
+    e = space[1]
+    plant(p, reverse, t, space[0])
+    exponential(space[0], 5, e, space[2], space[3])
+    return (
+        e[0, 0] * i + e[0, 1] * w + e[0, 3] * u + e[0, 4] * T,
+        e[1, 0] * i + e[1, 1] * w + e[1, 3] * u + e[1, 4] * T,
+        th + e[2, 0] * i + e[2, 1] * w + e[2, 3] * u + e[2, 4] * T,
+    )
+
+
+@scalar
 def slip_at(p, modal, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
     kind = int(modal[at + KIND])
@@ -91,12 +109,7 @@ def slip_at(p, modal, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untype
         first, second = phi12(rate * t)
         return 0.0, w + t * first * dw, th + t * (w + t * second * dw)
     if modal[at + CLOSE] > 0.0:
-        e = exponential(plant(p, reverse, 5) * t)
-        return (
-            e[0, 0] * i + e[0, 1] * w + e[0, 3] * u + e[0, 4] * T,
-            e[1, 0] * i + e[1, 1] * w + e[1, 3] * u + e[1, 4] * T,
-            th + e[2, 0] * i + e[2, 1] * w + e[2, 3] * u + e[2, 4] * T,
-        )
+        return slip_close(p, reverse, t, i, w, th, u, T)
     di, dw = derivative(p, modal, at, i, w, u, T)
     m = modal[at + MEAN]
     a, b, a2, b2 = integrals(kind, m, modal[at + ROOT], t)
@@ -105,7 +118,7 @@ def slip_at(p, modal, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untype
     return i + a * di + b * qi, w + a * dw + b * qw, th + w * t + a2 * dw + b2 * qw
 
 
-@kernel
+@scalar
 def derivative(p, modal, at, i, w, u, T):  # type: ignore[no-untyped-def]
     """(i', w') while slipping."""
     if int(modal[at + KIND]) == SINGLE:
@@ -115,7 +128,7 @@ def derivative(p, modal, at, i, w, u, T):  # type: ignore[no-untyped-def]
     return di, dw
 
 
-@kernel
+@scalar
 def first_extremum(p, modal, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
     """First time later than ``after`` at which w' = 0; inf if there is none."""
     kind = int(modal[at + KIND])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import inlined, kernel
 from nonlinear._kernels.signals import signal
 
 
-@kernel
+@inlined
 def probe(row, point, tables, k, period, value, memory, position):  # type: ignore[no-untyped-def]
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import scalar
 
 
-@kernel
+@scalar
 def clear(out):  # type: ignore[no-untyped-def]
     """Reset a row of results."""
     out[:] = 0.0
@@ -24,7 +24,7 @@ def clear(out):  # type: ignore[no-untyped-def]
         out[layout.OUT_STEP + j] = -1.0
 
 
-@kernel
+@scalar
 def extremes(sig, count, out):  # type: ignore[no-untyped-def]
     """Update minimum and maximum of each signal."""
     for j in range(count):
@@ -33,7 +33,7 @@ def extremes(sig, count, out):  # type: ignore[no-untyped-def]
         out[at + 1] = max(out[at + 1], sig[j])
 
 
-@kernel
+@scalar
 def window(sig, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-def]
     """Add one tick to a window; (c, s) is the unit phasor of the fundamental."""
     for j in range(count):
@@ -50,7 +50,7 @@ def window(sig, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-
             re, im = re * c - im * s, re * s + im * c
 
 
-@kernel
+@scalar
 def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
     """Update rise, peak and settling of a response normalised to its target; times in ticks."""
     at = layout.OUT_STEP

@@ -301,13 +301,3 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
     out[layout.OUT_SPEED_COMMAND], out[layout.OUT_CURRENT_COMMAND] = w_lim, i_ref
     out[layout.OUT_VOLTAGE] = u
     return status
-
-
-@kernel
-def run_rows(rows, tables, start, stop, outs, statuses):  # type: ignore[no-untyped-def]
-    """Run rows start to stop without histories."""
-    history = np.empty((0, 0))
-    flags = np.empty(0, np.uint8)
-    shared = np.zeros(2)
-    for r in range(start, stop):
-        statuses[r] = run(rows[r], tables, history, flags, outs[r], shared)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import inlined, kernel, scalar
 from nonlinear._kernels.energy import energy_slip, energy_stick
 from nonlinear._kernels.expm import (
     A11,
@@ -40,6 +42,7 @@ CONSTANTS = RINGING + 1
 def prepare(p, constants):  # type: ignore[no-untyped-def]
     """Everything of a run that does not change with time."""
     Ts, f = p[layout.PERIOD], p[layout.DELAY_FRACTION]
+    space = np.empty((4, 5, 5))
     constants[LENGTH], constants[LENGTH + 1] = f, Ts - f
     constants[RINGING] = 0.0
     for direction in range(2):
@@ -48,9 +51,8 @@ def prepare(p, constants):  # type: ignore[no-untyped-def]
         if int(constants[at + KIND]) == COMPLEX and constants[at + ROOT] * Ts >= 3.0:
             constants[RINGING] = 1.0
         for part in range(2):
-            transition(
-                p, direction == 1, constants[LENGTH + part], constants, (2 * direction + part) * TRANSITION
-            )
+            place = (2 * direction + part) * TRANSITION
+            transition(p, direction == 1, constants[LENGTH + part], space, constants, place)
     for part in range(2):
         rate = 0.0 if p[layout.SOURCE] > 0.0 else p[layout.RESISTANCE] / p[layout.INDUCTANCE]
         constants[DECAY + part] = math.exp(-rate * constants[LENGTH + part])
@@ -59,7 +61,7 @@ def prepare(p, constants):  # type: ignore[no-untyped-def]
     constants[SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
 
 
-@kernel
+@inlined
 def slip_step(m, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """One precomputed transition."""
     return (
@@ -69,7 +71,7 @@ def slip_step(m, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@scalar
 def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
     """Time at which the drive torque of the locked rotor reaches ``level``; also the current then."""
     R, L = p[layout.RESISTANCE], p[layout.INDUCTANCE]
@@ -80,7 +82,7 @@ def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
     return min(t, dt), i_level
 
 
-@kernel
+@scalar
 def stick(p, i, u, Tb, Tp, Tm, dt):  # type: ignore[no-untyped-def]
     """Locked rotor: time spent, current after it, and the direction of the breakaway (0: none)."""
     kM, Kg = p[layout.TORQUE_CONSTANT], p[layout.SOURCE_GAIN]
@@ -104,7 +106,7 @@ def stick(p, i, u, Tb, Tp, Tm, dt):  # type: ignore[no-untyped-def]
     return dt, i_end, 0.0
 
 
-@kernel
+@scalar
 def direction_at_rest(p, i, u, Tb, Tp, Tm, s):  # type: ignore[no-untyped-def]
     """What follows a landing of motion s: 0 rest while |drive| <= Tc breakaway, -s motion the other way."""
     drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb
@@ -113,7 +115,7 @@ def direction_at_rest(p, i, u, Tb, Tp, Tm, s):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@kernel
+@scalar
 def segment(p, c, part, u, Tb, Tcp, Tcm, i, w, th, s, result):  # type: ignore[no-untyped-def]
     """Advance over one segment with all its events.
 

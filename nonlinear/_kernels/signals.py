@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import inlined, scalar
 
 TWO_PI = 2.0 * math.pi
 NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
 TRIANGLE, CHIRP, LOG_CHIRP = layout.TRIANGLE, layout.CHIRP, layout.LOG_CHIRP
 
 
-@kernel
+@scalar
 def triangle_wave(cycles):  # type: ignore[no-untyped-def]
     """Triangle of amplitude 1 in phase with sin(2 pi cycles)."""
     x = cycles + 0.25
@@ -20,7 +20,7 @@ def triangle_wave(cycles):  # type: ignore[no-untyped-def]
     return 4.0 * x - 1.0 if x < 0.5 else 3.0 - 4.0 * x
 
 
-@kernel
+@scalar
 def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
     """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
     x = min(s, span)
@@ -32,7 +32,7 @@ def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
     return cycles + f1 * max(s - span, 0.0)
 
 
-@kernel
+@inlined
 def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
 
@@ -60,7 +60,7 @@ def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
 
-@kernel
+@scalar
 def fill(row, at, tables, period, out):  # type: ignore[no-untyped-def]
     """Sample a signal at every tick."""
     for k in range(out.shape[0]):

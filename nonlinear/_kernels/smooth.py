@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel
+from nonlinear._kernels.compiled import kernel, scalar
 from nonlinear._kernels.energy import energy_tanh
-from nonlinear._kernels.expm import TRANSITION, exponential, plant
+from nonlinear._kernels.expm import TRANSITION, exponential, plant, transition
 from nonlinear._kernels.segment import LENGTH, slip_step
 
 LEVELS = 16
@@ -27,44 +29,46 @@ W1, W2, W3 = STAGE + 3, STAGE + 6, STAGE + 9
 LEVEL = STAGE + 12
 
 
-@kernel
-def phi_columns(p, h):  # type: ignore[no-untyped-def]
+@scalar
+def phi_columns(p, h, space):  # type: ignore[no-untyped-def]
     """exp of the plant over h; columns 4, 5, 6 are h phi1, h phi2, h phi3 applied to a unit torque."""
-    a = plant(p, False, 7) * h
+    a, e = space[0], space[1]
+    plant(p, False, h, a)
     # the torque input is fed by a chain of integrators over the step: column 5 drives 4, column 6 drives 5
     a[4, 5] = 1.0
     a[5, 6] = 1.0
-    return exponential(a)
+    exponential(a, 7, e, space[2], space[3])
 
 
 @kernel
 def prepare_tanh(p, constants, table):  # type: ignore[no-untyped-def]
     """Fill the coefficients of every level for both segments."""
+    space = np.empty((4, 7, 7))
     for part in range(2):
         for level in range(LEVELS):
             h = constants[LENGTH + part] / 2.0**level
-            if h <= 0.0:
-                continue
-            o = (part * LEVELS + level) * LEVEL
-            for where in range(2):
-                step = 0.5 * h if where == 0 else h
-                e = phi_columns(p, step)
-                at = o + (HALF if where == 0 else FULL)
-                table[at + 0], table[at + 1] = e[0, 0], e[0, 1]
-                table[at + 2], table[at + 3] = e[1, 0], e[1, 1]
-                table[at + 4], table[at + 5] = e[2, 0], e[2, 1]
-                for r in range(3):
-                    table[at + 6 + r], table[at + 9 + r] = e[r, 3], e[r, 4]
-                    if where == 0:
-                        table[o + STAGE + r] = e[r, 4]
-                    else:
-                        first, second, third = e[r, 4], e[r, 5], e[r, 6]
-                        table[o + W1 + r] = first - 3.0 * second + 4.0 * third
-                        table[o + W2 + r] = 2.0 * second - 4.0 * third
-                        table[o + W3 + r] = 4.0 * third - second
+            if h > 0.0:
+                prepare_level(p, h, space, table, (part * LEVELS + level) * LEVEL)
 
 
-@kernel
+@scalar
+def prepare_level(p, h, space, table, o):  # type: ignore[no-untyped-def]
+    """Fill the coefficients of one step length at ``table[o]``."""
+    transition(p, False, 0.5 * h, space, table, o + HALF)
+    transition(p, False, h, space, table, o + FULL)
+    phi_columns(p, 0.5 * h, space)
+    e = space[1]
+    for r in range(3):
+        table[o + STAGE + r] = e[r, 4]
+    phi_columns(p, h, space)
+    for r in range(3):
+        first, second, third = e[r, 4], e[r, 5], e[r, 6]
+        table[o + W1 + r] = first - 3.0 * second + 4.0 * third
+        table[o + W2 + r] = 2.0 * second - 4.0 * third
+        table[o + W3 + r] = 4.0 * third - second
+
+
+@scalar
 def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
     """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion."""
     x = w / p[layout.SMOOTHING]
@@ -73,7 +77,7 @@ def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
     return -Tcm * math.tanh(x) - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
 
 
-@kernel
+@scalar
 def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
     """Number of halvings of h that the tolerance asks for at this state."""
     if p[layout.TANH_LEVEL] >= 0.0:
@@ -96,7 +100,7 @@ def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
     return level
 
 
-@kernel
+@scalar
 def etd_step(p, table, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
     """One ETD4RK step."""
     n0 = tanh_torque(p, w, Tcp, Tcm)
@@ -115,7 +119,7 @@ def etd_step(p, table, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped
     )
 
 
-@kernel
+@scalar
 def tanh_segment(p, c, table, part, u, Tb, Tcp, Tcm, i, w, th, result):  # type: ignore[no-untyped-def]
     """Advance over one segment under the smoothed law; returns (i, w, th)."""
     whole = c[LENGTH + part]
