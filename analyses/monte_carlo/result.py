@@ -28,6 +28,8 @@ class Odds:
         Value of the nominal design, and the worst of all samples.
     worst_sample : int or None
         Its number.
+    columns : tuple of str
+        Columns that the requirement looks at.
     """
 
     id: str
@@ -43,6 +45,7 @@ class Odds:
     nominal: float | None = None
     worst: float | None = None
     worst_sample: int | None = None
+    columns: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,8 @@ class MonteCarloResult:
     worst : tuple of WorstCase
     folder : Path
         Every sample, as Parquet.
+    nominal : mapping of str to float
+        The figures of the nominal design, by column.
     notes : tuple of str
     """
 
@@ -108,6 +113,7 @@ class MonteCarloResult:
     odds: tuple[Odds, ...]
     worst: tuple[WorstCase, ...]
     folder: Path
+    nominal: Mapping[str, float]
     notes: tuple[str, ...] = ()
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.errors import InputError
 from analyses.engine import Engine
-from analyses.monte_carlo.judging import judge, label
+from analyses.monte_carlo.judging import judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
@@ -64,6 +64,21 @@ class MonteCarloSettings:
             raise InputError(f"chunk = {self.chunk}: from 1 to 1000000")
 
 
+def sample_folder(design: Design, settings: MonteCarloSettings, folder: Path) -> Path:
+    """Folder of a study inside another: the same study always gets the same one, another never."""
+    import hashlib
+    import json
+
+    identity = _task(design, settings).identity()
+    digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
+    return folder / f"samples-{digest[:12]}"
+
+
+def _task(design: Design, settings: MonteCarloSettings) -> SampleTask:
+    sampler = sampler_of(design, seed=settings.seed, table=settings.table)
+    return SampleTask(design, sampler, settings.operating_point, settings.load_Nm, step=settings.step)
+
+
 def monte_carlo(
     design: Design,
     folder: str | Path,
@@ -94,10 +109,8 @@ def monte_carlo(
         If nothing has a tolerance, or the folder holds another study.
     """
     settings = settings or MonteCarloSettings()
-    sampler = sampler_of(design, seed=settings.seed, table=settings.table)
-    task = SampleTask(
-        design, sampler, settings.operating_point, settings.load_Nm, step=settings.step
-    )  # fmt: skip
+    task = _task(design, settings)
+    sampler = task.sampler
     store = Store.open(Path(folder), task.identity(), settings.chunk)
     (engine or Engine()).run(task, store.missing(settings.samples), store.write, progress)
 
@@ -118,7 +131,8 @@ def monte_carlo(
     worst = _worst_cases(task, tallies, Path(folder)) if settings.worst_cases else ()
     return MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
-        column_statistics(blocks, task.units), tuple(odds), worst, Path(folder), _notes(task),
+        column_statistics(blocks, task.units), tuple(odds), worst, Path(folder),
+        {name: float(values[0]) for name, values in nominal.items()}, _notes(task),
     )  # fmt: skip
 
 
@@ -151,8 +165,9 @@ class _Tally:
         _, sample, value = self.worst[0]
         here = float(judge(r, design, nominal).value[0])
         return replace(
-            made, minimum=r.minimum, maximum=r.maximum, nominal=here, worst=value, worst_sample=sample
-        )
+            made, minimum=r.minimum, maximum=r.maximum, nominal=here, worst=value, worst_sample=sample,
+            columns=source_columns(r, design),
+        )  # fmt: skip
 
 
 def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple[WorstCase, ...]:

@@ -20,6 +20,10 @@ MODULES: dict[str, str] = {
     "onset": "reports.figures.onset",
     "delay_budget": "reports.figures.delay_budget",
     "curves": "reports.figures.curves",
+    "distribution": "reports.figures.distribution",
+    "tornado": "reports.figures.tornado",
+    "overlay": "reports.figures.overlay",
+    "trade_off": "reports.figures.trade_off",
 }
 
 

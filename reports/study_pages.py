@@ -1,0 +1,47 @@
+"""Pages of studies (tolerances, variants, tuning): one document, one page and its JSON, both or neither."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.atomic import write_together
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from reports.drawing import Progress
+
+
+def study_document(
+    design: Design, sections: Sequence[doc.Section], *, title: str, subtitle: str, kind: str
+) -> dict[str, Any]:
+    """Put a document of a study of a design together."""
+    from actuator_lti.design import design_hash
+    from reports.build import design_head
+    from reports.provenance import provenance
+    from reports.sections import provenance as provenance_section
+
+    head, origin = design_head(design), provenance(design_hash(design))
+    return doc.document(
+        title=title,
+        subtitle=subtitle,
+        design=head,
+        provenance=origin,
+        sections=[*sections, provenance_section.section(head, origin)],
+        kind=kind,
+    )
+
+
+def write_pages(
+    made: Mapping[str, Any], folder: Path, stem: str, *, processes: int = 1, progress: Progress | None = None
+) -> tuple[Path, Path]:
+    """Write ``<stem>.html`` and ``<stem>.json``."""
+    from reports.html import page
+
+    content = doc.dumps(made)
+    html = page(doc.loads(content), processes=processes, progress=progress)
+    paths = (folder / f"{stem}.html", folder / f"{stem}.json")
+    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
+    return paths
