@@ -19,7 +19,7 @@ class InputError(ValueError):
 
     def __init__(self, message: str, where: str | None = None) -> None:
         line = f"{where}: {message}" if where else message
-        super().__init__(" ".join(line.split()))
+        super().__init__("".join(c if c.isprintable() else "?" for c in " ".join(line.split())))
         self.message = message
         self.where = where
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
 
 _ELECTRICAL = {
@@ -117,9 +118,9 @@ def _requirements(design: Design, where: str) -> None:
     present = {"position", "every"}
     present |= {name for name in ("velocity", "current") if getattr(design.controller, name) is not None}
     for item in design.requirements:
-        path = f"requirement.{item.id}"
+        path = f"requirement.{shown(item.id)[1:-1]}"
         if item.id in seen:
-            raise _refuse(where, "requirement.id", f'"{item.id}"', "allowed: each id once")
+            raise _refuse(where, "requirement.id", shown(item.id), "allowed: each id once")
         seen.add(item.id)
         if item.minimum is None and item.maximum is None:
             raise InputError(f"{path}: missing limit; allowed: minimum, maximum or both", where=where)
@@ -129,11 +130,11 @@ def _requirements(design: Design, where: str) -> None:
             )
         if QUANTITIES[item.quantity].scope == "loop":
             if item.loop not in present:
-                shown = "missing" if item.loop is None else f'"{item.loop}"'
-                raise _refuse(where, f"{path}.loop", shown, f"allowed: {', '.join(sorted(present))}")
+                given = "missing" if item.loop is None else shown(item.loop)
+                raise _refuse(where, f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}")
         elif item.loop is not None:
             raise _refuse(
-                where, f"{path}.loop", f'"{item.loop}"', f"{item.quantity} is of the drive, no loop"
+                where, f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
             )
 
 
@@ -146,7 +147,7 @@ def _correlations(design: Design, where: str) -> None:
             if path not in index:
                 allowed = ", ".join(index) or "none, no value has a tolerance"
                 raise _refuse(
-                    where, "correlation", f'"{path}"', f"allowed: keys with a tolerance ({allowed})"
+                    where, "correlation", shown(path), f"allowed: keys with a tolerance ({allowed})"
                 )
         if len(pair) == 1 or pair in seen:
             raise _refuse(where, "correlation", f'"{item.first}", "{item.second}"', "allowed: each pair once")
