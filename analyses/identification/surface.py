@@ -143,7 +143,7 @@ def _fitted(
         own = _own_variance(points, theta)
         shared = shared_errors(points, instruments, theta[2], torque_constant)
         scatter, birge = _run_scatter(x, y, own, shared)
-        gain = _gain(x, _covariance(own + scatter, shared))
+        gain = gain_matrix(x, torque_covariance(own + scatter, shared))
         change = gain @ y - theta
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
@@ -198,13 +198,13 @@ def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatAr
     return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
 
 
-def _covariance(variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
+def torque_covariance(variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
     """Covariance of the torques: each run's own, and the shared errors (a third of the bound squared)."""
     effects = effects_of(shared, len(variance))
     return np.asarray(np.diag(variance) + effects @ effects.T / 3.0)
 
 
-def _gain(x: FloatArray, covariance: FloatArray) -> FloatArray:
+def gain_matrix(x: FloatArray, covariance: FloatArray) -> FloatArray:
     """The matrix that makes the coefficients of the torques: (X' V^-1 X)^-1 X' V^-1."""
     whitened = np.linalg.solve(covariance, x)
     return np.asarray(np.linalg.solve(x.T @ whitened, whitened.T))
@@ -217,8 +217,8 @@ def _run_scatter(
     freedom = len(y) - x.shape[1]
 
     def chi_square(extra: float) -> float:
-        covariance = _covariance(own + extra, shared)
-        rest = y - x @ (_gain(x, covariance) @ y)
+        covariance = torque_covariance(own + extra, shared)
+        rest = y - x @ (gain_matrix(x, covariance) @ y)
         return float(rest @ np.linalg.solve(covariance, rest))
 
     first = chi_square(0.0)

@@ -13,7 +13,7 @@ from analyses.records.campaign_file import Instruments
 
 FloatArray = NDArray[np.float64]
 
-DRAWS = 1 << 16
+DRAWS = 1 << 15
 
 
 @dataclass(frozen=True, kw_only=True)

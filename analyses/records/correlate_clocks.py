@@ -11,7 +11,7 @@ from actuator_lti.errors import InputError
 from analyses.identification.means import correlation_time
 from analyses.records.record import FloatArray
 
-GRID = 10_000
+GRID = 4000
 MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
 
@@ -109,7 +109,7 @@ def _gauss_newton(pair: _Pair, parameters: int) -> tuple[FloatArray, FloatArray]
     """
     p = np.zeros(parameters)
     jac = np.zeros((len(pair.ga), parameters))
-    for _ in range(8):
+    for _ in range(5):
         for k in range(parameters):
             h = np.zeros(parameters)
             h[k] = 0.5

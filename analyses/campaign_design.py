@@ -1,0 +1,248 @@
+"""Which further runs would shrink the uncertainty of the margins most."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.points import SteadyPoint
+from analyses.identification.surface import PATHS, SurfaceFit
+from analyses.identification.systematic import effects_of, shared_errors
+from analyses.records.campaign_file import Instruments
+
+FloatArray = NDArray[np.float64]
+
+LOOPS = ("velocity", "position")
+STEP = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarginSpread:
+    """One margin of the design, its standard deviation from the friction's uncertainty, and its slopes.
+
+    ``slopes`` are per unit of C0, Cv and CM; ``std`` and ``floor_std`` (what remains however many runs are
+    made, because the instruments' shared errors remain) have the unit of the margin.
+    """
+
+    label: str
+    unit: str
+    value: float
+    slopes: FloatArray
+    std: float
+    floor_std: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuggestedRun:
+    """One further run, and the relative mean variance of the margins once it and those before it are made."""
+
+    order: int
+    speed_rad_s: float
+    load_Nm: float
+    remaining: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignSuggestion:
+    """Suggested runs in the order of their worth, and the margins that they serve.
+
+    ``remaining`` of the runs counts only what runs can reduce, the random part. ``shared_part`` is the share
+    of the margins' variance that comes from errors which all runs share; ``largest_shared`` names the largest
+    of these.
+    """
+
+    criterion: str
+    margins: tuple[MarginSpread, ...]
+    runs: tuple[SuggestedRun, ...]
+    shared_part: float
+    largest_shared: str | None
+
+
+def suggest_runs(
+    design: Design,
+    fit: SurfaceFit,
+    instruments: Instruments,
+    *,
+    count: int = 6,
+    speeds_rad_s: Sequence[float] | None = None,
+    loads_Nm: Sequence[float] | None = None,
+    criterion: str = "margins",
+    progress: Callable[[int, int], None] | None = None,
+) -> CampaignSuggestion:
+    """Suggest further (speed, load) points, one after the other, each the best after those before it.
+
+    Parameters
+    ----------
+    design : Design
+        Whose margins count: gain and phase margins of the velocity and position loop, with the friction of a
+        slow motion (describing function), at no load and at the largest one.
+    fit : SurfaceFit
+        The present estimate.
+    instruments : Instruments
+        Of the campaign.
+    count : int
+        How many runs to suggest.
+    speeds_rad_s, loads_Nm : sequence of float, optional
+        What can be set; the range of the runs so far, in steps of an eighth, by default.
+    criterion : {"margins", "D"}
+        ``margins``: mean relative variance of the margins (c-optimal, over all of them); ``D``: determinant
+        of the covariance of the coefficients.
+
+    Raises
+    ------
+    InputError
+        For an unknown criterion or an empty range.
+    """
+    if criterion not in ("margins", "D"):
+        raise InputError(f'criterion = "{criterion}": "margins" or "D"')
+    speeds, loads = _ranges(fit, speeds_rad_s, loads_Nm)
+    fitted = with_values(design, dict(zip(PATHS, (float(v) for v in fit.values), strict=True)))
+    margins = margin_spreads(fitted, fit, progress=progress)
+    slopes = np.array([m.slopes / m.std for m in margins if m.std > 0.0])
+    if criterion == "margins" and not len(slopes):
+        raise InputError("no margin depends on the friction: use the criterion D")
+    weight = slopes.T @ slopes / max(len(slopes), 1)
+    runs = _greedy(fit, speeds, loads, count, weight, criterion)
+    shared = {name: float(shift @ weight @ shift) / 3.0 for name, shift in fit.shared_shifts.items()}
+    whole = float(np.sum(weight * fit.covariance))
+    return CampaignSuggestion(
+        criterion=criterion,
+        margins=margins,
+        runs=runs,
+        shared_part=sum(shared.values()) / whole if whole > 0.0 else 0.0,
+        largest_shared=max(shared, key=lambda name: shared[name]) if shared else None,
+    )
+
+
+def margin_spreads(
+    design: Design, fit: SurfaceFit, *, progress: Callable[[int, int], None] | None = None
+) -> tuple[MarginSpread, ...]:
+    """Margins, their slopes to C0, Cv, CM (central differences), and their spread from a fit's covariance."""
+    steps = STEP * np.abs(fit.values)
+    middle = _margins(design)
+    slopes = {key: np.zeros(3) for key in middle}
+    for k, path in enumerate(PATHS):
+        sides = [
+            _margins(with_values(design, {path: float(fit.values[k] + s * steps[k])}, check=False))
+            for s in (-1, 1)
+        ]
+        for key in middle:
+            if all(key in side for side in sides):
+                slopes[key][k] = (sides[1][key] - sides[0][key]) / (2.0 * steps[k])
+        if progress is not None:
+            progress(k + 1, 3)
+    shared = fit.covariance - fit.random_covariance
+    return tuple(
+        MarginSpread(
+            label=label,
+            unit=unit,
+            value=middle[label, unit],
+            slopes=s,
+            std=float(np.sqrt(max(s @ fit.covariance @ s, 0.0))),
+            floor_std=float(np.sqrt(max(s @ shared @ s, 0.0))),
+        )
+        for (label, unit), s in slopes.items()
+    )
+
+
+def _margins(design: Design) -> dict[tuple[str, str], float]:
+    """Gain (dB) and phase margins (deg) of the outer loops where friction matters most: in slow motion."""
+    from actuator_lti import assemble_loops, stability_margins
+
+    found: dict[tuple[str, str], float] = {}
+    slow = 0.02 * min(design.limits.speed_rad_s, 1e3)
+    for load in sorted({0.0, design.load.moment_max_Nm}):
+        loops = assemble_loops(
+            design, operating_point="describing-function", load_Nm=load, speed_amplitude_rad_s=slow
+        )
+        for name in LOOPS:
+            loop = getattr(loops, name)
+            if loop is None:
+                continue
+            margins = stability_margins(loop.open_loop)
+            for what, unit, value in (
+                ("gain margin", "dB", margins.gain_margin_db),
+                ("phase margin", "deg", margins.phase_margin_deg),
+            ):
+                if value is not None and np.isfinite(value):
+                    found[f"{name} {what}, {load:g} N m", unit] = float(value)
+    return found
+
+
+def _ranges(
+    fit: SurfaceFit, speeds: Sequence[float] | None, loads: Sequence[float] | None
+) -> tuple[FloatArray, FloatArray]:
+    had = np.array([[p.speed_rad_s, p.load_Nm] for p in fit.points])
+    loaded = had[had[:, 1] > 0.0, 1]
+    wide = np.linspace(had[:, 0].min(), had[:, 0].max(), 9)
+    levels = np.linspace(loaded.min(), loaded.max(), 8) if len(loaded) else np.zeros(0)
+    chosen = np.asarray(wide if speeds is None else speeds, dtype=np.float64)
+    moments = np.asarray(np.concatenate([[0.0], levels]) if loads is None else loads, dtype=np.float64)
+    if not len(chosen) or not len(moments) or np.any(chosen <= 0.0) or np.any(moments < 0.0):
+        raise InputError("speeds must be positive, loads zero or more, and at least one of each is needed")
+    return chosen, moments
+
+
+def _greedy(
+    fit: SurfaceFit, speeds: FloatArray, loads: FloatArray, count: int, weight: FloatArray, criterion: str
+) -> tuple[SuggestedRun, ...]:
+    """Add the best run again and again; a run's own variance is the median of those made."""
+    own = float(np.median(fit.residual_stds_Nm**2))
+    rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
+    information = rows.T @ rows
+    candidates = np.array([[1.0, w, m] for m in loads for w in speeds])
+
+    def spread(matrix: FloatArray) -> float:
+        covariance = np.linalg.inv(matrix)
+        return float(np.linalg.det(covariance)) if criterion == "D" else float(np.sum(weight * covariance))
+
+    start = spread(information)
+    runs = []
+    for order in range(1, count + 1):
+        tried = [spread(information + np.outer(x, x) / own) for x in candidates]
+        best = int(np.argmin(tried))
+        x = candidates[best]
+        information = information + np.outer(x, x) / own
+        runs.append(
+            SuggestedRun(
+                order=order, speed_rad_s=float(x[1]), load_Nm=float(x[2]), remaining=tried[best] / start
+            )
+        )
+    return tuple(runs)
+
+
+def predicted_covariance(
+    fit: SurfaceFit, runs: Sequence[SuggestedRun], instruments: Instruments, torque_constant_Nm_A: float
+) -> FloatArray:
+    """Covariance of the coefficients, shared errors included, once the suggested runs are made."""
+    from analyses.identification.surface import gain_matrix, torque_covariance
+
+    added = tuple(_as_point(fit.points[0], run, fit) for run in runs)
+    points = (*fit.points, *added)
+    variance = np.concatenate(
+        [fit.residual_stds_Nm**2, np.full(len(added), np.median(fit.residual_stds_Nm**2))]
+    )
+    errors = shared_errors(points, instruments, float(fit.values[2]), torque_constant_Nm_A)
+    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
+    gain = gain_matrix(x, torque_covariance(variance, errors))
+    moved = gain @ effects_of(errors, len(points))
+    return np.asarray((gain * variance) @ gain.T + moved @ moved.T / 3.0)
+
+
+def _as_point(like: SteadyPoint, run: SuggestedRun, fit: SurfaceFit) -> SteadyPoint:
+    torque = float(fit.values @ np.array([1.0, run.speed_rad_s, run.load_Nm]))
+    return replace(
+        like,
+        run=f"suggested {run.order}",
+        direction=1,
+        torque_Nm=torque,
+        speed_rad_s=run.speed_rad_s,
+        load_Nm=run.load_Nm,
+        load_is_zero=run.load_Nm == 0.0,
+    )

@@ -1,0 +1,141 @@
+"""Refinement by simulation: the parameters with which the closed loop moves as the record did."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design import parameter_value, with_values
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+
+FloatArray = NDArray[np.float64]
+
+STEP = 1e-3
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputErrorResult:
+    """Refined values by dotted key, their standard errors, and the relative error before and after.
+
+    The errors are those of the drive signal: norm of the difference over norm of the measured. The standard
+    errors respect the correlation in time of what is left.
+    """
+
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    covariance: FloatArray
+    error_before: float
+    error_after: float
+    iterations: int
+    design: Design
+
+
+def refine_by_output_error(
+    design: Design,
+    paths: tuple[str, ...],
+    simulate_output: Callable[[Design], FloatArray],
+    measured: FloatArray,
+    *,
+    max_iterations: int = 12,
+    progress: Callable[[int, int], None] | None = None,
+) -> OutputErrorResult:
+    """Refine parameters so that the simulated output fits the measured one in the least-squares sense.
+
+    Gauss-Newton with halved steps, starting from the design's own values (an inverse-model estimate). The
+    derivative is by central differences of 0.1 % of each value.
+
+    Parameters
+    ----------
+    design : Design
+        Holds the starting values.
+    paths : tuple of str
+        Dotted keys to refine.
+    simulate_output : callable
+        Gives the output for a design, sampled as ``measured``; see `analyses.correlation.closed_loop`.
+    measured : array, shape (n,)
+
+    Raises
+    ------
+    InputError
+        For outputs of different shape, or a start at zero (then it has no scale).
+    NumericalError
+        If the output does not depend on a parameter.
+    """
+    start = np.array([parameter_value(design, path) for path in paths])
+    if np.any(start == 0.0):
+        raise InputError(
+            f"{paths[int(np.argmin(np.abs(start)))]} = 0: output error needs a start that is not zero"
+        )
+
+    def residual(relative: FloatArray) -> FloatArray:
+        values = dict(zip(paths, (float(v) for v in start * relative), strict=True))
+        output = simulate_output(with_values(design, values, check=False))
+        if output.shape != measured.shape:
+            raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
+        return np.asarray(measured - output)
+
+    p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, max_iterations, progress)
+    covariance = _covariance(jac, rest) * np.outer(start, start)
+    values = {path: float(v) for path, v in zip(paths, start * p, strict=True)}
+    norm = float(np.linalg.norm(measured))
+    return OutputErrorResult(
+        values=values,
+        standard_errors={k: float(v) for k, v in zip(paths, np.sqrt(np.diag(covariance)), strict=True)},
+        covariance=covariance,
+        error_before=float(np.linalg.norm(first)) / norm,
+        error_after=float(np.linalg.norm(rest)) / norm,
+        iterations=iterations,
+        design=with_values(design, values, check=False),
+    )
+
+
+def _gauss_newton(
+    residual: Callable[[FloatArray], FloatArray],
+    count: int,
+    paths: tuple[str, ...],
+    max_iterations: int,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[FloatArray, FloatArray, FloatArray, int, FloatArray]:
+    p = np.ones(count)
+    rest = first = residual(p)
+    jac = np.zeros((len(rest), count))
+    iteration = 0
+    for iteration in range(1, max_iterations + 1):
+        for k in range(count):
+            h = np.zeros(count)
+            h[k] = STEP
+            jac[:, k] = (residual(p + h) - residual(p - h)) / (2.0 * STEP)
+        dead = np.flatnonzero(np.linalg.norm(jac, axis=0) <= 1e-12 * np.linalg.norm(rest))
+        if len(dead):
+            raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
+        change = -np.linalg.lstsq(jac, rest, rcond=None)[0]
+        p, rest, moved = _halved_step(residual, p, rest, change)
+        if progress is not None:
+            progress(iteration, max_iterations)
+        if not moved or np.max(np.abs(change)) < TOLERANCE:
+            break
+    return p, rest, jac, iteration, first
+
+
+def _halved_step(
+    residual: Callable[[FloatArray], FloatArray], p: FloatArray, rest: FloatArray, change: FloatArray
+) -> tuple[FloatArray, FloatArray, bool]:
+    """The longest of the full, half, quarter ... steps that makes the residual smaller."""
+    for _ in range(8):
+        tried = residual(p + change)
+        if np.linalg.norm(tried) < np.linalg.norm(rest):
+            return p + change, tried, True
+        change = 0.5 * change
+    return p, rest, False
+
+
+def _covariance(jac: FloatArray, rest: FloatArray) -> FloatArray:
+    from analyses.identification.means import correlation_time
+
+    variance = float(rest @ rest) / (len(rest) - jac.shape[1])
+    return np.asarray(variance * correlation_time(rest) * np.linalg.inv(jac.T @ jac))
