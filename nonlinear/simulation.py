@@ -84,7 +84,8 @@ def simulate(
     record_every : int
         Keep every so many rows.
     tanh_tolerance : float
-        Relative accuracy asked of one tick under the tanh law; sets its sub-steps.
+        Error of the speed that one tick may add under the tanh law, in smoothing speeds w_s; sets its
+        sub-steps.
     max_events : int
         Most events in one tick before the run is given up.
     raise_on_failure : bool

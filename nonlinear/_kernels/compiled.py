@@ -25,9 +25,13 @@ def source_stamp() -> str:
     return digest.hexdigest()
 
 
+njit: Any = numba.njit  # _nrt is not in its published signature
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call: without the GIL, arithmetic as written (no fastmath), cached on disk."""
-    return _stamped(numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=True)(function))
+    return _stamped(njit(**OPTIONS, _nrt=True)(function))
 
 
 def scalar(function: Callable[..., Any]) -> Any:
@@ -35,13 +39,12 @@ def scalar(function: Callable[..., Any]) -> Any:
 
     It needs no reference counts, whose atomic operations would cost more than its arithmetic.
     """
-    return _stamped(numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function))
+    return _stamped(njit(**OPTIONS, _nrt=False)(function))
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """The same for a small function of the tick loop: its code is copied into its callers."""
-    options = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False, "forceinline": True}
-    return _stamped(numba.njit(**options)(function))
+    return _stamped(njit(**OPTIONS, _nrt=False, forceinline=True)(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

@@ -35,7 +35,8 @@ DECAY = MODAL_AT + 2 * MODAL
 LENGTH = DECAY + 2
 SMOOTH = LENGTH + 2  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
 RINGING = SMOOTH + 1  # 1: w' may change sign twice in a segment: always look
-CONSTANTS = RINGING + 1
+RELAX = RINGING + 1  # R/L
+CONSTANTS = RELAX + 1
 
 
 @kernel
@@ -53,9 +54,9 @@ def prepare(p, constants):  # type: ignore[no-untyped-def]
         for part in range(2):
             place = (2 * direction + part) * TRANSITION
             transition(p, direction == 1, constants[LENGTH + part], space, constants, place)
+    constants[RELAX] = p[layout.RESISTANCE] / p[layout.INDUCTANCE]
     for part in range(2):
-        rate = 0.0 if p[layout.SOURCE] > 0.0 else p[layout.RESISTANCE] / p[layout.INDUCTANCE]
-        constants[DECAY + part] = math.exp(-rate * constants[LENGTH + part])
+        constants[DECAY + part] = math.exp(-constants[RELAX] * constants[LENGTH + part])
     dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
     same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
     constants[SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
@@ -83,8 +84,11 @@ def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def stick(p, i, u, Tb, Tp, Tm, dt):  # type: ignore[no-untyped-def]
-    """Locked rotor: time spent, current after it, and the direction of the breakaway (0: none)."""
+def stick(p, i, u, Tb, Tp, Tm, dt, decay):  # type: ignore[no-untyped-def]
+    """Locked rotor: time spent, current after it, direction of the breakaway (0: none).
+
+    ``decay`` is exp(-R dt/L).
+    """
     kM, Kg = p[layout.TORQUE_CONSTANT], p[layout.SOURCE_GAIN]
     drive = kM * i + Kg * u + Tb
     if drive > Tp:
@@ -93,8 +97,7 @@ def stick(p, i, u, Tb, Tp, Tm, dt):  # type: ignore[no-untyped-def]
         return 0.0, i, -1.0
     if p[layout.SOURCE] > 0.0:
         return dt, i, 0.0
-    decay = math.exp(-p[layout.RESISTANCE] / p[layout.INDUCTANCE] * dt)
-    final = u / p[layout.RESISTANCE]
+    final = u * (1.0 / p[layout.RESISTANCE])
     i_end = final + (i - final) * decay
     drive = kM * i_end + Tb
     if drive > Tp:
@@ -131,7 +134,8 @@ def segment(p, c, part, u, Tb, Tcp, Tcm, i, w, th, s, result):  # type: ignore[n
         if events > p[layout.MAX_EVENTS]:
             return i, w, th, s, events, layout.TOO_MANY_EVENTS
         if s == 0.0:
-            t, i_end, s = stick(p, i, u, Tb, Tp, Tm, left)
+            decay = c[DECAY + part] if left == whole else math.exp(-c[RELAX] * left)
+            t, i_end, s = stick(p, i, u, Tb, Tp, Tm, left, decay)
             if energy:
                 energy_stick(p, t, i, u, result)
             i = i_end

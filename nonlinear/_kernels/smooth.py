@@ -3,7 +3,8 @@
 The linear plant and the held voltage are propagated exactly; only the tanh term is approximated (Cox and
 Matthews 2002, ETD4RK), so a small inductance costs nothing.  A step h is chosen from the tolerance:
 rate h <= STEP_FACTOR tolerance^(1/4), where ``rate`` is the relaxation rate Tc/(J w_s) plus the
-rate |w'|/w_s at which the tanh is run through; steps are a segment divided by a power of two.  Beyond
+rate |w'|/w_s at which the tanh is run through, so that the tolerance bounds the error of the speed
+that a tick adds, in smoothing speeds; steps are a segment divided by a power of two.  Beyond
 SATURATED smoothing speeds tanh is 1 to the last bit but one and a whole segment is exact.
 """
 
@@ -21,7 +22,7 @@ from nonlinear._kernels.segment import LENGTH, slip_step
 
 LEVELS = 16
 SATURATED = 19.0
-STEP_FACTOR = 1.5
+STEP_FACTOR = 4.0  # leaves about a factor of twenty to the error seen
 # one level: transition over h/2 (12), over h (12), phi1 at h/2 (3), weights of N(u), N(a)+N(b), N(c) (9)
 HALF, FULL = 0, TRANSITION
 STAGE = 2 * TRANSITION
