@@ -1,22 +1,19 @@
-"""Files of controller settings: TOML, or XML as a CANopen device configuration (``.xdc``) writes it."""
+"""Files of controller settings: found out, read and written; the XML kind in its own module."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, ParseError, SubElement, indent, tostring
 
 from actuator_lti.design.model import ControllerObject, ControllerObjects
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import check_objects
-from actuator_lti.design.reading import MAX_BYTES, MAX_DEPTH, decode, parse_toml, read_bytes, shown
+from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.errors import InputError
 
 MAX_OBJECTS = 5000
 _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
-_INTEGER = re.compile(r"(?:[+-]?[0-9]{1,20}|0[xX][0-9A-Fa-f]{1,16})\Z")
-_NAMESPACE = "http://www.canopen.org/xml/1.0"
 
 
 def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -> ControllerObjects:
@@ -36,6 +33,8 @@ def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -
     """
     where = shown(str(path), 200)[1:-1]
     text = decode(read_bytes(Path(path), "settings file"), where)
+    from actuator_lti.design.settings_xml import read_settings_xml
+
     read = read_settings_xml if text.lstrip().startswith("<") else read_settings_toml
     return read(text, where, velocity_gain_factor)
 
@@ -86,7 +85,7 @@ def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None
         )
     factor = tree.get("velocity_gain_factor", 1.0) if velocity_gain_factor is None else velocity_gain_factor
     values = tuple(object_from(label, raw, where) for label, raw in entries.items())
-    return _checked(values, factor, where)
+    return checked_objects(values, factor, where)
 
 
 def checked_factor(factor: Any, where: str) -> float:
@@ -98,7 +97,8 @@ def checked_factor(factor: Any, where: str) -> float:
     return float(factor)
 
 
-def _checked(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
+def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
+    """Settings from their parts, each in its range."""
     if len(values) > MAX_OBJECTS:
         raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}", where=where)
     check_objects(values, where)
@@ -123,94 +123,3 @@ def write_settings_toml(objects: ControllerObjects) -> str:
         comment = f"  # {known.meaning}, {known.unit}" if known else "  # kept as it came"
         lines.append(f'"{item.label}" = {inline}{comment}')
     return "\n".join(lines) + "\n"
-
-
-def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Settings from XML: the actual values of its CANopen objects and sub-objects.
-
-    No DTD, no entities and no external references are accepted.
-    """
-    from defusedxml import DefusedXmlException
-    from defusedxml.ElementTree import fromstring
-
-    if len(text) > MAX_BYTES:
-        raise InputError("is larger than allowed: at most 1 MiB", where=where)
-    try:
-        root = fromstring(text.encode(), forbid_dtd=True)
-    except DefusedXmlException:
-        raise InputError("holds a DTD or an entity; allowed: plain XML", where=where) from None
-    except ParseError as error:
-        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
-    except (ValueError, LookupError, RecursionError) as error:
-        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
-    values = tuple(_objects_in(root, where))
-    if not values:
-        raise InputError("holds no CANopenObject with an actualValue", where=where)
-    return _checked(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor, where)
-
-
-def _local(element: Element) -> str:
-    return str(element.tag).rpartition("}")[2]
-
-
-def _objects_in(root: Element, where: str) -> list[ControllerObject]:
-    found: list[ControllerObject] = []
-    stack: list[tuple[Element, int]] = [(root, 0)]
-    while stack:
-        element, depth = stack.pop()
-        if depth > 8 * MAX_DEPTH:
-            raise InputError("nested too deeply", where=where)
-        if _local(element) == "CANopenObject":
-            index = _hex(element, "index", 4, where)
-            found += _values_of(element, index, 0, where)
-            for sub in element:
-                if _local(sub) == "CANopenSubObject":
-                    found += _values_of(sub, index, _hex(sub, "subIndex", 2, where), where)
-            continue
-        stack.extend((child, depth + 1) for child in reversed(element))
-    return found
-
-
-def _hex(element: Element, attribute: str, digits: int, where: str) -> int:
-    text = element.get(attribute, "")
-    plain = text[2:] if text[:2] in ("0x", "0X") else text
-    if not re.fullmatch(rf"[0-9A-Fa-f]{{1,{digits}}}", plain):
-        raise InputError(
-            f"{attribute} = {shown(text)}: allowed: up to {digits} hexadecimal digits", where=where
-        )
-    return int(plain, 16)
-
-
-def _values_of(element: Element, index: int, subindex: int, where: str) -> list[ControllerObject]:
-    text = element.get("actualValue")
-    if text is None:
-        return []
-    label = ControllerObject(index=index, subindex=subindex, value=0).label
-    if not _INTEGER.match(text.strip()):
-        raise InputError(f"{label} = {shown(text)}: allowed: a whole number", where=where)
-    value = int(text.strip(), 16) if text.strip()[:2] in ("0x", "0X") else int(text)
-    names = {"name": element.get("name", ""), "data_type": element.get("dataType", "")}
-    if any(len(name) > 200 for name in names.values()):
-        raise InputError(f"{label}: a name of more than 200 characters", where=where)
-    return [ControllerObject(index=index, subindex=subindex, value=value, **names)]
-
-
-def write_settings_xml(objects: ControllerObjects) -> str:
-    """Settings as ``.xdc``-style XML that :func:`read_settings_xml` turns back into the same objects."""
-    root = Element("ISO15745ProfileContainer", {"xmlns": _NAMESPACE})
-    profile = SubElement(root, "ISO15745Profile")
-    body = SubElement(SubElement(profile, "ProfileBody"), "ApplicationLayers")
-    listed = SubElement(body, "CANopenObjectList")
-    parents: dict[int, Element] = {}
-    last: int | None = None
-    for item in objects.values:
-        if item.subindex == 0 or item.index != last:
-            parents[item.index] = SubElement(listed, "CANopenObject", {"index": f"{item.index:04X}"})
-        last = item.index
-        target = parents[item.index]
-        if item.subindex:
-            target = SubElement(target, "CANopenSubObject", {"subIndex": f"{item.subindex:02X}"})
-        more = {"name": item.name, "dataType": item.data_type, "actualValue": str(item.value)}
-        target.attrib.update({key: value for key, value in more.items() if value})
-    indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"

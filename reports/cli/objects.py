@@ -30,6 +30,10 @@ PerOption = Annotated[
 BaseOption = Annotated[
     str, typer.Option("--onto", metavar="DESIGN", help="Design that the settings are put into.")
 ]
+IntoOption = Annotated[
+    Path | None,
+    typer.Option("--into", metavar="XDC", help="Device configuration whose other contents are kept."),
+]
 CompleteOption = Annotated[
     bool, typer.Option("--complete", help="Also objects that the imported settings did not have.")
 ]
@@ -41,6 +45,7 @@ def export(
     out: TargetOption = None,
     per: PerOption = None,
     complete: CompleteOption = False,
+    into: IntoOption = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -49,7 +54,8 @@ def export(
 
     from actuator_lti.design import load_design
     from actuator_lti.design.objects import calibration, export_objects
-    from actuator_lti.design.settings_file import write_settings_toml, write_settings_xml
+    from actuator_lti.design.settings_file import write_settings_toml
+    from actuator_lti.design.settings_xml import settings_xml
     from reports.atomic import write_text
     from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
@@ -59,11 +65,16 @@ def export(
         drive = replace(drive, objects=replace(drive.objects, velocity_gain_factor=calibration(per)))
     result = export_objects(drive, complete=complete or None)
     xml = out is not None and out.suffix.lower() in (".xdc", ".xml")
-    text = write_settings_xml(result.objects) if xml else write_settings_toml(result.objects)
+    homeless: tuple[str, ...] = ()
+    if xml or into is not None:
+        text, homeless = settings_xml(result.objects, into)
+    else:
+        text = write_settings_toml(result.objects)
     if out is not None:
         refuse_existing(out, force)
         write_text(out, text)
     notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
+    notes += [f"no place for it in {into}: {label}" for label in homeless]
     if as_json:
         objects = [_plain(item) for item in result.objects.values]
         print_json({"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes,

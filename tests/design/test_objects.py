@@ -15,10 +15,9 @@ from actuator_lti.design.settings_file import (
     parse_label,
     read_settings,
     read_settings_toml,
-    read_settings_xml,
     write_settings_toml,
-    write_settings_xml,
 )
+from actuator_lti.design.settings_xml import read_settings_xml, update_settings_xml, write_settings_xml
 from actuator_lti.errors import InputError
 
 AMBER = load_design("ilr33-amber")
@@ -183,8 +182,7 @@ def test_settings_survive_design_toml_and_xml(given_set: ControllerObjects) -> N
         assert export_objects(stored).objects == given_set
 
 
-def test_a_device_configuration_with_more_in_it_is_read(tmp_path: object) -> None:
-    text = """<?xml version="1.0" encoding="utf-8"?>
+DEVICE = """<?xml version="1.0" encoding="utf-8"?>
     <!-- a device configuration -->
     <ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.0">
       <ISO15745Profile><ProfileHeader><ProfileName>x</ProfileName></ProfileHeader></ISO15745Profile>
@@ -197,12 +195,28 @@ def test_a_device_configuration_with_more_in_it_is_read(tmp_path: object) -> Non
         <CANopenObject index="6083" name="Profile acceleration" dataType="0007" actualValue="250"/>
       </CANopenObjectList></ApplicationLayers></ProfileBody></ISO15745Profile>
     </ISO15745ProfileContainer>"""
-    found = {item.label: (item.value, item.name) for item in read_settings_xml(text, "x").values}
+
+
+def test_a_device_configuration_with_more_in_it_is_read() -> None:
+    found = {item.label: (item.value, item.name) for item in read_settings_xml(DEVICE, "x").values}
     assert found == {
         "0x2348.00": (1, "Number of entries"),
         "0x2348.01": (50, "Kv"),
         "0x6083.00": (250, "Profile acceleration"),
     }
+
+
+def test_a_device_configuration_is_updated_in_place() -> None:
+    assert read_settings_xml(update_settings_xml(DEVICE, ControllerObjects())[0], "x") == read_settings_xml(
+        DEVICE, "x"
+    )
+    text, left = update_settings_xml(DEVICE, objects({"0x2348.01": 60, "0x6083.00": 300, "0x2342.01": 20}))
+    found = {item.label: item.value for item in read_settings_xml(text, "x").values}
+    assert found == {"0x2348.00": 1, "0x2348.01": 60, "0x6083.00": 300}
+    assert left == ("0x2342.01",)
+    assert 'actualValue="0x3C"' in text
+    assert "<ProfileName>x</ProfileName>" in text
+    assert 'defaultValue="0x12"' in text
 
 
 BOMB = '<!DOCTYPE a [<!ENTITY b "bb"><!ENTITY c "&b;&b;">]><a>&c;</a>'
