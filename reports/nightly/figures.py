@@ -13,7 +13,7 @@ MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
 _INPUT_SECTIONS = ("parameters", "provenance")
 # Which way is better, by what the name holds; figures of no known direction change but do not regress.
-_LARGER = ("margin", "bandwidth", "output_rate", "acceleration", "probability")
+_LARGER = ("margin", "bandwidth", "minus3db", "minus90deg", "output_rate", "acceleration", "probability")
 _SMALLER = ("overshoot", "rise_time", "settling", "peak", "motor_current", "standing_error", "distortion")
 
 
@@ -56,6 +56,11 @@ def digest(document: Mapping[str, Any]) -> dict[str, Any]:
         "figures": [asdict(f) for f in figures[:MAX_FIGURES]],
         "failed": sum(v.passed is False for v in verdicts),
         "total": len(verdicts),
+        "failed_sections": [
+            one_line(str(part.get("title", "")), 120)
+            for part in document.get("sections", ())
+            if part.get("status") == "fail"
+        ],
     }
 
 
@@ -105,13 +110,12 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
     """Return every number of verdicts, facts and tables; the inputs (parameters, provenance) are none."""
     seen: set[str] = set()
     for verdict in verdicts_of(document):
-        better = 1
         yield Figure(name=f"{verdict.id}: value", value=verdict.value, unit=verdict.unit, kind="requirement")
         yield Figure(
             name=f"{verdict.id}: distance",
             value=verdict.distance,
             unit=verdict.unit,
-            better=better,
+            better=1,
             kind="distance",
         )
         passed = None if verdict.passed is None else float(verdict.passed)
@@ -152,28 +156,27 @@ def _of_block(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
 
 
 def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
-    columns = block.get("columns", ())
-    rows = block.get("rows", ())
+    """Name each number by caption, row and column; a row by its texts in front of the first number."""
+    columns, rows = block.get("columns", ()), block.get("rows", ())
     numeric = [c for c in columns if any(_is_number(r.get(c["key"])) for r in rows)]
-    names = [c["key"] for c in columns if c not in numeric]
+    first = columns.index(numeric[0]) if numeric else 0
+    names = [c["key"] for c in columns[: max(first, 1)] if c not in numeric]
+    caption = one_line(str(block.get("caption", "")), 60)
     counts: dict[str, int] = {}
     for row in rows:
-        label = " / ".join(one_line(str(row[k]), 60) for k in names[:3] if row.get(k) not in (None, ""))
+        label = " / ".join(one_line(row[k], 60) for k in names if isinstance(row.get(k), str) and row[k])
         counts[label] = counts.get(label, 0) + 1
         if counts[label] > 1:
             label = f"{label} ({counts[label]})"
         for column in numeric:
-            value = row.get(column["key"])
-            if value is not None and not _is_number(value):
-                continue
-            caption = one_line(str(block.get("caption", "")), 50)
-            name = f"{section} / {caption} / {label} / {column['key']}"
-            yield Figure(
-                name=name,
-                value=number(value),
-                unit=str(column.get("unit", "") or ""),
-                better=direction(str(column["key"])),
-            )
+            value, words = row.get(column["key"]), str(column.get("label", "") or column["key"])
+            if value is None or _is_number(value):
+                yield Figure(
+                    name=f"{section} / {caption} / {label} / {one_line(words, 40)}",
+                    value=number(value),
+                    unit=str(column.get("unit", "") or ""),
+                    better=direction(f"{column['key']} {words}"),
+                )
 
 
 def direction(name: str) -> int:
@@ -184,6 +187,8 @@ def direction(name: str) -> int:
     >>> direction("phase_margin_deg"), direction("overshoot"), direction("crossover")
     (1, -1, 0)
     """
+    if "margin_hz" in name or "margin_rad" in name:  # the frequency at which a margin is found
+        return 0
     key = name.lower().replace(" ", "_").replace("-", "_")
     if any(word in key for word in _SMALLER):
         return -1

@@ -334,6 +334,8 @@ def open_history(path: Path) -> Iterator[History]:
         connection.row_factory = sqlite3.Row
         notice = _configure(connection, path)
         yield History(connection, notice)
+    except sqlite3.OperationalError as error:
+        raise InputError(f"cannot be read or written: {error}", where=str(path)) from error
     finally:
         connection.close()
 

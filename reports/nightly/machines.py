@@ -132,6 +132,7 @@ def _suite(design: DesignView, night: Overview) -> tuple[str, tuple[int, int, in
     if not design.broken:
         cases.append(_regression_case(design))
         cases += [_requirement_case(design, v) for v in design.verdicts]
+        cases += [_section_case(design, title) for title in design.failed_sections]
     counts = [len(cases), *(sum(f"<{tag} " in c for c in cases) for tag in ("failure", "error", "skipped"))]
     tests, failures, errors, skipped = counts
     head = (
@@ -182,6 +183,10 @@ def _requirement_case(design: DesignView, verdict: Verdict) -> str:
         name,
         f'<failure type="requirement" message={_attribute(found)}>{_text(verdict.reason)}</failure>',
     )
+
+
+def _section_case(design: DesignView, title: str) -> str:
+    return _case(design, f"section {title}", '<failure type="section" message="does not pass"></failure>')
 
 
 def _attribute(text: str) -> str:

@@ -233,7 +233,12 @@ def _built(cache: Cache, job: Job, done: Done) -> Outcome:
 
 
 def _status(meta: Mapping[str, Any]) -> Any:
-    return "fail" if meta.get("failed") else "pass"
+    return "fail" if meta.get("failed") or meta.get("failed_sections") else "pass"
+
+
+def _message(outcome: Outcome) -> str:
+    sections = outcome.meta.get("failed_sections", ())
+    return outcome.message or (f"not passed: {', '.join(sections)}" if sections else "")
 
 
 def _new_result(outcome: Outcome) -> NewResult:
@@ -258,7 +263,7 @@ def _new_result(outcome: Outcome) -> NewResult:
         total=int(meta.get("total", 0)),
         worst=worst["relative"] if worst else None,
         worst_id=worst["id"] if worst else "",
-        message=outcome.message,
+        message=_message(outcome),
     )
 
 

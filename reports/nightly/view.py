@@ -70,6 +70,11 @@ class DesignView:
         """Files of its report."""
         return tuple(self.meta.get("files", ()))
 
+    @property
+    def failed_sections(self) -> tuple[str, ...]:
+        """Titles of the sections of its report that do not pass."""
+        return tuple(self.meta.get("failed_sections", ()))
+
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Requirements of tonight's report."""

@@ -1,0 +1,22 @@
+"""`actuator-lti pdf`: a report.json typeset for signing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
+FileOption = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
+]
+
+
+def pdf(report: ReportArgument, out: FileOption = None) -> None:
+    """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
+    from reports.cli.output import print_line
+    from reports.document import load
+    from reports.pdf import write_pdf
+
+    print_line(str(write_pdf(load(report), out or report.with_suffix(".pdf"))))

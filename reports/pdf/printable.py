@@ -1,0 +1,170 @@
+"""A document as the template prints it: texts only, numbers in their format, figures as SVG."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from reports.document import figures
+from reports.drawing import draw_all
+from reports.html import KICKERS, show_signed
+from reports.nightly.text import visible
+from reports.numbers import show
+
+MAX_CELL = 600
+MAX_TEXT = 20_000
+MAX_TITLE = 240
+LINE_PT = 481.0
+SCALE = 0.78
+_LONG_WORD = re.compile(r"\S{24,}")
+_SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
+_WORDS = {True: "met", False: "not met", None: "not judged"}
+_STATES = {True: "pass", False: "fail", None: "info"}
+
+
+def printable(made: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn a document into what ``report.typ`` reads; nothing in it is markup any more."""
+    blocks = figures(made)
+    drawings = dict(zip(map(id, blocks), draw_all(blocks, page=False), strict=True))
+    design, origin = made.get("design") or {}, made.get("provenance") or {}
+    return {
+        "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
+        "title": clean(made.get("title"), MAX_TITLE),
+        "subtitle": clean(made.get("subtitle"), 1200),
+        "passed": bool(made["verdict"]["passed"]),
+        "overall": _overall(made["verdict"]),
+        "facts": _facts(design, origin),
+        "revision": clean(design.get("revision"), 60),
+        "verdicts": [
+            _verdict(item) for block in _walk(made) if block["kind"] == "verdicts" for item in block["items"]
+        ],
+        "sections": [_section(part, drawings) for part in made["sections"]],
+    }
+
+
+def clean(value: object, limit: int = MAX_CELL) -> str:
+    """Text that can be seen and can be broken into lines; longer than ``limit`` it is cut.
+
+    Examples
+    --------
+    >>> clean("a\\u202eb"), clean(None), clean("abcdef", 4)
+    ('a⟨U+202E⟩b', '', 'abc…')
+    """
+    text = visible("" if value is None else str(value))
+    if len(text) > limit:
+        text = text[: limit - 1] + "…"
+    return _LONG_WORD.sub(lambda m: "\u200b".join(re.findall(r".{1,12}", m.group())), text)
+
+
+def _overall(verdict: Mapping[str, Any]) -> str:
+    total, failed, open_ = verdict["total"], verdict["failed"], verdict.get("not_judged", 0)
+    if not total:
+        return "No requirement is stated"
+    text = (
+        f"{failed} of {total} requirements not met"
+        if failed
+        else f"{total - open_} of {total} requirements met"
+    )
+    return text + (f", {open_} not judged" if open_ else "")
+
+
+def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[str]]:
+    rows = [
+        ("Design", design.get("name")),
+        ("Revision", design.get("revision") or "not stated"),
+        ("Hash of the design", origin.get("design_hash")),
+        ("Computed by", f"actuator-lti {origin.get('version') or ''}"),
+        ("Commit", origin.get("commit")),
+        ("Date", origin.get("time")),
+    ]
+    return [[label, clean(value, 200)] for label, value in rows if value]
+
+
+def _walk(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
+    from reports.document import walk
+
+    for part in made["sections"]:
+        yield from walk(part)
+
+
+def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:
+    limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'sig:4')}".strip()
+    return {
+        "state": _STATES[item.get("passed")],
+        "cells": [
+            clean(item.get("label"), 200),
+            _WORDS[item.get("passed")],
+            show(item.get("value"), "sig:4"),
+            clean(limit, 60),
+            show_signed(item.get("distance")),
+            clean(item.get("unit"), 30),
+        ],
+        "id": clean(item.get("id"), 120),
+        "reason": clean(item.get("reason"), 400),
+        "source": clean(item.get("source"), 200),
+    }
+
+
+def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
+    return {
+        "title": clean(part["title"], MAX_TITLE),
+        "intro": clean(part.get("intro"), MAX_TEXT),
+        "status": part["status"],
+        "blocks": [_block(block, drawings) for block in part["blocks"]],
+    }
+
+
+def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
+    kind = block["kind"]
+    if kind == "table":
+        return _table(block)
+    if kind == "figure":
+        return _figure(block, drawings[id(block)])
+    if kind == "facts":
+        items = [[clean(i["label"], 200), _with_unit(i["value"], i["unit"])] for i in block["items"]]
+        return {"kind": kind, "items": items}
+    if kind == "verdicts":
+        return {"kind": kind, "items": [_verdict(item) for item in block["items"]]}
+    if kind == "details":
+        inner = [_block(b, drawings) for b in block["blocks"]]
+        return {"kind": kind, "title": clean(block["title"], MAX_TITLE), "blocks": inner}
+    return {"kind": "text", "paragraphs": [clean(p, MAX_TEXT) for p in str(block["text"]).split("\n\n")]}
+
+
+def _figure(block: Mapping[str, Any], svg: str) -> dict[str, Any]:
+    """Scale every figure alike, so that their lettering is the same and two fit on a page."""
+    size = _SIZE.search(svg)
+    width = min(LINE_PT, SCALE * float(size[1])) if size else LINE_PT
+    texts = {"caption": clean(block["caption"], 2000), "alt": clean(block["alt"], 2000)}
+    return {"kind": "figure", "svg": visible(svg), "width": width, **texts}
+
+
+def _with_unit(value: Any, unit: object) -> str:
+    return f"{clean(show(value), 300)} {clean(unit, 30)}".strip()
+
+
+def _table(block: Mapping[str, Any]) -> dict[str, Any]:
+    columns: Sequence[Mapping[str, Any]] = block["columns"]
+    return {
+        "kind": "table",
+        "caption": clean(block["caption"], 1000),
+        "note": clean(block.get("note"), 2000),
+        "columns": [
+            {"label": clean(c["label"], 120), "unit": clean(c["unit"], 30), "align": c["align"]}
+            for c in columns
+        ],
+        "rows": [
+            {
+                "status": row.get("_status") or "",
+                "cells": [_cell(row.get(c["key"]), c["format"]) for c in columns],
+            }
+            for row in block["rows"]
+        ],
+    }
+
+
+def _cell(value: Any, form: str) -> dict[str, str]:
+    if isinstance(value, Mapping):
+        return {"text": clean(show(value.get("text"), form)), "status": value.get("status") or ""}
+    return {"text": clean(show(value, form)), "status": ""}
