@@ -1,0 +1,283 @@
+"""Study files: a base design, variants of it as overrides, sweeps and grids, and what to do with them.
+
+A study file is TOML and only data::
+
+    [study]
+    name = "gear and gains"
+    base = "ilr33-amber"                     # shipped name, or path beside the study file
+    validation = false
+
+    [[variant]]
+    name = "slower gear"
+    override = { "gear.worm.ratio" = 50 }
+
+    [[variant]]
+    name = "other motor"
+    motor = "motor-24V.toml"                 # its [motor] table replaces the base's
+    override = { "limits.voltage" = "24 V" }
+
+    [[sweep]]                                # one parameter: a list, or from, to, points, spacing
+    parameter = "control.velocity.gain"
+    values = ["0.06 A*s/rad", "0.24 A*s/rad"]
+
+    [[grid]]                                 # every combination
+    axes = [{ parameter = "motor.resistance", values = ["50 mohm", "60 mohm"] },
+            { parameter = "limits.voltage", from = "10 V", to = "14 V", points = 3 }]
+
+    [[requirement]]                          # added to the base's, or in place of one with the same id
+    id = "bandwidth"
+    quantity = "bandwidth"
+    loop = "position"
+    minimum = "20 Hz"
+
+    [monte_carlo]
+    samples = 1000
+    seed = 0
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.errors import InputError
+from analyses.slugs import slug
+from analyses.study_axes import Axis, read_axis
+from analyses.study_reading import Reader
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+MOST_VARIANTS = 1000
+LONGEST_NAME = 200
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One design of a study.
+
+    Attributes
+    ----------
+    name : str
+        As written; any text, never used as a path.
+    slug : str
+        The name as part of a file name, unique in the study.
+    design : Design or None
+        ``None`` where it was refused; then ``error`` says why.
+    overrides : mapping of str to object
+        Dotted keys as written.
+    error : str
+    """
+
+    name: str
+    slug: str
+    design: Design | None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class MonteCarloPlan:
+    """What a study asks of Monte Carlo."""
+
+    samples: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Study:
+    """A base design and its variants.
+
+    Attributes
+    ----------
+    name, title, description, origin : str
+    base : Variant
+        With the study's own requirements.
+    variants : tuple of Variant
+        In the order of the file: variants, sweeps, grids.
+    validation : bool
+        Whether the nonlinear validation is wanted.
+    monte_carlo : MonteCarloPlan or None
+    """
+
+    name: str
+    title: str
+    description: str
+    origin: str
+    base: Variant
+    variants: tuple[Variant, ...]
+    validation: bool = False
+    monte_carlo: MonteCarloPlan | None = None
+
+    @property
+    def all(self) -> tuple[Variant, ...]:
+        """The base, then the variants."""
+        return (self.base, *self.variants)
+
+
+def is_study(path: str | Path) -> bool:
+    """Whether a file is a study (a TOML file with a ``[study]`` table) and not a design."""
+    from actuator_lti.design.reading import decode, parse_toml, read_bytes
+
+    file = Path(path)
+    if not file.is_file():
+        return False
+    return "study" in parse_toml(decode(read_bytes(file, "study file"), str(path)), str(path))
+
+
+def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
+    """Read a study file.
+
+    Parameters
+    ----------
+    path : path
+        TOML, at most 1 MiB and 1000 variants.
+    keep_going : bool
+        Keep a variant that its design's checks refuse, with its error, instead of refusing the study.
+
+    Raises
+    ------
+    InputError
+        One line: file, key, value and what is allowed.
+    """
+    from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
+
+    where = shown(str(path), 200)[1:-1]
+    tree = parse_toml(decode(read_bytes(Path(path), "study file"), where), where)
+    return study_from_tree(tree, where, Path(path).parent, keep_going=keep_going)
+
+
+def study_of(design: Design) -> Study:
+    """A study of one design, without variants."""
+    base = Variant(design.name, slug(design.name), design)
+    return Study(design.name, design.title, design.description, design.origin, base, ())
+
+
+def study_from_tree(tree: dict[str, Any], where: str, folder: Path, *, keep_going: bool = False) -> Study:
+    """Build a study from its parsed tree; designs are looked for beside the file."""
+    reader = Reader(where, folder)
+    reader.only(tree, "", {"study", "variant", "sweep", "grid", "requirement", "monte_carlo"})
+    head = reader.table(tree, "study")
+    reader.only(head, "study", {"name", "title", "description", "base", "validation"})
+    base = reader.design(reader.text(head, "study", "base"))
+    extra = reader.tables(tree, "requirement")
+    base = _required(base, extra, reader)
+    maker = _Maker(base, reader, extra, keep_going)
+    variants = (*maker.variants(tree), *maker.sweeps(tree), *maker.grids(tree))
+    name = reader.text(head, "study", "name", base.name, LONGEST_NAME)
+    first = Variant(base.name, slug(base.name), base)
+    _check_names((first, *variants), reader)
+    return Study(
+        name,
+        reader.text(head, "study", "title", ""),
+        reader.text(head, "study", "description", ""),
+        where,
+        first,
+        variants,
+        reader.flag(head, "study", "validation", False),
+        _plan(tree, reader),
+    )
+
+
+def _required(design: Design, extra: list[dict[str, Any]], reader: Reader) -> Design:
+    """Add the study's requirements, in place of those with the same id."""
+    from actuator_lti.design import design_tree, with_overrides
+
+    if not extra:
+        return design
+    replaced = {item.get("id") for item in extra}
+    kept = [item for item in design_tree(design).get("requirement", []) if item.get("id") not in replaced]
+    return reader.located("requirement", lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
+
+
+def _plan(tree: dict[str, Any], reader: Reader) -> MonteCarloPlan | None:
+    if "monte_carlo" not in tree:
+        return None
+    table = reader.table(tree, "monte_carlo")
+    reader.only(table, "monte_carlo", {"samples", "seed"})
+    return MonteCarloPlan(
+        reader.integer(table, "monte_carlo", "samples", 1000, 1, 100_000_000),
+        reader.integer(table, "monte_carlo", "seed", 0, 0, 2**63 - 1),
+    )
+
+
+def _check_names(variants: tuple[Variant, ...], reader: Reader) -> None:
+    if len(variants) - 1 > MOST_VARIANTS:
+        raise reader.error(f"{len(variants) - 1} variants; allowed: at most {MOST_VARIANTS}")
+    seen: set[str] = set()
+    for variant in variants:
+        if variant.name in seen:
+            raise reader.error(
+                f"variant.name = {reader.shown(variant.name)}: twice; allowed: names that differ"
+            )
+        seen.add(variant.name)
+
+
+@dataclass(frozen=True)
+class _Maker:
+    """Makes variants of a base."""
+
+    base: Design
+    reader: Reader
+    requirements: list[dict[str, Any]]
+    keep_going: bool
+
+    def variants(self, tree: dict[str, Any]) -> Iterator[Variant]:
+        reader = self.reader
+        for place, table in enumerate(reader.tables(tree, "variant")):
+            where = f"variant[{place + 1}]"
+            reader.only(table, where, {"name", "base", "motor", "override"})
+            name = reader.text(table, where, "name", None, LONGEST_NAME)
+            overrides = dict(reader.table(table, "override", where, optional=True))
+            if "motor" in table:
+                overrides = {"motor": reader.motor(reader.text(table, where, "motor")), **overrides}
+            origin = None
+            if "base" in table:
+                origin = reader.text(table, where, "base")
+            yield self._made(name, overrides, origin)
+
+    def sweeps(self, tree: dict[str, Any]) -> Iterator[Variant]:
+        for place, table in enumerate(self.reader.tables(tree, "sweep")):
+            axis = read_axis(table, f"sweep[{place + 1}]", self.base, self.reader)
+            yield from (self._point((axis,), (value,)) for value in axis.values)
+
+    def grids(self, tree: dict[str, Any]) -> Iterator[Variant]:
+        reader = self.reader
+        for place, table in enumerate(reader.tables(tree, "grid")):
+            where = f"grid[{place + 1}]"
+            reader.only(table, where, {"axes"})
+            axes = tuple(
+                read_axis(item, f"{where}.axes[{k + 1}]", self.base, reader)
+                for k, item in enumerate(reader.tables(table, "axes", where))
+            )
+            size = 1
+            for axis in axes:
+                size *= len(axis.values)
+            if not axes or size > MOST_VARIANTS:
+                raise reader.error(f"{where}: {size if axes else 0} points; allowed: 1 to {MOST_VARIANTS}")
+            for point in product(*(axis.values for axis in axes)):
+                yield self._point(axes, point)
+
+    def _point(self, axes: tuple[Axis, ...], point: tuple[Any, ...]) -> Variant:
+        overrides = {axis.parameter: value for axis, value in zip(axes, point, strict=True)}
+        return self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides, None)
+
+    def _made(self, name: str, overrides: dict[str, Any], origin: str | None) -> Variant:
+        from actuator_lti.design import with_overrides
+
+        def make() -> Design:
+            start = self.base
+            if origin is not None:
+                start = _required(self.reader.design(origin), self.requirements, self.reader)
+            return with_overrides(start, overrides) if overrides else start
+
+        try:
+            design = self.reader.located(f"variant {self.reader.shown(name)}", make)
+        except InputError as error:
+            if not self.keep_going:
+                raise
+            return Variant(name, slug(name), None, overrides, str(error))
+        return Variant(name, slug(name), design, overrides)
