@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from actuator_lti.delay_budget import DelayBudget
     from actuator_lti.limiters import Onset
     from actuator_lti.loops import ExactMargins, Loops
+    from actuator_lti.plant import OperatingPoint
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
@@ -140,15 +141,12 @@ def _operating_points(design: Design) -> tuple[OperatingPointFigures, ...]:
     from actuator_lti.loops import assemble_loops
     from actuator_lti.plant import friction_slope
 
-    def point(label: str, load: float | None, kind: str, speed: float | None = None) -> OperatingPointFigures:
+    def point(
+        label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
+    ) -> OperatingPointFigures:
         moment = load or 0.0
-        slope = friction_slope(design, kind, moment, speed, 1)  # type: ignore[arg-type]
-        found = assemble_loops(
-            design,
-            operating_point=kind,
-            load_Nm=moment,
-            speed_amplitude_rad_s=speed,  # type: ignore[arg-type]
-        )
+        slope = friction_slope(design, kind, moment, speed, 1)
+        found = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
         return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False))
 
     points = [point("sliding", None, "sliding")]

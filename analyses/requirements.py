@@ -166,12 +166,12 @@ LOOP_QUANTITIES: dict[str, Callable[[LoopFigures], float | None]] = {
     "delay_margin": lambda found: found.margins.delay_margin_s,
     "modulus_margin": lambda found: found.margins.modulus_margin,
     "sensitivity_peak": lambda found: found.margins.sensitivity_peak_db,
-    "bandwidth": lambda found: found.bandwidth and found.bandwidth.minus3db_hz,
-    "bandwidth_90deg": lambda found: found.bandwidth and found.bandwidth.minus90deg_hz,
-    "resonance_peak": lambda found: found.bandwidth and found.bandwidth.resonance_peak_db,
-    "overshoot": lambda found: found.step and found.step.overshoot_percent,
-    "rise_time": lambda found: found.step and found.step.rise_time_s,
-    "settling_time": lambda found: found.step and found.step.settling_time_s,
+    "bandwidth": lambda found: found.bandwidth.minus3db_hz if found.bandwidth else None,
+    "bandwidth_90deg": lambda found: found.bandwidth.minus90deg_hz if found.bandwidth else None,
+    "resonance_peak": lambda found: found.bandwidth.resonance_peak_db if found.bandwidth else None,
+    "overshoot": lambda found: found.step.overshoot_percent if found.step else None,
+    "rise_time": lambda found: found.step.rise_time_s if found.step else None,
+    "settling_time": lambda found: found.step.settling_time_s if found.step else None,
 }
 
 

@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
 
-DECADES_BELOW = 1.6
+DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
 
 
@@ -71,7 +71,8 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
     The crossovers themselves are points of it.
     """
     margins = figures.margins
-    marks = [m.frequency_rad_s for m in (*margins.gain_margins, *margins.phase_margins)]
+    marks = [m.frequency_rad_s for m in margins.gain_margins]
+    marks += [m.frequency_rad_s for m in margins.phase_margins]
     marks = [mark for mark in marks if math.isfinite(mark) and mark > 0.0]
     nyquist = math.pi / margins.period_s if margins.period_s else None
     crossings = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0] or marks

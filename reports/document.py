@@ -74,7 +74,8 @@ def column(
     Parameters
     ----------
     format : str
-        ``"text"``, ``"sig:3"`` (significant digits), ``"fix:1"`` (decimals) or ``"yesno"``.
+        ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
+        ``"fix:1"`` (decimals) or ``"yesno"``.
     """
     side = align or ("left" if format in ("text", "yesno") else "right")
     return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
@@ -93,9 +94,20 @@ def table(
     }
 
 
-def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str) -> Block:
-    """Make a figure, drawn by the module registered under ``name`` from these data alone."""
-    return {"kind": "figure", "figure": name, "data": plain(data), "caption": caption, "alt": alt}
+def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout: str = "wide") -> Block:
+    """Make a figure, drawn by the module registered under ``name`` from these data alone.
+
+    Parameters
+    ----------
+    caption : str
+        What is seen; a figure must be understood alone.
+    alt : str
+        What stands for it where it cannot be seen.
+    layout : str
+        ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
+    """
+    made = {"kind": "figure", "figure": name, "data": plain(data), "caption": caption, "alt": alt}
+    return {**made, "layout": layout}
 
 
 def text(content: str) -> Block:

@@ -10,7 +10,8 @@ import base64
 import hashlib
 import html
 import itertools
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -21,6 +22,7 @@ from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
 
+SMALLEST, LARGEST = 0.92, 1.35  # pixels for a point of a figure: text stays between 8 and 12 pixels
 KICKERS = {"report": "Loop analysis report"}
 
 
@@ -112,8 +114,10 @@ def _sha256(text: str) -> str:
 
 
 def _labelled(svg: str, alt: str) -> Markup:
-    """Give a figure the text that stands for it where it cannot be seen."""
-    return Markup(svg.replace("<svg ", f'<svg role="img" aria-label="{html.escape(alt)}" ', 1))
-
-
-Drawn = Callable[[Mapping[str, Any]], Markup]
+    """Give a figure the text that stands for it where it cannot be seen, and the bounds of its width."""
+    box = re.search(r'viewBox="0 0 ([\d.]+) ', svg)
+    width = float(box.group(1)) if box else 600.0
+    bounds = f"min-width:{SMALLEST * width:.0f}px;max-width:{LARGEST * width:.0f}px"
+    return Markup(
+        svg.replace("<svg ", f'<svg role="img" aria-label="{html.escape(alt)}" style="{bounds}" ', 1)
+    )

@@ -14,8 +14,8 @@ def show(value: Any, format: str = "text") -> str:
 
     Examples
     --------
-    >>> show(2737.31, "sig:3"), show(0.0000612, "sig:3"), show(-3.04, "fix:1"), show(None)
-    ('2737', '6.12×10⁻⁵', '−3.0', '–')
+    >>> show(2737.31, "sig:3"), show(0.0000612, "sig:3"), show(-3.04, "fix:1"), show(6.0), show(None)
+    ('2737', '6.12×10⁻⁵', '−3.0', '6', '–')
     """
     if value is None:
         return MISSING
@@ -26,13 +26,21 @@ def show(value: Any, format: str = "text") -> str:
     kind, _, digits = format.partition(":")
     if kind == "fix":
         return fixed(value, int(digits))
-    return significant(value, int(digits) if kind == "sig" else 4)
+    if kind == "sig":
+        return significant(value, int(digits))
+    return short(value, int(digits) if kind == "short" else 4)
 
 
 def fixed(value: float, decimals: int) -> str:
     """Write a number with so many decimals."""
     text = f"{value:.{decimals}f}"
     return _minus(text.lstrip("-") if float(text) == 0 else text)
+
+
+def short(value: float, digits: int = 4) -> str:
+    """Write a number with so many significant digits, without trailing zeros."""
+    head, cross, power = significant(value, digits).partition("×")
+    return (head.rstrip("0").rstrip(".") if "." in head else head) + cross + power
 
 
 def significant(value: float, digits: int = 3) -> str:

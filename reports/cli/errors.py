@@ -17,7 +17,7 @@ NUMERICAL_FAILURE = 3
 INTERRUPTED = 130
 
 # typer's own usage errors, whichever click it carries: BadParameter -> UsageError -> ClickException.
-_USAGE_ERRORS = typer.BadParameter.__mro__[2]
+_USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 
 
 def leave_with(passed: bool) -> None:

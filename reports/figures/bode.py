@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from reports.figures import style
 
-SIZE = (8.4, 5.6)
+SIZE = (5.2, 4.9)
 LABELLED = 3
 
 

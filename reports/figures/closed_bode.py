@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from reports.figures import style
 from reports.figures.bode import curves
 
-SIZE = (8.4, 5.0)
+SIZE = (5.2, 4.9)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:
@@ -42,4 +42,4 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
 def _mark(ax: Axes, x: float, y: float, words: str, colour: str, marker: str, data: dict[str, Any]) -> None:
     """Put a marked point with its label."""
     ax.plot([x], [y], marker=marker, markersize=5.5, color=colour, linestyle="none")
-    style.tag(ax, words, (x, y), data, below=None)
+    style.tag(ax, words, (x, y), data, below=False)

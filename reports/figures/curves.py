@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 
 from reports.figures import style
 
-SIZE = (8.4, 3.6)
+SIZE = (8.4, 3.4)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:

@@ -7,42 +7,49 @@ from __future__ import annotations
 
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.figures import style
 
-SIZE = (8.4, 2.9)
+SIZE = (10.6, 2.7)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:
-    """Draw the bars from 0 to 180 deg of lag; what is left to 180 is the phase margin."""
+    """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
     ax = fig.add_subplot()
     names = list(dict.fromkeys(part["name"] for bar in data["bars"] for part in bar["parts"]))
     for row, bar in enumerate(data["bars"]):
-        start = 0.0
-        for part in bar["parts"]:
-            k = names.index(part["name"])
-            look = {"color": style.SERIES[k % 7], "alpha": 0.85, "edgecolor": style.PAPER, "height": 0.56}
-            ax.barh(row, part["deg"], left=start, hatch=style.HATCHES[k % 7], **look)
-            if abs(part["deg"]) > 9:
-                ax.text(
-                    start + part["deg"] / 2,
-                    row,
-                    f"{part['deg']:.0f}°",
-                    ha="center",
-                    va="center",
-                    bbox=style.label_box(),
-                )
-            start += part["deg"]
-        ax.text(max(start, 0.0) + 2, row, f"{start:.1f}°", va="center", color=style.MUTED)
+        _bar(ax, row, bar["parts"], names)
     for k, name in enumerate(names):
-        ax.barh(
-            [0], [0], color=style.SERIES[k % 7], hatch=style.HATCHES[k % 7], edgecolor=style.PAPER, label=name
-        )
+        ax.barh([0], [0], **_look(k), label=name)
     ax.axvline(180.0, color=style.INK, linewidth=1.1)
+    ax.axvline(0.0, color=style.INK, linewidth=0.9)
     ax.set_yticks(range(len(data["bars"])), [bar["label"] for bar in data["bars"]])
     ax.invert_yaxis()
-    ax.set_xticks(range(0, 181, 30))
-    ax.set_xlabel("lag at the gain crossover, deg (180 deg: no phase margin left)")
+    ax.xaxis.set_major_locator(style.multiples(30.0))
+    ax.set_xlabel("lag at the gain crossover, deg (left of zero: lead; at 180 deg no phase margin is left)")
     ax.grid(visible=False, axis="y")
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.28), ncols=min(len(names), 4))
+    fig.legend(loc="outside upper center", ncols=6)
+
+
+def _bar(ax: Axes, row: int, parts: list[dict[str, Any]], names: list[str]) -> None:
+    """Draw the parts of one loop and their sum."""
+    ends = {1: 0.0, -1: 0.0}
+    for part in parts:
+        side = 1 if part["deg"] >= 0 else -1
+        ax.barh(row, part["deg"], left=ends[side], height=0.56, **_look(names.index(part["name"])))
+        if abs(part["deg"]) > 6:
+            place: dict[str, Any] = {"ha": "center", "va": "center", "bbox": style.label_box()}
+            ax.text(ends[side] + part["deg"] / 2, row, f"{part['deg']:.0f}°".replace("-", "−"), **place)
+        ends[side] += part["deg"]
+    ax.text(ends[1] + 2, row, f"{sum(ends.values()):.1f}° in all", va="center", color=style.INK)
+
+
+def _look(k: int) -> dict[str, Any]:
+    return {
+        "color": style.SERIES[k % 7],
+        "hatch": style.HATCHES[k % 7],
+        "edgecolor": style.PAPER,
+        "alpha": 0.85,
+    }

@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from reports.figures import style
 
-SIZE = (6.4, 5.2)
+SIZE = (5.2, 5.0)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:
@@ -34,7 +34,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
         ax.plot([x], [y], marker="o", markersize=5, color=style.GREEN, linestyle="none")
     ax.plot([-1], [0], marker="+", markersize=11, markeredgewidth=2, color=style.INK, linestyle="none")
     ax.annotate("−1", (-1, 0), xytext=(-6, -11), textcoords="offset points", ha="right", fontsize=9)
-    _frame(data, ax)
+    _frame(data, ax, fig)
 
 
 def _modulus(data: dict[str, Any], ax: Axes) -> None:
@@ -50,15 +50,15 @@ def _modulus(data: dict[str, Any], ax: Axes) -> None:
         ax.plot([point[0]], [point[1]], marker="D", markersize=4.5, color=style.ORANGE, linestyle="none")
 
 
-def _frame(data: dict[str, Any], ax: Axes) -> None:
+def _frame(data: dict[str, Any], ax: Axes, fig: Figure) -> None:
     """Keep -1 and the unit circle in view, whatever the curve does far away."""
     reach = data.get("reach", 1.6)
     ax.set_aspect("equal")
-    ax.set_xlim(-1.0 - reach, max(1.25, reach - 0.6))
+    ax.set_xlim(-1.0 - reach, reach - 0.35)
     ax.set_ylim(-reach, reach)
     ax.set_xlabel("real part of L")
     ax.set_ylabel("imaginary part of L")
-    ax.legend(loc="upper right", fontsize=8, ncols=1)
+    fig.legend(loc="outside lower center", ncols=3, fontsize=8)
     step = 0.5 if reach < 3 else 2.0 ** math.ceil(math.log2(reach / 4))
     ax.xaxis.set_major_locator(style.multiples(step))
     ax.yaxis.set_major_locator(style.multiples(step))

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 
 from reports.figures import style
 
-SIZE = (8.4, 3.8)
+SIZE = (10.6, 4.0)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:
@@ -39,10 +39,10 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     full = data.get("full_deflection")
     if full:
         ax.axhline(full, color=style.INK, linewidth=1.0, linestyle=(0, (2, 2)))
-        place = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "bottom"}
-        ax.text(0.99, full, f"full deflection {full:g} {data['unit']}", **place)
+        place: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "bottom"}
+        ax.text(0.995, full, f"full deflection {full:g} {data['unit']}", **place)
     ax.set_ylabel(f"command amplitude, {data['unit']}")
-    ax.legend(loc="upper right", title="limit reached first by")
+    fig.legend(loc="outside right upper", title="reached at this amplitude")
 
 
 def _columns(data: dict[str, Any]) -> list[tuple[float | None, ...]]:

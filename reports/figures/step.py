@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from reports.figures import style
 
-SIZE = (8.4, 3.4)
+SIZE = (5.2, 2.75)
 
 
 def draw(data: dict[str, Any], fig: Figure) -> None:
@@ -44,13 +44,15 @@ def _band(data: dict[str, Any], ax: Axes, scale: float) -> None:
     if data.get("rise"):
         t10, t90 = (t * scale for t in data["rise"])
         for t, level in ((t10, 0.1 * final), (t90, 0.9 * final)):
-            ax.plot([t], [level], marker="o", markersize=4.5, color=style.ORANGE, linestyle="none")
+            if t <= ax.get_xlim()[1]:
+                ax.plot([t], [level], marker="o", markersize=4.5, color=style.GREEN, linestyle="none")
         words.append(f"rise 10–90 %: {style.seconds(data['rise'][1] - data['rise'][0])}")
     if data.get("overshoot_percent") is not None:
         words.append(f"overshoot: {data['overshoot_percent']:.1f} %")
-    if data.get("settling_s") is not None:
+    if data.get("settling_s") is not None and data["settling_s"] <= data["time_s"][-1]:
         ax.axvline(data["settling_s"] * scale, color=style.PURPLE, linewidth=1.2, linestyle=(0, (5, 2)))
+    if data.get("settling_s") is not None:
         words.append(f"settled to 2 %: {style.seconds(data['settling_s'])}")
     if words:
-        place = {"transform": ax.transAxes, "ha": "right", "va": "center", "linespacing": 1.5}
+        place: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "center", "linespacing": 1.5}
         ax.text(0.985, 0.42, "\n".join(words), bbox=style.label_box(), **place)

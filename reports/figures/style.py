@@ -108,7 +108,8 @@ def render(
     page: bool,
 ) -> str:
     """Draw with the one style and give the SVG element; the same data give the same bytes."""
-    with matplotlib.rc_context({**STYLE, "svg.hashsalt": prefix}):
+    settings: dict[Any, Any] = {**STYLE, "svg.hashsalt": prefix}
+    with matplotlib.rc_context(settings):
         fig = Figure(figsize=size, layout="constrained")
         draw(data, fig)
         buffer = io.StringIO()

@@ -36,7 +36,7 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
     rows = []
     for name, point in points.items():
         own = [found for found in stages.values() if found.loop.break_point == name]
-        rows += [_row(name, "inner closed, outer open", found) for found in own]
+        rows += [_row(name, "outer ones open", found) for found in own]
         rows.append(_row(name, "all closed", point.figures))
     note = "The outermost loop has no other loop outside it, so its two lines agree."
     blocks = [doc.table("Break-point matrix", COLUMNS, rows, note)]

@@ -11,7 +11,7 @@ from reports.sections.names import LOOPS, hertz
 
 PARTS = {
     "controller": "controller",
-    "plant": "motor and inner loops",
+    "plant": "motor, inner loops",
     "measurement": "speed measurement",
     "hold": "hold",
     "computing delay": "computing delay",
@@ -32,7 +32,7 @@ def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
     rows = [_row(name, budget) for name, budget in budgets.items()]
     note = (
         "Measured by the same loop built up step by step, so that the parts add up to the phase of the exact "
-        "sampled loop. One more sample: what a further period of computing delay would cost; not in the total."
+        "sampled loop. One more sample: what one more period of computing delay costs, not in the total."
     )
     bars = [
         {

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from analyses.loop_figures import LoopFigures
 from analyses.responses import curve, frequency_grid
 from reports import document as doc
@@ -15,7 +13,8 @@ from reports.sections.margins import margin_row, response_row
 from reports.sections.names import FORMS, LOOPS
 
 COLUMNS = [
-    doc.column("loop", "Loop and form"),
+    doc.column("loop", "Loop"),
+    doc.column("form", "Form"),
     doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
     doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
     doc.column("phase_cost_deg", "against ideal", "deg", format="fix:2"),
@@ -38,10 +37,9 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay, the model of the paper. No form uses a Padé approximation."
     )
-    blocks = [doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)]
-    blocks += [_overlay(name, forms) for name in forms["sampled"]]
+    table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The difference between the forms is the price of sampling, hold and computing delay."
-    return doc.section("forms", "Sampled, continuous, ideal", blocks, intro=intro)
+    return doc.section("forms", "Sampled, continuous, ideal", [_overlay(forms), table], intro=intro)
 
 
 def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures) -> dict[str, Any]:
@@ -50,19 +48,16 @@ def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures) -> dict[s
     reference = margin_row(ideal)["phase_margin_deg"]
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {"loop": f"{LOOPS[name]}, {FORMS[form]}", "phase_cost_deg": cost, **margins, **response}
+    row = {**margins, **response, "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({} if found.stable else {"_status": "fail"})
 
 
-def _overlay(name: str, forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
-    """Make the overlaid open-loop Bode figure of one loop."""
-    sampled = forms["sampled"][name]
-    grid = frequency_grid(sampled, points=180)
-    series = [(FORMS[form], curve(found[name].loop.open_loop, grid)) for form, found in forms.items()]
-    data = {**bode_data(series), "nyquist_hz": nyquist_hz(sampled)}
-    lag = np.diff([found.phase_deg[-1] for _, found in series[:3:2]])[0]
-    caption = (
-        f"{LOOPS[name]}, open loop in the three forms, up to the Nyquist frequency; there they differ by "
-        f"{abs(lag):.0f}° in phase."
-    )
-    return doc.figure("bode", data, caption=caption, alt=f"Bode diagram with three curves. {caption}")
+def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
+    """Make the overlaid open-loop Bode figures of all loops."""
+    panels = []
+    for name, sampled in forms["sampled"].items():
+        grid = frequency_grid(sampled, points=130)
+        series = [(FORMS[form], curve(found[name].loop.open_loop, grid)) for form, found in forms.items()]
+        panels.append({"title": LOOPS[name], **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
+    caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."
+    return doc.figure("forms", {"panels": panels}, caption=caption, alt=f"Bode diagrams. {caption}")

@@ -13,6 +13,7 @@ from analyses.loop_figures import LoopFigures
 from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at
 from reports import document as doc
 from reports.document import rounded
+from reports.numbers import fixed
 from reports.sections.margins import finite, margin_row, response_row
 from reports.sections.names import LOOPS, hertz
 
@@ -88,7 +89,7 @@ def open_bode(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any
         f"{title}, open loop: gain margins at the phase crossovers (■), "
         "phase margins at the gain crossovers (●)."
     )
-    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, found))
+    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, found), layout="half")
 
 
 def closed_bode(
@@ -115,7 +116,7 @@ def closed_bode(
     }
     lag = _hz(band.minus90deg_hz)
     words = f"{title}, closed loop: −3 dB at {_hz(band.minus3db_hz)}, −90° at {lag}."
-    return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}")
+    return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
 
 
 def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
@@ -128,7 +129,7 @@ def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
         value = response_at(system, np.array([closest]))[0]
         at = [float(value.real), float(value.imag)]
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
-    on_circle = response_at(system, np.array(phases)) if phases else []
+    on_circle = response_at(system, np.array(phases)) if phases else np.empty(0, dtype=complex)
     data = {
         "real": rounded(points.real, 4),
         "imag": rounded(points.imag, 4),
@@ -143,7 +144,7 @@ def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
         f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "
         "(modulus margin, 1 over the peak of S)."
     )
-    return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}")
+    return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
 
 
 def sensitivity(
@@ -169,19 +170,22 @@ def sensitivity(
         "nyquist_hz": nyquist_hz(found),
     }
     caption = (
-        f"{title}: sensitivity S = 1/(1 + L), peak {peaks.sensitivity_db:.2f} dB, "
-        f"and closed loop T = L/(1 + L), peak {peaks.complementary_db:.2f} dB."
+        f"{title}: sensitivity S = 1/(1 + L), peak {fixed(peaks.sensitivity_db, 2)} dB, "
+        f"and closed loop T = L/(1 + L), peak {fixed(peaks.complementary_db, 2)} dB."
     )
-    return doc.figure("sensitivity", data, caption=caption, alt=caption)
+    return doc.figure("sensitivity", data, caption=caption, alt=caption, layout="half")
 
 
 def step(title: str, found: LoopFigures, locked: LoopFigures | None) -> dict[str, Any]:
     """Make the step figure."""
     figures = found.step
     assert figures is not None
-    series = [_step_series("rotor free" if locked else "closed loop", found)]
+    end = None
     if locked is not None and locked.step is not None:
-        series.append(_step_series("rotor locked", locked, end_s=series[0]["time_s"][-1]))
+        end = 6.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
+    series = [_step_series("rotor free" if locked else "closed loop", found, end)]
+    if locked is not None and locked.step is not None:
+        series.append(_step_series("rotor locked", locked, end))
     data = {
         "time_s": series[0]["time_s"],
         "series": series,
@@ -191,8 +195,10 @@ def step(title: str, found: LoopFigures, locked: LoopFigures | None) -> dict[str
         "overshoot_percent": finite(figures.overshoot_percent),
         "held": found.loop.period_s is not None,
     }
-    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
-    return doc.figure("step", data, caption=caption, alt=f"Step response. {caption}")
+    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
+    if end is not None and float(figures.settling_time_s) > end:
+        caption += " With the rotor free, back-EMF keeps it from settling within the time shown."
+    return doc.figure("step", data, caption=caption, alt=f"Step response. {caption}", layout="half")
 
 
 def bode_data(series: Sequence[tuple[str, Curve]]) -> dict[str, Any]:
@@ -227,7 +233,10 @@ def _step_series(label: str, found: LoopFigures, end_s: float | None = None) -> 
         keep = max(int(np.searchsorted(time, end_s, side="right")), 8)
         time, response = time[:keep], response[:keep]
     stride = max(1, math.ceil(len(time) / STEP_POINTS))
-    return {"label": label, "time_s": rounded(time[::stride]), "response": rounded(response[::stride])}
+    time, response = time[::stride], response[::stride]
+    if end_s is not None and time[-1] < end_s:
+        time, response = np.append(time, end_s), np.append(response, response[-1])
+    return {"label": label, "time_s": rounded(time), "response": rounded(response)}
 
 
 def _rise(figures: Any) -> list[float] | None:

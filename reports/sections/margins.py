@@ -122,7 +122,7 @@ def response_row(found: LoopFigures) -> dict[str, Any]:
             "minus3db_hz": finite(band.minus3db_hz),
             "minus90deg_hz": finite(band.minus90deg_hz),
             "resonance_db": finite(band.resonance_peak_db),
-            "resonance_hz": finite(band.resonance_hz),
+            "resonance_hz": finite(band.resonance_hz) or None,
         }
     if peaks is not None:
         row["t_peak_db"] = finite(peaks.complementary_db)

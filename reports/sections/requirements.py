@@ -34,7 +34,9 @@ def item(verdict: RequirementVerdict) -> dict[str, Any]:
     reason = verdict.reason
     if verdict.value is not None and math.isinf(verdict.value):
         reason = reason or "unlimited"
-    source = requirement.source + (f" ({requirement.note})" if requirement.note else "")
+    source = requirement.source + (
+        f" ({requirement.note})" if requirement.note and requirement.note != requirement.source else ""
+    )
     return doc.verdict(
         verdict.id,
         label(verdict),
