@@ -144,11 +144,15 @@ def margin_spreads(
             unit=unit,
             value=middle[label, unit],
             slopes=s,
-            std=float(np.sqrt(max(s @ fit.covariance @ s, 0.0))),
-            floor_std=float(np.sqrt(max(s @ shared @ s, 0.0))),
+            std=_root(s, fit.covariance),
+            floor_std=_root(s, shared),
         )
         for (label, unit), s in slopes.items()
     )
+
+
+def _root(slopes: FloatArray, covariance: FloatArray) -> float:
+    return float(np.sqrt(np.maximum(slopes @ covariance @ slopes, 0.0)))
 
 
 def _margins(design: Design) -> dict[tuple[str, str], float]:

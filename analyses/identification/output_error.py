@@ -113,7 +113,7 @@ def _gauss_newton(
         dead = np.flatnonzero(np.linalg.norm(jac, axis=0) <= 1e-12 * np.linalg.norm(rest))
         if len(dead):
             raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
-        change = -np.linalg.lstsq(jac, rest, rcond=None)[0]
+        change = np.asarray(-np.linalg.lstsq(jac, rest, rcond=None)[0])
         p, rest, moved = _halved_step(residual, p, rest, change)
         if progress is not None:
             progress(iteration, max_iterations)

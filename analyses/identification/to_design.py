@@ -40,6 +40,7 @@ def dynamic_estimate(model: DynamicModel, source: str) -> Estimate:
 
     With a friction per direction the offset lies in the difference of the two, and the offset becomes zero.
     """
+    paths: tuple[str, ...]
     if model.form == "symmetric":
         paths = ("motor.rotor_inertia", "friction.viscous", "friction.dry_torque", "friction.offset_torque")
     else:

@@ -1,0 +1,196 @@
+"""The model driven by a record's own command, load and supply."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.correlation.compare import SignalComparison, compare_signals
+from analyses.identification.differentiation import filtered_motion
+from analyses.records.record import Record
+
+if TYPE_CHECKING:
+    from nonlinear import State
+
+FloatArray = NDArray[np.float64]
+
+REFERENCES = ("reference", "position_reference")
+UNITS = {
+    "angle": "rad",
+    "output_angle": "rad",
+    "position": "m",
+    "speed": "rad/s",
+    "velocity": "m/s",
+    "current": "A",
+    "voltage": "V",
+    "force": "N",
+}
+VELOCITY_CUTOFF_HZ = 100.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CorrelationResult:
+    """The comparison of every signal that the record and the model share.
+
+    ``limits`` tells for each limiter what share of the simulated time it was active. ``notes`` tells what was
+    done to the record, and what the model was given.
+    """
+
+    record: str
+    design: str
+    signals: tuple[SignalComparison, ...]
+    limits: dict[str, float]
+    notes: tuple[str, ...]
+    counts: str
+    sha256: str
+
+    def __getitem__(self, name: str) -> SignalComparison:
+        for signal in self.signals:
+            if signal.name == name:
+                return signal
+        raise InputError(
+            f'no signal "{name}"; there are: {", ".join(s.name for s in self.signals)}', self.record
+        )
+
+
+def correlate_record(
+    design: Design,
+    record: Record,
+    *,
+    derive_velocity: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> CorrelationResult:
+    """Simulate the design with a record's command and compare every signal.
+
+    Parameters
+    ----------
+    design : Design
+    record : Record
+        Needs the command: ``reference`` (output angle, rad) or ``position_reference`` (m, linear axis). A
+        ``torque`` signal is the hinge moment at the output, a ``supply`` signal the bus voltage (its median
+        becomes the voltage limit). Compared are, where recorded: angle, output_angle or position, speed or
+        velocity, current, voltage, force. The force of a drive with an ideal source is its gain times the
+        voltage.
+    derive_velocity : bool
+        Where no speed was recorded, compare with the derivative of the recorded position (4th-order
+        Butterworth at 100 Hz forward and backward, central differences).
+    progress : callable, optional
+
+    Raises
+    ------
+    InputError
+        If the record holds no command, or nothing to compare.
+    """
+    notes = list(record.notes)
+    if not record.is_regular:
+        record = record.resampled()
+        notes.append(record.notes[-1])
+    measured = _measured(design, record, derive_velocity, notes)
+    if not measured:
+        raise InputError(f"nothing to compare; known signals: {', '.join(UNITS)}", where=record.name)
+    design = _with_supply(design, record, notes)
+    modelled, limits = _modelled(design, record, measured, notes, progress)
+    signals = tuple(
+        compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
+        for name, values in measured.items()
+    )
+    return CorrelationResult(
+        record=record.name,
+        design=design.name,
+        signals=signals,
+        limits=limits,
+        notes=tuple(notes),
+        counts=str(record.counts),
+        sha256=record.sha256,
+    )
+
+
+def _measured(design: Design, record: Record, derive: bool, notes: list[str]) -> dict[str, FloatArray]:
+    found = {name: record[name] for name in UNITS if name in record.signals}
+    gain = design.motor.source_gain_Nm_V
+    if design.axis == "linear":
+        place, rate = "position", "velocity"
+        if "force" not in found and "voltage" in found and gain is not None:
+            found["force"] = gain * found["voltage"]
+            notes.append(f"measured force: {gain:g} N/V times the recorded voltage")
+    else:
+        place, rate = ("angle" if "angle" in found else "output_angle"), "speed"
+    if derive and rate not in found and place in found:
+        cutoff = min(VELOCITY_CUTOFF_HZ, 0.2 / record.period_s)
+        motion = filtered_motion(found[place], record.period_s, cutoff_hz=cutoff, order=4)
+        ratio = design.total_ratio if place == "output_angle" else 1.0
+        found[rate] = ratio * motion.velocity
+        notes.append(f"measured {rate}: derivative of the {place}, filtered at {cutoff:g} Hz without phase")
+    return found
+
+
+def _with_supply(design: Design, record: Record, notes: list[str]) -> Design:
+    if "supply" not in record.signals:
+        return design
+    level = float(np.median(record["supply"]))
+    spread = float(np.std(record["supply"]))
+    notes.append(f"supply: the median of the record, {level:.4g} V (std {spread:.2g} V)")
+    return with_values(design, {"limits.voltage": level}, check=False)
+
+
+def _modelled(
+    design: Design,
+    record: Record,
+    measured: dict[str, FloatArray],
+    notes: list[str],
+    progress: Callable[[int, int], None] | None,
+) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    """Every comparable signal of the model at the record's times, and the limiters' shares of the time."""
+    from nonlinear import commands, loads, simulate
+
+    reference = next((record[name] for name in REFERENCES if name in record.signals), None)
+    if reference is None:
+        raise InputError(
+            f"no command: one of the signals {', '.join(REFERENCES)} is needed", where=record.name
+        )
+    time = record.time_s - record.time_s[0]
+    load = 0.0 if "torque" not in record.signals else loads.series(time, record["torque"])
+    period = design.controller.period_s
+    run = simulate(
+        design,
+        commands.sampled(time, reference, where=record.name),
+        float(time[-1]) + 2.0 * period,
+        load,
+        initial=_initial(design, measured),
+        progress=progress,
+    )
+    gain = design.motor.source_gain_Nm_V
+    series = {
+        "angle": run.motor_angle_rad,
+        "output_angle": run.output_angle_rad,
+        "position": run.output_angle_rad,
+        "speed": run.motor_speed_rad_s,
+        "velocity": run.motor_speed_rad_s / design.total_ratio,
+        "current": run.current_A,
+        "voltage": run.voltage_V,
+        "force": run.voltage_V * (1.0 if gain is None else gain),
+    }
+    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between its samples")
+    limits = {name: use.fraction for name, use in run.limits.items()}
+    return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
+
+
+def _initial(design: Design, measured: dict[str, FloatArray]) -> State:
+    """The state at the record's first sample, as far as it tells."""
+    from nonlinear import State
+
+    ratio = design.total_ratio
+    place = 0.0
+    if "angle" in measured:
+        place = float(measured["angle"][0])
+    for name in ("output_angle", "position"):
+        if name in measured and "angle" not in measured:
+            place = ratio * float(measured[name][0])
+    return State(motor_angle_rad=place)

@@ -1,0 +1,152 @@
+"""A motor on a voltage: steady gain and time constant from a step, and what they say of another record.
+
+Made for the ODrive records: the drive logs its voltage, and a speed that has passed its estimator, a
+critically damped second-order tracker whose bandwidth is a setting (1000 rad/s unless changed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError, NumericalError
+from analyses.records.csv_stream import read_csv_record
+from analyses.records.record import Record
+from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
+
+FloatArray = NDArray[np.float64]
+
+ODRIVE_SPEC = RecordSpec(
+    format=CsvFormat(comment="%", row_end=";", names=("timestep", "voltage", "position", "velocity")),
+    time=TimeColumn(column="timestep", tick_s=1.0 / 8000.0, minimum=1.0),
+    signals=(
+        SignalColumn(name="voltage", column="voltage", unit="V"),
+        SignalColumn(name="angle", column="position", unit="turn"),
+        SignalColumn(name="speed", column="velocity", unit="turn/s"),
+    ),
+)
+ESTIMATOR_RAD_S = 1000.0
+GRID_S = 1.0 / 16000.0
+WINDOW_S = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class VoltageMotor:
+    """``time_constant dw/dt + w = gain V``, and the speed estimator that the record has passed.
+
+    ``gain_rad_sV`` and ``time_constant_s`` with their standard errors; ``estimator_rad_s`` is given, not
+    fitted.
+    """
+
+    gain_rad_sV: float
+    gain_std: float
+    time_constant_s: float
+    time_constant_std_s: float
+    estimator_rad_s: float
+    steady_speeds_rad_s: tuple[float, ...]
+    relative_residual: float
+
+    def estimated_speed(self, time_s: FloatArray, voltage_V: FloatArray) -> FloatArray:
+        """Speed as the drive would log it, for a voltage on a regular grid, held between its points."""
+        from scipy.signal import cont2discrete, lfilter
+
+        period = float(time_s[1] - time_s[0])
+        b = self.estimator_rad_s
+        plant = [self.time_constant_s, 1.0]
+        denominator = np.polymul(plant, [1.0, 2.0 * b, b * b])
+        numerator, discrete, _ = cont2discrete(([self.gain_rad_sV * b * b], denominator), period)
+        return np.asarray(lfilter(numerator.ravel(), discrete, voltage_V))
+
+
+def read_odrive(path: str | Path) -> Record:
+    """Read a record of the ODrive recorder; rows of NaN and the zeros at its end are dropped and counted."""
+    return read_csv_record(path, ODRIVE_SPEC)
+
+
+def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S) -> VoltageMotor:
+    """Fit gain and time constant to the speed after a voltage step.
+
+    The step falls somewhere between two rows; its moment is fitted too, one for each record.
+
+    Raises
+    ------
+    InputError
+        If a record holds no step from zero.
+    NumericalError
+        If the fit does not converge.
+    """
+    from scipy.optimize import least_squares
+
+    steps = [_Step.of(record) for record in records]
+    if not steps:
+        raise InputError("at least one record of a step is needed")
+    gain = float(np.mean([step.steady / step.level for step in steps]))
+
+    def motor(p: FloatArray) -> VoltageMotor:
+        return VoltageMotor(
+            gain_rad_sV=float(p[0] * gain),
+            gain_std=0.0,
+            time_constant_s=float(abs(p[1]) * 1e-3),
+            time_constant_std_s=0.0,
+            estimator_rad_s=estimator_rad_s,
+            steady_speeds_rad_s=(),
+            relative_residual=0.0,
+        )
+
+    def residual(p: FloatArray) -> FloatArray:
+        grid = np.arange(0.0, WINDOW_S + 0.1, GRID_S)
+        unit = motor(p).estimated_speed(grid, np.ones(len(grid)))
+        parts = [
+            s.speed - s.level * np.interp(s.time - ms * 1e-3, grid, unit, left=0.0)
+            for s, ms in zip(steps, p[2:], strict=True)
+        ]
+        return np.concatenate(parts)
+
+    start = np.array([1.0, 3.0, *(s.between * 500.0 for s in steps)])
+    solution = least_squares(residual, start, diff_step=1e-3, x_scale=np.maximum(np.abs(start), 0.1))
+    if not solution.success:
+        raise NumericalError(f"the step does not fit a first-order motor: {solution.message}")
+    variance = 2.0 * solution.cost / (len(solution.fun) - len(start))
+    std = np.sqrt(np.diag(variance * np.linalg.inv(solution.jac.T @ solution.jac)))
+    size = float(np.linalg.norm(np.concatenate([s.speed for s in steps])))
+    return VoltageMotor(
+        gain_rad_sV=float(solution.x[0] * gain),
+        gain_std=float(std[0] * gain),
+        time_constant_s=float(abs(solution.x[1]) * 1e-3),
+        time_constant_std_s=float(std[1] * 1e-3),
+        estimator_rad_s=estimator_rad_s,
+        steady_speeds_rad_s=tuple(step.steady for step in steps),
+        relative_residual=float(np.linalg.norm(solution.fun)) / size,
+    )
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Speed around a step; times from the last row without voltage, ``between`` is the gap to the next."""
+
+    time: FloatArray
+    speed: FloatArray
+    level: float
+    steady: float
+    between: float
+
+    @staticmethod
+    def of(record: Record) -> _Step:
+        on = np.flatnonzero(record["voltage"] != 0.0)
+        if not len(on) or on[0] == 0:
+            raise InputError("no step of the voltage from zero", where=record.name)
+        first = int(on[0])
+        zero = float(record.time_s[first - 1])
+        part = (record.time_s >= zero - 0.05) & (record.time_s <= zero + WINDOW_S)
+        late = record.time_s > zero + 0.2
+        return _Step(
+            time=record.time_s[part] - zero,
+            speed=record["speed"][part],
+            level=float(np.median(record["voltage"][first:])),
+            steady=float(np.mean(record["speed"][late])),
+            between=float(record.time_s[first] - zero),
+        )
