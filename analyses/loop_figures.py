@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -65,8 +65,8 @@ def loop_figures(
 
     Raises
     ------
-    NumericalError
-        If a figure cannot be found to its stated accuracy.
+    InputError, NumericalError
+        If the margins cannot be found; another figure that cannot becomes a note.
     """
     from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
     from actuator_lti.margins import stability_margins
@@ -89,10 +89,10 @@ def loop_figures(
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
-    """Give a figure; where the response has none (no gain at DC, say), note the reason instead."""
+    """Give a figure; where there is none (no gain at DC, say) or none is found, note the reason instead."""
     try:
         return call()
-    except InputError as error:
+    except (InputError, NumericalError) as error:
         notes.append(str(error))
         return None
 

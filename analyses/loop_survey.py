@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
 from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
@@ -24,10 +25,27 @@ DESCRIBED_FRACTIONS = (0.01, 0.1)
 
 @dataclass(frozen=True)
 class BreakPoint:
-    """A loop seen at one point with all others closed; ``exact`` where it is periodically time-varying."""
+    """A loop seen at one point with all others closed.
 
-    figures: LoopFigures
+    Attributes
+    ----------
+    figures : LoopFigures or None
+        ``None`` where they cannot be found; ``reason`` says why.
+    exact : ExactMargins or None
+        Where the loop is periodically time-varying.
+    reason : str
+    """
+
+    figures: LoopFigures | None
     exact: ExactMargins | None
+    reason: str = ""
+
+    @property
+    def stable(self) -> bool:
+        """Whether the closed loop is known to be stable."""
+        if self.exact is not None:
+            return self.exact.stable
+        return self.figures is not None and self.figures.stable
 
 
 @dataclass(frozen=True)
@@ -131,9 +149,11 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
     from actuator_lti.loops import exact_margins
 
     loop = loops.break_points[name]
-    return BreakPoint(
-        loop_figures(loop, bandwidth=False, step=False), exact_margins(loops, name) if loop.periodic else None
-    )
+    exact = exact_margins(loops, name) if loop.periodic else None
+    try:
+        return BreakPoint(loop_figures(loop, bandwidth=False, step=False), exact)
+    except (InputError, NumericalError) as error:
+        return BreakPoint(None, exact, str(error))
 
 
 def _operating_points(design: Design) -> tuple[OperatingPointFigures, ...]:

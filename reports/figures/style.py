@@ -152,7 +152,7 @@ def phase_ticks(ax: Axes, low: float, high: float) -> None:
     ax.set_yticks([tick for tick in ticks if low <= tick <= high])
 
 
-HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "||||", "----")
+HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
 
 
 def gaps(values: Sequence[float | None]) -> list[float]:

@@ -33,13 +33,16 @@ EXACT_COLUMNS = [
 
 def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures]) -> dict[str, Any]:
     """Make the section; ``stages`` are the loops with the outer ones open."""
-    rows = []
+    rows: list[dict[str, Any]] = []
+    reasons: list[str] = []
     for name, point in points.items():
         own = [found for found in stages.values() if found.loop.break_point == name]
         rows += [_row(name, "outer ones open", found) for found in own]
         rows.append(_row(name, "all closed", point.figures))
+        reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
     note = "The outermost loop has no other loop outside it, so its two lines agree."
     blocks = [doc.table("Break-point matrix", COLUMNS, rows, note)]
+    blocks += [doc.text(reason) for reason in reasons]
     exact = [_exact_row(name, point) for name, point in points.items() if point.exact is not None]
     if exact:
         words = (
@@ -52,11 +55,13 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
         "A gain error or a delay sits at one place in the finished drive, with every other loop running. "
         "The matrix shows what the drive tolerates at each place."
     )
-    status = "info" if all(point.figures.stable for point in points.values()) else "fail"
+    status = "info" if all(point.stable for point in points.values()) else "fail"
     return doc.section("break-points", "Break-point matrix", blocks, intro=intro, status=status)
 
 
-def _row(name: str, others: str, found: LoopFigures) -> dict[str, Any]:
+def _row(name: str, others: str, found: LoopFigures | None) -> dict[str, Any]:
+    if found is None:
+        return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
     return {"point": POINTS.get(name, name), "others": others, **margin_row(found)}
 
 
