@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from actuator_lti.errors import InputError
 from reports.nightly.figures import digest
 
 
@@ -47,5 +48,7 @@ def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     from actuator_lti.design.loader import read_design_text
     from reports.build import design_report
 
+    if "refused" in payload:
+        raise InputError(str(payload["refused"]))
     design = read_design_text(str(payload["design"]), str(payload["name"]))
     return design_report(design)

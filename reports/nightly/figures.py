@@ -59,9 +59,15 @@ def digest(document: Mapping[str, Any]) -> dict[str, Any]:
         "failed_sections": [
             one_line(str(part.get("title", "")), 120)
             for part in document.get("sections", ())
-            if part.get("status") == "fail"
+            if part.get("status") == "fail" and not _has_failed_verdict(part)
         ],
     }
+
+
+def _has_failed_verdict(part: Mapping[str, Any]) -> bool:
+    blocks = [block for _, block in _nested("", part.get("blocks", ()))]
+    items = [item for block in blocks if block.get("kind") == "verdicts" for item in block.get("items", ())]
+    return any(item.get("passed") is False for item in items)
 
 
 def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:

@@ -342,6 +342,7 @@ def open_history(path: Path) -> Iterator[History]:
 
 def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
     try:
+        schema.checked_version(connection, path)
         connection.execute(f"PRAGMA page_size = {PAGE_BYTES}")
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")

@@ -63,7 +63,7 @@ def prepare(connection: sqlite3.Connection, path: Path) -> str | None:
     InputError
         Where the file is no history, or was written by a newer version.
     """
-    version = _checked_version(connection, path)
+    version = checked_version(connection, path)
     if version == VERSION:
         return None
     backup = _backup(connection, path, version) if version else None
@@ -80,7 +80,14 @@ def prepare(connection: sqlite3.Connection, path: Path) -> str | None:
     return f"history brought from version {version} to {VERSION}; as it was: {backup.name}"
 
 
-def _checked_version(connection: sqlite3.Connection, path: Path) -> int:
+def checked_version(connection: sqlite3.Connection, path: Path) -> int:
+    """Return the version of a history (0 of a new file); refuse what is none, changing nothing.
+
+    Raises
+    ------
+    InputError
+        Where the file is no history, or was written by a newer version.
+    """
     try:
         version = int(connection.execute("PRAGMA user_version").fetchone()[0])
         application = int(connection.execute("PRAGMA application_id").fetchone()[0])

@@ -1,50 +1,125 @@
-"""From a study file, or a single design, to the jobs of a night."""
+"""From a study file, or a single design, to the jobs of a night.
+
+A study file may hold a table for the nightly beside what `analyses.study` reads::
+
+    [nightly]
+    pdf = true
+    tolerance = { "*phase margin*" = "0.5 deg", "*bandwidth*" = "1 %" }
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from actuator_lti.design import design_hash, load_design, write_design
-from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from reports.nightly.job import Job
 from reports.nightly.night import Study
-from reports.nightly.text import one_line
+from reports.nightly.tolerance import Tolerances, read_tolerances
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.study import Study as StudyFile
+    from analyses.study import Variant
+
+_KEYS = ("pdf", "tolerance")
 
 
-def read_study(path: str, *, pdf: bool = False, validation: bool = True) -> Study:
+def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) -> Study:
     """Read what is to be built every night.
+
+    A variant that its design's checks refuse becomes a job that fails with their words; the others are built.
 
     Parameters
     ----------
     path : str
         A study file, or a design (by path or shipped name), which is then a study of one.
     pdf : bool
-        Whether a PDF is made beside each report.
-    validation : bool
-        Whether reports hold the nonlinear validation.
+        Whether a PDF is made beside each report; the study file may ask for it, too.
+    validation : bool, optional
+        Whether reports hold the nonlinear validation; as the study says where left out.
 
     Raises
     ------
     InputError
         From the file: one line with place, key and what is allowed.
     """
-    design = load_design(path)
-    settings = {"pdf": pdf, "validation": validation}
-    origin = Path(path) if Path(path).exists() else None
-    return Study(name=design.name, title=design.title, jobs=(design_job(design, settings),), origin=origin)
+    from analyses.study import is_study, study_of
+
+    if not is_study(path):
+        from actuator_lti.design import load_design
+
+        design = load_design(path)
+        file, table = study_of(design), {}
+        check = True if validation is None else validation
+    else:
+        file, table = _read_file(Path(path))
+        check = file.validation if validation is None else validation
+    tolerances = _tolerances(table, path)
+    settings = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
+    return Study(
+        name=file.name,
+        title=file.title or file.name,
+        jobs=tuple(_jobs(file, settings)),
+        origin=Path(path).resolve() if Path(path).exists() else None,
+        tolerances=tolerances,
+    )
 
 
-def design_job(design: Design, settings: Mapping[str, Any], name: str | None = None) -> Job:
-    """Make the job that builds one design's report."""
-    label = name or design.name
-    if not label.strip():
-        raise InputError(f"{one_line(design.origin, 80)}: the design has no name")
+def _read_file(path: Path) -> tuple[StudyFile, dict[str, Any]]:
+    from actuator_lti.design.reading import decode, parse_toml, read_bytes
+    from analyses.study import study_from_tree
+
+    where = str(path)
+    tree = parse_toml(decode(read_bytes(path, "study file"), where), where)
+    table = tree.pop("nightly", {})
+    if not isinstance(table, dict):
+        raise InputError("nightly: allowed: a table, [nightly]", where=where)
+    for key in table:
+        if key not in _KEYS:
+            raise InputError(f"nightly.{key[:60]!r}: unknown key; allowed: {', '.join(_KEYS)}", where=where)
+    return study_from_tree(tree, where, path.parent, keep_going=True), table
+
+
+def _tolerances(table: Mapping[str, Any], where: str) -> Tolerances:
+    rules = table.get("tolerance", {})
+    if not isinstance(rules, dict):
+        raise InputError("nightly.tolerance: allowed: a table of name pattern to tolerance", where=where)
+    return read_tolerances(rules, where)
+
+
+def _flag(table: Mapping[str, Any], key: str, where: str) -> bool:
+    value = table.get(key, False)
+    if not isinstance(value, bool):
+        raise InputError(f"nightly.{key} = {str(value)[:40]!r}: allowed: true or false", where=where)
+    return value
+
+
+def _jobs(study: StudyFile, settings: Mapping[str, Any]) -> Iterator[Job]:
+    for variant in study.all:
+        yield (
+            refused_job(variant)
+            if variant.design is None
+            else design_job(variant.design, settings, variant.name)
+        )
+
+
+def refused_job(variant: Variant) -> Job:
+    """Make the job of a variant that cannot be a design: it fails with the words of the refusal."""
+    parameters = {key: str(value) for key, value in variant.overrides.items()}
     return Job(
-        name=label,
-        payload={"name": label, "design": write_design(design), "settings": dict(settings)},
+        name=variant.name, payload={"name": variant.name, "refused": variant.error}, parameters=parameters
+    )
+
+
+def design_job(design: Design, settings: Mapping[str, Any], name: str) -> Job:
+    """Make the job that builds one design's report."""
+    from actuator_lti.design import design_hash, write_design
+
+    return Job(
+        name=name,
+        payload={"name": name, "design": write_design(design), "settings": dict(settings)},
         design_hash=design_hash(design),
         parameters={path: parameter.text for path, parameter in design.parameters.items()},
         title=design.title,

@@ -1,0 +1,87 @@
+"""Checks of a published site that several tests share."""
+
+from __future__ import annotations
+
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+from xml.etree import ElementTree
+
+VOID = {"meta", "link", "input", "br", "hr", "img", "wbr", "path", "circle", "rect", "line"}
+
+
+class Page(HTMLParser):
+    """Collects links, ids, tags and text; remembers whether every element was closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.links: list[str] = []
+        self.ids: set[str] = set()
+        self.tags: list[str] = []
+        self.words: list[str] = []
+        self.handlers: list[str] = []
+        self.depth: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name in ("href", "src", "xlink:href", "action", "srcset"):
+                self.links.append(value or "")
+            if name == "id":
+                self.ids.add(value or "")
+            if name.startswith("on"):
+                self.handlers.append(name)
+        if tag not in VOID:
+            self.depth.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.depth.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in self.depth:
+            while self.depth.pop() != tag:
+                pass
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join(" ".join(self.words).split())
+
+
+def check_whole(site: Path) -> Page:
+    """Every page reachable from the index is complete and every link leads to a file inside of the site."""
+    seen: set[Path] = set()
+    first = _check_page(site / "index.html", site, seen)
+    json.loads((site / "summary.json").read_text())
+    ElementTree.parse(site / "junit.xml")
+    return first
+
+
+def _check_page(path: Path, site: Path, seen: set[Path]) -> Page:
+    seen.add(path)
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    if path.name != "report.html":
+        assert text.rstrip().endswith("</html>"), f"{path} is cut off"
+    assert not page.depth or path.name == "report.html", f"{path}: {page.depth} not closed"
+    for link in page.links:
+        parts = urlsplit(link)
+        if link.startswith("data:") or (not parts.path and not parts.netloc):
+            continue
+        assert not parts.scheme, f"{path} asks {link}"
+        assert not parts.netloc, f"{path} asks {link}"
+        target = (path.parent / unquote(parts.path)).resolve()
+        assert target.is_relative_to(site.resolve()), f"{link} leaves the site"
+        if target.name in ("summary.json", "junit.xml", "summary.md"):
+            continue
+        assert target.is_file(), f"{path.name}: {link} leads nowhere"
+        if target.suffix == ".html" and target not in seen:
+            _check_page(target, site.resolve(), seen)
+    return page

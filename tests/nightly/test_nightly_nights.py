@@ -1,0 +1,255 @@
+"""Whole nights: what is built, what is not built again, what changed and what is approved."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from nightly_fakes import CODE, INLINE, Calendar, job, study
+from site_checks import check_whole
+
+from actuator_lti.errors import InputError
+from reports.nightly.changes import compare_figures
+from reports.nightly.figures import Figure
+from reports.nightly.job import MAX_JOBS, Job
+from reports.nightly.night import approve, run_night
+from reports.nightly.tolerance import Tolerances, read_tolerances
+from reports.nightly.trend import change_points, flaps, missing_nights
+
+
+class Nights:
+    """Runs one night a day on one site."""
+
+    def __init__(self, site) -> None:
+        self.site = site
+        self.clock = Calendar()
+        self.said: list[str] = []
+
+    def __call__(self, *jobs: Job, days: int = 1, code=CODE, **more):
+        self.clock.next(days)
+        night = run_night(
+            study(*jobs, **more), self.site, INLINE, code=code, clock=self.clock, say=self.said.append
+        )
+        check_whole(self.site)
+        return night
+
+    def approve(self, *jobs: Job, **more):
+        words = {"by": "A. Engineer", "reason": "reviewed", **more}
+        return approve(study(*jobs), self.site, settings=INLINE, clock=self.clock, **words)
+
+
+@pytest.fixture
+def nights(tmp_path) -> Nights:
+    return Nights(tmp_path / "site")
+
+
+def test_the_same_study_is_not_built_again(nights, tmp_path) -> None:
+    log = tmp_path / "log"
+    first = nights(job("a", log=str(log)), job("b", log=str(log)))
+    assert not any(d.result.cached for d in first.designs)
+    second = nights(job("a", log=str(log)), job("b", log=str(log)))
+    assert all(d.result.cached for d in second.designs)
+    assert log.read_text().split() == ["a", "b"]
+    third = nights(job("a", log=str(log)), job("b", 11.0, log=str(log)))
+    assert {d.name: d.result.cached for d in third.designs} == {"a": True, "b": False}
+
+
+def test_another_code_version_builds_everything_again(nights) -> None:
+    nights(job("a"))
+    assert nights(job("a")).designs[0].result.cached
+    assert not nights(job("a"), code=replace(CODE, sources="t")).designs[0].result.cached
+
+
+def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) -> None:
+    night = nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"), job("fair", 7.0))
+    assert [d.name for d in night.designs] == ["broken", "bad", "fair", "good"]
+    assert [d.state for d in night.designs] == ["broken", "fail", "pass", "pass"]
+    assert night.exit_status == 1
+    assert nights(job("good", 12.0)).exit_status == 0
+
+
+def test_a_change_is_told_with_the_parameter_behind_it(nights) -> None:
+    nights(job("a", 10.0))
+    (design,) = nights(job("a", 9.0)).designs
+    assert design.last_night.changes[0].figure == "GM: distance"
+    assert design.last_night.changes[0].delta == pytest.approx(-1.0)
+    assert design.last_night.cause.parameters == (("control.position.gain", "10 1/s", "9 1/s"),)
+    assert not design.last_night.cause.code
+    page = (nights.site / "summary.md").read_text()
+    assert "parameter control.position.gain: 10 1/s → 9 1/s" in page
+
+
+def test_libraries_and_code_behind_a_change_are_told(nights) -> None:
+    nights(job("a", 10.0, limit=6.0))
+    newer = replace(CODE, sources="t", libraries={"numpy": "3"})
+    changed = replace(job("a", 10.0), payload={"name": "a", "margin": 9.0})
+    (design,) = nights(changed, code=newer).designs
+    assert ("numpy", "2", "3") in design.last_night.cause.libraries
+    assert design.last_night.cause.code
+
+
+def test_moves_within_the_tolerance_are_none(nights) -> None:
+    nights(job("a", 10.0))
+    assert not nights(job("a", 10.005)).designs[0].last_night.changes
+    wide = read_tolerances({"*": "5 dB"}, "t")
+    assert not nights(job("a", 12.0), tolerances=wide).designs[0].last_night.changes
+    assert nights(job("a", 14.0), tolerances=read_tolerances({"*": 1.0}, "t")).designs[0].last_night.changes
+
+
+def test_a_regression_counts_until_it_is_approved(nights) -> None:
+    nights(job("a", 10.0))
+    night = nights(job("a", 9.0))
+    assert night.designs[0].state == "regression"
+    assert night.exit_status == 1
+    assert "nobody has approved" in night.designs[0].baseline.note
+    assert nights(job("a", 9.0)).exit_status == 1
+    assert not nights(job("a", 9.0)).designs[0].last_night.changes
+    assert nights.approve(job("a", 9.0)).exit_status == 0
+    night = nights(job("a", 9.0))
+    assert night.exit_status == 0
+    assert night.designs[0].approval.by == "A. Engineer"
+    assert nights(job("a", 8.0)).exit_status == 1
+    assert nights(job("a", 9.5)).exit_status == 0
+
+
+def test_a_slow_drift_within_each_night_is_still_a_regression(nights) -> None:
+    for step in range(12):
+        night = nights(job("a", 10.0 - 0.008 * step))
+        assert not night.designs[0].last_night.changes
+    assert night.exit_status == 1
+
+
+def test_one_design_can_be_approved_alone(nights) -> None:
+    nights(job("a", 10.0), job("b", 10.0))
+    nights(job("a", 9.0), job("b", 9.0))
+    night = nights.approve(job("a", 9.0), job("b", 9.0), names=["a"])
+    assert {d.name: d.state for d in night.designs} == {"a": "pass", "b": "regression"}
+
+
+def test_an_approval_needs_a_name_a_reason_and_a_result(nights) -> None:
+    with pytest.raises(InputError, match="no night has been built"):
+        nights.approve(job("a"))
+    nights(job("a"), job("b", mode="raise"))
+    with pytest.raises(InputError, match="needs a name and a reason"):
+        nights.approve(job("a"), reason=" ")
+    with pytest.raises(InputError, match="'b' has no result"):
+        nights.approve(job("a"), names=["b"])
+
+
+def test_a_requirement_that_fails_now_is_the_first_change(nights) -> None:
+    nights(job("a", 7.0))
+    (design,) = nights(job("a", 5.0)).designs
+    assert design.last_night.changes[0].kind == "verdict"
+    assert design.last_night.changes[0].worse
+
+
+def test_missing_results_are_no_changes(nights) -> None:
+    nights(job("a", 10.0), job("b"))
+    broken = nights(job("a", 10.0, mode="raise", words="no such gear"), job("b"))
+    (a, b) = broken.designs
+    assert a.broken
+    assert a.result.message.startswith("ValueError: no such gear")
+    assert not a.last_night.changes
+    assert b.state == "pass"
+    back = next(d for d in nights(job("a", 10.0), job("b")).designs if d.name == "a")
+    assert not back.last_night.changes
+    assert "1 night(s) without a result" in back.last_night.note
+    assert nights(job("a", 10.0)).gone == ("b",)
+
+
+def test_flapping_is_told_apart_from_a_change(nights) -> None:
+    for k in range(6):
+        night = nights(job("flaps", 10.0 + k % 2), job("moves", 10.0 if k < 5 else 12.0))
+    found = {d.name: d.last_night.changes for d in night.designs}
+    assert all(c.flapping for c in found["flaps"])
+    assert not any(c.flapping for c in found["moves"])
+    assert len(found["moves"]) > 0
+
+
+def test_nights_without_a_run_are_shown_as_such(nights) -> None:
+    for days in (1, 1, 1, 1, 4, 1):
+        night = nights(job("a"), days=days)
+    assert night.missing == ((3, 3),)
+    assert "3 nights without a run" in (nights.site / "index.html").read_text()
+    assert not night.designs[0].last_night.changes
+
+
+def test_machine_files_say_what_the_page_says(nights) -> None:
+    nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"))
+    summary = json.loads((nights.site / "summary.json").read_text())
+    assert summary["schema"] == "actuator-lti/nightly"
+    assert summary["exit_status"] == 1
+    assert summary["counts"] == {"broken": 1, "fail": 1, "regression": 0, "pass": 1}
+    root = ElementTree.parse(nights.site / "junit.xml").getroot()
+    assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
+    failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
+    assert failed == ["GM gain margin"]
+    assert "✗ failing" in (nights.site / "summary.md").read_text()
+
+
+def test_old_reports_go_and_old_figures_stay(nights) -> None:
+    settings = replace(INLINE, keep_reports=3)
+    for k in range(8):
+        nights.clock.next()
+        run_night(study(job("a", 10.0 + k)), nights.site, settings, code=CODE, clock=nights.clock)
+    check_whole(nights.site)
+    assert len(list((nights.site / "reports").glob("*/*"))) == 3
+    page = next((nights.site / "nights").glob("000008-*/a-*.html")).read_text()
+    assert page.count('aria-label="Report of') == 3
+    assert "between 10.00 and 17.00 over 8 nights" in page
+
+
+def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
+    (tmp_path / "thesis.tex").write_text("x")
+    with pytest.raises(InputError, match="not empty and no site"):
+        run_night(study(job("a")), tmp_path, INLINE, code=CODE)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["thesis.tex"]
+
+
+def test_too_large_a_study_is_refused_with_the_limit(tmp_path) -> None:
+    with pytest.raises(InputError, match=f"at most {MAX_JOBS}"):
+        run_night(study(*(Job(name=str(k)) for k in range(MAX_JOBS + 1))), tmp_path / "s", INLINE, code=CODE)
+    with pytest.raises(InputError, match="used twice"):
+        run_night(study(job("a"), job("a")), tmp_path / "s", INLINE, code=CODE)
+    with pytest.raises(InputError, match="at most 20000 allowed"):
+        run_night(study(job("a" * 20001)), tmp_path / "s", INLINE, code=CODE)
+    assert not (tmp_path / "s").exists()
+
+
+def test_change_points_of_known_steps_are_found_to_the_night() -> None:
+    rng = np.random.default_rng(3)
+    clean = np.concatenate([np.full(40, 9.4), np.full(30, 8.1), np.full(30, 8.6)])
+    assert [p.index for p in change_points(clean, 0.05)] == [40, 70]
+    noisy = clean + 0.1 * rng.standard_normal(100)
+    assert [p.index for p in change_points(noisy, 0.05)] == [40, 70]
+    assert [p.index for p in change_points(clean[:41], 0.05)] == [40]
+
+
+def test_noise_and_small_steps_have_no_change_point() -> None:
+    rng = np.random.default_rng(4)
+    found = [change_points(rng.standard_normal(200), 0.05) for _ in range(20)]
+    assert sum(map(len, found)) <= 4
+    assert change_points(np.array([1.0, 1.0, 1.04, 1.04]), 0.05) == ()
+    assert change_points(np.array([np.nan, 1.0]), 0.05) == ()
+
+
+def test_a_single_step_does_not_flap() -> None:
+    assert not flaps(np.array([1.0] * 5 + [2.0] * 5), 0.1)
+    assert not flaps(np.arange(10.0), 0.1)
+    assert flaps(np.array([1.0, 2.0, 1.0, np.nan, 2.0, 1.0]), 0.1)
+
+
+def test_several_runs_a_day_are_no_missing_nights() -> None:
+    assert missing_nights([f"2026-01-01T{h:02d}:0{m}:00Z" for h in range(3) for m in range(3)]) == ()
+
+
+def test_figures_that_appear_or_vanish_are_changes_without_a_side() -> None:
+    one = {"x": Figure(name="x", value=1.0, better=1)}
+    two = {"y": Figure(name="y", value=1.0, better=1)}
+    assert [(c.figure, c.worse) for c in compare_figures(one, two, Tolerances())] == [
+        ("x", None),
+        ("y", None),
+    ]

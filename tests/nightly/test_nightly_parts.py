@@ -1,0 +1,178 @@
+"""The parts of the nightly: texts, cache, tolerances, figures of a report, lock."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from nightly_fakes import fake_document
+
+from actuator_lti.errors import InputError
+from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.code_version import code_version, commits_between
+from reports.nightly.figures import digest, figures_of
+from reports.nightly.lock import hold
+from reports.nightly.text import csv_cell, one_line, slug, visible
+from reports.nightly.tolerance import read_tolerances
+
+
+@given(st.text())
+def test_a_slug_is_one_plain_file_name(name: str) -> None:
+    made = slug(name)
+    assert made.isascii()
+    assert set(made) <= set("abcdefghijklmnopqrstuvwxyz0123456789-")
+    assert 12 <= len(made) <= 51
+
+
+def test_different_names_get_different_slugs() -> None:
+    names = ["a/b", "a-b", "A-B", "a b", "../a-b", "a-b ", "а-b"]
+    assert len({slug(n) for n in names}) == len(names)
+
+
+@given(st.text())
+def test_one_line_has_nothing_that_breaks_or_turns_it(text: str) -> None:
+    line = one_line(text, 50)
+    assert len(line) <= 50
+    assert line.isprintable() or all(c.isprintable() or c in "\ufffd" or ord(c) > 0x7F for c in line)
+    assert not set(line) & set("\n\r\t\x00\u202e\u2066\u200f")
+
+
+def test_visible_shows_direction_marks() -> None:
+    assert visible("a\u202eb") == "a⟨U+202E⟩b"
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+cmd|x", "-2+3", "@SUM(A1)", "\t=1", " =1", "|calc"])
+def test_no_csv_cell_is_a_formula(text: str) -> None:
+    assert csv_cell(text).startswith("'")
+
+
+@pytest.mark.parametrize("text", ["-3.5", "+1e-9", "12", "gain"])
+def test_numbers_and_words_in_csv_stay_as_they_are(text: str) -> None:
+    assert csv_cell(text) == text
+
+
+def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
+    cache = Cache(tmp_path)
+    cache.write("ab12", {"failed": 0}, {"report.html": b"x" * 1000})
+    entry = cache.read("ab12")
+    assert entry is not None
+    assert entry.meta["failed"] == 0
+    assert entry.file("report.html") == b"x" * 1000
+    assert cache.read("cd34") is None
+
+
+@pytest.mark.parametrize("where", [0, 10, 60, 120, -1])
+def test_any_damaged_byte_of_a_cache_entry_is_found(tmp_path, where: int) -> None:
+    cache = Cache(tmp_path)
+    cache.write("ab12", {}, {"report.html": b"x"})
+    data = bytearray(cache.path("ab12").read_bytes())
+    data[where] ^= 1
+    cache.path("ab12").write_bytes(bytes(data))
+    with pytest.raises(CorruptEntry):
+        cache.read("ab12")
+
+
+@pytest.mark.parametrize("size", [0, 1, 50, 200])
+def test_a_truncated_cache_entry_is_found(tmp_path, size: int) -> None:
+    cache = Cache(tmp_path)
+    cache.write("ab12", {}, {"report.html": b"x"})
+    cache.path("ab12").write_bytes(cache.path("ab12").read_bytes()[:size])
+    with pytest.raises(CorruptEntry):
+        cache.read("ab12")
+
+
+def test_an_entry_under_another_name_is_refused(tmp_path) -> None:
+    cache = Cache(tmp_path)
+    cache.write("ab12", {}, {})
+    cache.path("ab34").write_bytes(cache.path("ab12").read_bytes())
+    with pytest.raises(CorruptEntry, match="another key"):
+        cache.read("ab34")
+
+
+def test_digest_knows_verdicts_and_every_number_of_a_table() -> None:
+    made = digest(fake_document({"name": "a", "margin": 5.0}))
+    assert made["failed"] == 1
+    assert made["verdicts"][0]["relative"] == pytest.approx(-1 / 6)
+    values = {f["name"]: (f["value"], f["unit"], f["better"]) for f in made["figures"]}
+    assert values["GM: distance"] == (-1.0, "dB", 1)
+    assert values["GM: met"][0] == 0.0
+    assert values["margins / Margins / velocity / phase margin"] == (46.0, "deg", 1)
+    assert values["margins / Margins / position / crossover"] == (300.0, "rad/s", 0)
+
+
+def test_figures_keep_their_names_when_values_change() -> None:
+    first = [f.name for f in figures_of(fake_document({"name": "a", "margin": 5.0}))]
+    second = [f.name for f in figures_of(fake_document({"name": "a", "margin": 9.0}))]
+    assert first == second
+    assert len(set(first)) == len(first)
+
+
+@pytest.mark.parametrize("value", ["-1 deg", "much", "nan", True, [1]])
+def test_a_tolerance_that_is_none_is_refused(value: object) -> None:
+    with pytest.raises(InputError, match=r"study.toml: tolerance 'x'"):
+        read_tolerances({"x": value}, "study.toml")
+
+
+def test_the_second_nightly_says_who_holds_the_lock(tmp_path) -> None:
+    with hold(tmp_path), pytest.raises(InputError, match=r"process \d+ on .+ since 20\d\d-.*--wait"):
+        _hold_elsewhere(tmp_path)
+
+
+def _hold_elsewhere(folder) -> None:
+    code = (
+        "import sys; from pathlib import Path; from reports.nightly.lock import hold\n"
+        "from actuator_lti.errors import InputError\n"
+        "try:\n  with hold(Path(sys.argv[1])): pass\n"
+        "except InputError as e: sys.stderr.write(str(e)); sys.exit(2)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(folder)], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise InputError(done.stderr)
+
+
+def test_the_lock_is_free_again_and_waiting_gets_it(tmp_path) -> None:
+    with hold(tmp_path):
+        pass
+    with hold(tmp_path, wait_s=5.0):
+        assert (tmp_path / "holder.json").exists()
+    assert not (tmp_path / "holder.json").exists()
+
+
+def test_the_code_version_follows_the_sources(tmp_path) -> None:
+    package = tmp_path / "actuator_lti"
+    package.mkdir()
+    (package / "a.py").write_text("x = 1\n")
+    before = code_version(tmp_path).hash
+    assert code_version(tmp_path).hash == before
+    (package / "a.py").write_text("x = 2\n")
+    assert code_version(tmp_path).hash != before
+
+
+def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
+    def git(*words: str) -> str:
+        identity = ["-c", "user.name=n", "-c", "user.email=e@example.org"]
+        command = ["git", "-C", str(tmp_path), *identity, *words]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    git("init", "-q")
+    (tmp_path / "f").write_text("1")
+    git("add", "f")
+    git("commit", "-q", "-m", "first")
+    old = git("rev-parse", "HEAD")
+    (tmp_path / "f").write_text("2")
+    git("commit", "-q", "-a", "-m", "second <b>\u202e")
+    new = git("rev-parse", "HEAD")
+    trap = tmp_path / "trap"
+    for key in ("core.fsmonitor", "core.pager", "core.hooksPath", "gpg.program", "diff.external"):
+        git("config", key, f"touch {trap}")
+    git("config", "log.showSignature", "true")
+    lines = commits_between(tmp_path, old, new)
+    assert len(lines) == 1
+    assert lines[0].endswith("second <b>⟨U+202E⟩")
+    assert not trap.exists()
+    assert commits_between(tmp_path, "0" * 40, new) == ()
