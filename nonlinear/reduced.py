@@ -92,6 +92,15 @@ class BatchResult:
         """Fraction of the ticks in which a limiter acted: speed, acceleration, current, voltage."""
         return self.outs[:, at.OUT_LIMIT_TICKS + at.LIMITERS.index(name)] / self.rows[:, at.TICKS]
 
+    def window_limit_fraction(self, name: str) -> Floats:
+        """Fraction of the last window in which a limiter acted."""
+        return self.outs[:, at.OUT_WINDOW_LIMITS + at.LIMITERS.index(name)] / self.rows[:, at.WINDOW]
+
+    @property
+    def window_stick_fraction(self) -> Floats:
+        """Fraction of the ticks of the last window that began at rest."""
+        return self.outs[:, at.OUT_WINDOW_STICK] / self.rows[:, at.WINDOW]
+
     def limit_first_s(self, name: str) -> Floats:
         """First time at which a limiter acted; inf if never."""
         first = self.outs[:, at.OUT_LIMIT_FIRST + at.LIMITERS.index(name)]

@@ -50,10 +50,12 @@ def measured_speed(p, th, w, angles, place, filtered, period):  # type: ignore[n
 
 
 @scalar
-def count_limits(flags, k, out):  # type: ignore[no-untyped-def]
-    """Count the ticks in which each limiter acts, and note the first."""
+def count_limits(flags, k, in_window, out):  # type: ignore[no-untyped-def]
+    """Count the ticks in which each limiter acts, in all and in the last window, and note the first."""
     for j in range(4):
         if flags & (1 << j):
             out[layout.OUT_LIMIT_TICKS + j] += 1.0
+            if in_window:
+                out[layout.OUT_WINDOW_LIMITS + j] += 1.0
             if out[layout.OUT_LIMIT_FIRST + j] < 0.0:
                 out[layout.OUT_LIMIT_FIRST + j] = k

@@ -164,7 +164,10 @@ WINDOW_BASE = 4
 MAX_HARMONICS = 9
 WINDOW_SIGNAL = WINDOW_BASE + 2 * MAX_HARMONICS
 WINDOWS = 2  # 0: the last window, 1: the one before
-OUT_SIZE = OUT_WINDOWS + WINDOWS * ALL_SIGNALS * WINDOW_SIGNAL
+# what happened in the last window: ticks each limiter was active, ticks that began at rest
+OUT_WINDOW_LIMITS = OUT_WINDOWS + WINDOWS * ALL_SIGNALS * WINDOW_SIGNAL
+OUT_WINDOW_STICK = OUT_WINDOW_LIMITS + 4
+OUT_SIZE = OUT_WINDOW_STICK + 1
 
 # --- status ----------------------------------------------------------------------------------------
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)

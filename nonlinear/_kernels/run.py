@@ -173,9 +173,11 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
         # -- what is kept ---------------------------------------------------------------------------
         flags = flag_w | flag_a | flag_i | flag_u
         if flags:
-            count_limits(flags, k, out)
+            count_limits(flags, k, k >= ticks - length, out)
         if s == 0.0:
             stick_ticks += 1
+            if k >= ticks - length:
+                out[layout.OUT_WINDOW_STICK] += 1.0
             flags |= layout.FLAG_STICK
         if recording:
             if since_record == 0:
