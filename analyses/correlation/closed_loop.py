@@ -96,7 +96,7 @@ def correlate_record(
     if not measured:
         raise InputError(f"nothing to compare; known signals: {', '.join(UNITS)}", where=record.name)
     design = _with_supply(design, record, notes)
-    modelled, limits = _modelled(design, record, measured, notes, progress)
+    modelled, limits = model_signals(design, record, measured, notes, progress)
     signals = tuple(
         compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
@@ -140,14 +140,24 @@ def _with_supply(design: Design, record: Record, notes: list[str]) -> Design:
     return with_values(design, {"limits.voltage": level}, check=False)
 
 
-def _modelled(
+def model_signals(
     design: Design,
     record: Record,
     measured: dict[str, FloatArray],
-    notes: list[str],
-    progress: Callable[[int, int], None] | None,
+    notes: list[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Every comparable signal of the model at the record's times, and the limiters' shares of the time."""
+    """The model's signals at a regular record's times, and the limiters' shares of the time.
+
+    Parameters
+    ----------
+    design, record
+        As for `correlate_record`.
+    measured : dict
+        The signals wanted; the simulation starts from the position among them, at rest.
+    notes : list of str, optional
+        What was done is added to it.
+    """
     from nonlinear import commands, loads, simulate
 
     reference = next((record[name] for name in REFERENCES if name in record.signals), None)
@@ -177,7 +187,8 @@ def _modelled(
         "voltage": run.voltage_V,
         "force": run.voltage_V * (1.0 if gain is None else gain),
     }
-    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between its samples")
+    if notes is not None:
+        notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between samples")
     limits = {name: use.fraction for name, use in run.limits.items()}
     return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
 

@@ -14,6 +14,7 @@ KNOWN_UNITS = {
     "time": "s",
     "current": "A",
     "voltage": "V",
+    "supply": "V",
     "speed": "rad/s",
     "angle": "rad",
     "torque": "N*m",

@@ -1,0 +1,86 @@
+"""The model against records: figures of likeness, and pictures of both with the difference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.thinning import kept_rows
+
+if TYPE_CHECKING:
+    from analyses.correlation.closed_loop import CorrelationResult
+    from analyses.correlation.compare import SignalComparison
+
+NAMES = {
+    "angle": "Motor angle",
+    "output_angle": "Output angle",
+    "position": "Position",
+    "speed": "Motor speed",
+    "velocity": "Velocity",
+    "current": "Motor current",
+    "voltage": "Voltage",
+    "force": "Force",
+}
+
+
+def section(result: CorrelationResult, number: int = 1) -> dict[str, Any]:
+    """Make the section of one record."""
+    figures = [signal_figure(signal) for signal in result.signals]
+    active = {name: share for name, share in result.limits.items() if share > 0.0}
+    limits = ", ".join(f"{name} {100.0 * share:.1f} % of the time" for name, share in active.items())
+    told = limits or "none"
+    intro = (
+        f"Model {result.design} with the command of {result.record}; {result.counts}. Limits reached: {told}."
+    )
+    blocks = [comparison_table(result), *figures, *[doc.text(note) for note in result.notes]]
+    return doc.section(f"correlation-{number}", f"Model against {result.record}", blocks, intro=intro)
+
+
+def comparison_table(result: CorrelationResult) -> dict[str, Any]:
+    """One row a signal."""
+    columns = [
+        doc.column("name", "Signal"),
+        doc.column("relative", "Relative error", "%", format="sig:4"),
+        doc.column("fit", "Fit", "%", format="fix:3"),
+        doc.column("largest", "Largest error", format="sig:3"),
+        doc.column("unit", "Unit"),
+        doc.column("at", "at", "s", format="fix:3"),
+        doc.column("delay", "Measured later by", "ms", format="fix:3"),
+    ]
+    rows = [
+        {
+            "name": NAMES.get(s.name, s.name),
+            "relative": 100.0 * s.relative_error,
+            "fit": s.fit_percent,
+            "largest": s.max_error,
+            "unit": s.unit,
+            "at": s.max_error_time_s,
+            "delay": None if s.delay_s is None else 1e3 * s.delay_s,
+        }
+        for s in result.signals
+    ]
+    note = (
+        "Relative error: norm of the difference over norm of the measured. Fit: 100 % less the same over "
+        "the norm about "
+        "the mean."
+    )
+    return doc.table(f"{result.design} against {result.record}", columns, rows, note)
+
+
+def signal_figure(signal: SignalComparison) -> dict[str, Any]:
+    """Both signals and their difference."""
+    difference = signal.modelled - signal.measured
+    rows = kept_rows([signal.measured, signal.modelled, difference])
+    name = NAMES.get(signal.name, signal.name)
+    data = {
+        "time_s": rounded(signal.time_s[rows], 6),
+        "measured": rounded(signal.measured[rows]),
+        "modelled": rounded(signal.modelled[rows]),
+        "difference": rounded(difference[rows], 4),
+        "label": f"{name.lower()}, {signal.unit}",
+        "difference_label": f"difference, {signal.unit}",
+    }
+    caption = f"{name}: measured and model, relative error {100.0 * signal.relative_error:.3g} %"
+    alt = f"{name} over time, measured and from the model, and the difference of the two"
+    return doc.figure("correlation_signal", data, caption=caption, alt=alt)
