@@ -1,0 +1,133 @@
+"""The figures that variants are compared by, with their names, units and which way is better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, pi
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.batch import UNITS, Population
+from actuator_lti.errors import InputError
+from analyses.drive_figures import drive_figures
+from analyses.requirements import DRIVE_QUANTITIES, LOOP_QUANTITIES
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.loops import Loops
+    from analyses.loop_figures import LoopFigures
+
+Figures = Mapping[str, float | None]
+_LARGER = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin", "bandwidth", "bandwidth_90deg",
+           "output_rate", "acceleration", "onset")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class FigureName:
+    """A figure.
+
+    Attributes
+    ----------
+    key, label, unit : str
+    group : str
+        ``"current"``, ``"velocity"``, ``"position"``, ``"drive"`` or ``"large"``.
+    better : int
+        1 where larger is better, -1 where smaller is, 0 where neither.
+    """
+
+    key: str
+    label: str
+    unit: str
+    group: str
+    better: int
+
+
+def small_signal(design: Design, found: Mapping[str, LoopFigures]) -> dict[str, float | None]:
+    """Linear figures of every loop and static figures at every load of the design."""
+    figures: dict[str, float | None] = {}
+    for loop, one in found.items():
+        for quantity, read in LOOP_QUANTITIES.items():
+            closed = quantity not in ("gain_margin", "phase_margin", "modulus_margin", "sensitivity_peak")
+            value = read(one) if one.stable or not closed else None
+            figures[f"{loop}.{quantity}"] = None if value is None else float(value)
+    for load in design.validation.loads_Nm:
+        at_load = drive_figures(design, load)
+        for quantity, get in DRIVE_QUANTITIES.items():
+            figures[f"drive.{quantity}@{load:g}"] = get(at_load, design)
+    return figures
+
+
+@dataclass(frozen=True)
+class LargeSignal:
+    """Large-signal figures, taken of every design at the same commands.
+
+    Attributes
+    ----------
+    frequencies_hz : tuple of float
+        Where the largest linear amplitude is given.
+    deflection_rad, duration_s : float
+        Step of full deflection.
+    loads_Nm : tuple of float
+    """
+
+    frequencies_hz: tuple[float, ...]
+    deflection_rad: float
+    duration_s: float
+    loads_Nm: tuple[float, ...]
+
+    @classmethod
+    def plan(cls, base: Design) -> LargeSignal:
+        """Choose commands from the base, so that all designs get the same."""
+        rates = [drive_figures(base, load).output_rate_rad_s for load in base.validation.loads_Nm]
+        slowest = min((rate for rate in rates if rate > 0.0), default=1.0)
+        deflection = base.validation.full_deflection_rad
+        duration = min(20.0, 0.5 + 2.0 * deflection / slowest)
+        return cls((1.0, 5.0), deflection, duration, base.validation.loads_Nm)
+
+    def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
+        """Largest linear amplitudes, and the nonlinear step of full deflection at every load."""
+        from actuator_lti.limiters import onset
+        from analyses.monte_carlo.stepping import StepCheck, step_columns
+
+        shown = 1.0 if design.axis == "linear" else degrees(1.0)
+        figures: dict[str, float | None] = {}
+        for frequency in self.frequencies_hz:
+            try:
+                amplitude = float(onset(loops, [2 * pi * frequency]).amplitude_rad[0])
+            except InputError:
+                continue  # beyond Nyquist of the position loop
+            figures[f"large.onset@{frequency:g}"] = amplitude * shown
+        for load in self.loads_Nm:
+            step = StepCheck(self.deflection_rad, self.duration_s, load)
+            columns = step_columns(step, Population(design, {}, 1))
+            for name in ("rise_time", "overshoot", "settling_time", "peak_current"):
+                value = float(columns[f"nonlinear.{name}"][0])
+                figures[f"large.{name}@{load:g}"] = None if value != value else value
+        return figures
+
+
+large_signal = LargeSignal
+
+
+def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[FigureName, ...]:
+    """Names of all figures that occur, in the order in which they first do."""
+    keys = dict.fromkeys(key for figures in all_figures for key in figures)
+    return tuple(_name(key, design) for key in keys)
+
+
+def _name(key: str, design: Design) -> FigureName:
+    group, _, rest = key.partition(".")
+    quantity, _, at = rest.partition("@")
+    angle = "m" if design.axis == "linear" else "deg"
+    units: dict[str, Any] = {
+        **UNITS, "output_rate": f"{angle}/s", "motor_current": "A", "acceleration": f"{angle}/s^2",
+        "onset": angle, "peak_current": "A",
+    }  # fmt: skip
+    words = quantity.replace("_", " ")
+    if quantity == "onset":
+        words, at = "linear up to", f"{at} Hz"
+    elif at:
+        at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
+    label = f"{words} at {at}" if at else words
+    unit = "" if units[quantity] == "1" else units[quantity]
+    return FigureName(key, label, unit, group, 1 if quantity in _LARGER else -1)

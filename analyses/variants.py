@@ -1,0 +1,228 @@
+"""Variants against their base: every figure, verdicts, differences, and what moved them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analyses.requirements import RequirementVerdict, evaluate_requirements
+from analyses.study import Study, Variant
+from analyses.variant_figures import FigureName, Figures, figure_names, large_signal, small_signal
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.loop_figures import LoopFigures
+    from analyses.sensitivity import Sensitivities
+
+Progress = Callable[[int, int], None]
+_ALIKE = 1e-12  # relative; differences below are rounding
+
+
+@dataclass(frozen=True)
+class Changed:
+    """One key that differs from the base, as texts."""
+
+    path: str
+    base: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one changed key alone does to a figure, starting from the base."""
+
+    path: str
+    amount: float
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One design of a comparison.
+
+    Attributes
+    ----------
+    variant : Variant
+    figures : mapping of str to float or None
+        By column, such as ``"position.phase_margin"``; ``None`` where there is none.
+    verdicts : tuple of RequirementVerdict
+    changed : tuple of Changed
+    differences : mapping of str to float
+        Figure minus the base's, where they differ.
+    moved_by : mapping of str to tuple of Contribution
+        For each difference the changed keys one at a time, the strongest first; what is left over is
+        their interaction (or a key without a number).
+    loops : mapping of str to LoopFigures
+        For drawing.
+    """
+
+    variant: Variant
+    figures: Figures
+    verdicts: tuple[RequirementVerdict, ...]
+    changed: tuple[Changed, ...] = ()
+    differences: Mapping[str, float] = field(default_factory=dict)
+    moved_by: Mapping[str, tuple[Contribution, ...]] = field(default_factory=dict)
+    loops: Mapping[str, LoopFigures] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A study compared.
+
+    Attributes
+    ----------
+    study : Study
+    names : tuple of FigureName
+    base : Compared
+    variants : tuple of Compared
+    sensitivities : Sensitivities
+        Of the base.
+    refused : tuple of Variant
+        Those that have no design, with the reason.
+    """
+
+    study: Study
+    names: tuple[FigureName, ...]
+    base: Compared
+    variants: tuple[Compared, ...]
+    sensitivities: Sensitivities
+    refused: tuple[Variant, ...]
+
+    @property
+    def all(self) -> tuple[Compared, ...]:
+        """Base first."""
+        return (self.base, *self.variants)
+
+    def ends(self, name: FigureName) -> tuple[float, float] | None:
+        """Best and worst value of a figure over all designs; ``None`` if they do not differ."""
+        values = [v for c in self.all if (v := c.figures.get(name.key)) is not None and isfinite(v)]
+        if name.better == 0 or len(values) < 2 or max(values) - min(values) <= _ALIKE * max(map(abs, values)):
+            return None
+        low, high = min(values), max(values)
+        return (high, low) if name.better > 0 else (low, high)
+
+
+def compare(study: Study, *, progress: Progress | None = None) -> Comparison:
+    """Compute every figure of every design of a study and what differs from the base.
+
+    Raises
+    ------
+    InputError, NumericalError
+        From the base or a variant.
+    """
+    from analyses.sensitivity import sensitivities
+
+    assert study.base.design is not None
+    good = [v for v in study.variants if v.design is not None]
+    total = 2 * (len(good) + 1)
+    tell = progress or (lambda done, total: None)
+    plan = large_signal.plan(study.base.design)
+    base = _evaluated(study.base, plan)
+    tell(1, total)
+    found = sensitivities(study.base.design)
+    tell(2, total)
+    compared = []
+    for k, variant in enumerate(good):
+        one = _evaluated(variant, plan)
+        tell(3 + 2 * k, total)
+        compared.append(_against(one, base))
+        tell(4 + 2 * k, total)
+    names = figure_names([c.figures for c in (base, *compared)], study.base.design)
+    refused = tuple(v for v in study.variants if v.design is None)
+    return Comparison(study, names, base, tuple(compared), found, refused)
+
+
+def _evaluated(variant: Variant, plan: Any) -> Compared:
+    from actuator_lti.loops import assemble_loops
+    from analyses.loop_figures import all_loop_figures
+
+    assert variant.design is not None
+    loops = assemble_loops(variant.design)
+    found = all_loop_figures(loops)
+    figures = {**small_signal(variant.design, found), **plan.figures(variant.design, loops)}
+    return Compared(variant, figures, evaluate_requirements(variant.design, found), loops=found)
+
+
+def _against(one: Compared, base: Compared) -> Compared:
+    """Add what differs from the base, and what moved it."""
+    assert one.variant.design is not None
+    assert base.variant.design is not None
+    changed = changes(base.variant.design, one.variant.design)
+    differences = {}
+    for key, value in one.figures.items():
+        before = base.figures.get(key)
+        if value is None or before is None or not (isfinite(value) and isfinite(before)):
+            continue
+        if abs(value - before) > _ALIKE * max(abs(value), abs(before)):
+            differences[key] = value - before
+    moved = _moved_by(base, one, changed, differences)
+    return Compared(one.variant, one.figures, one.verdicts, changed, differences, moved, one.loops)
+
+
+def changes(base: Design, other: Design) -> tuple[Changed, ...]:
+    """Keys of the design file that differ; names and texts of the head do not count."""
+    from actuator_lti.design import design_tree
+
+    flat, flat_other = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
+    keys = [*flat, *(key for key in flat_other if key not in flat)]
+    return tuple(
+        Changed(key, flat.get(key, "–"), flat_other.get(key, "–"))
+        for key in keys
+        if flat.get(key) != flat_other.get(key) and not key.startswith(("design.", "requirement", "fact"))
+    )
+
+
+def _flat(tree: Any, path: str = "") -> list[tuple[str, str]]:
+    """Leaves of a design tree as texts, by dotted key; an entry with a value is one leaf."""
+    if isinstance(tree, Mapping):
+        if "value" in tree:
+            return [(path, str(tree["value"]))]
+        return [leaf for key, item in tree.items() for leaf in _flat(item, f"{path}.{key}" if path else key)]
+    if isinstance(tree, list) and tree and all(isinstance(item, Mapping) for item in tree):
+        return [
+            leaf
+            for k, item in enumerate(tree)
+            for leaf in _flat(item, f"{path}.{item.get('name') or item.get('id') or k}")
+        ]
+    return [(path, str(tree))]
+
+
+def _moved_by(
+    base: Compared, one: Compared, changed: tuple[Changed, ...], differences: Mapping[str, float]
+) -> dict[str, tuple[Contribution, ...]]:
+    """Change one number at a time, starting from the base."""
+    assert base.variant.design is not None
+    assert one.variant.design is not None
+    if len(changed) == 1:
+        return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}
+    alone = _alone(base.variant.design, one.variant.design, changed)
+    moved: dict[str, tuple[Contribution, ...]] = {}
+    for key, total in differences.items():
+        parts = [
+            Contribution(path, amounts[key])
+            for path, amounts in alone.items()
+            if isfinite(amounts.get(key, nan)) and abs(amounts[key]) > 1e-6 * abs(total)
+        ]
+        moved[key] = tuple(sorted(parts, key=lambda part: -abs(part.amount)))
+    return moved
+
+
+def _alone(base: Design, other: Design, changed: tuple[Changed, ...]) -> dict[str, dict[str, float]]:
+    """What each changed number of the other design alone does to the figures of the base."""
+    from actuator_lti.batch import Population, variable_paths
+    from actuator_lti.design import parameter_value
+    from analyses.sensitivity import population_figures
+
+    both = set(variable_paths(base)) & set(variable_paths(other))
+    paths = [item.path for item in changed if item.path in both]
+    values = {path: np.full(len(paths) + 1, parameter_value(base, path)) for path in paths}
+    for k, path in enumerate(paths):
+        values[path][k + 1] = parameter_value(other, path)
+    columns = population_figures(Population(base, values, len(paths) + 1), base, time_figures=True)
+    return {
+        path: {key: float(column[k + 1] - column[0]) for key, column in columns.items()}
+        for k, path in enumerate(paths)
+    }

@@ -1,0 +1,87 @@
+"""`actuator-lti compare`: variants of a design on one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from reports.cli.options import JsonOption, OutOption, QuietOption
+
+if TYPE_CHECKING:
+    from analyses.study import Study
+
+StudyArgument = Annotated[str, typer.Argument(metavar="STUDY", help="Study file, or a design.")]
+VariantOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help='A variant more: "gear.worm.ratio=50"; repeatable.'),
+]
+
+
+def compare(
+    study: StudyArgument,
+    change: VariantOption = None,
+    out: OutOption = Path("out/compare"),
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what."""
+    from analyses.variants import compare as compared
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
+    from reports.cli.progress import progress
+    from reports.sections.compare import overview, sections
+    from reports.study_pages import study_document, write_pages
+    from reports.terminal import print_blocks
+
+    plan = _study(study, change or [])
+    assert plan.base.design is not None
+    with progress(f"comparing {plan.name}", quiet=quiet) as computing:
+        found = compared(plan, progress=computing)
+    made = study_document(
+        plan.base.design,
+        sections(found),
+        title=plan.title or plan.name,
+        subtitle=plan.description or f"{plan.base.name} and {len(plan.variants)} variants",
+        kind="compare",
+    )
+    with progress("drawing figures", quiet=quiet) as drawing:
+        page, data = write_pages(made, out, "compare", progress=drawing)
+    if as_json:
+        print_json(made)
+    else:
+        print_blocks([overview(found)])
+        print_line(f"{page}\n{data}")
+    leave_with(made["verdict"]["passed"] and not found.refused)
+
+
+def _study(path: str, changes: list[str]) -> Study:
+    """A study file, or a study of a design with the variants of the command line."""
+    from dataclasses import replace
+
+    from actuator_lti.design import load_design, with_overrides
+    from actuator_lti.errors import InputError
+    from analyses.slugs import slug
+    from analyses.study import Variant, is_study, load_study, study_of
+
+    plan = load_study(path) if is_study(path) else study_of(load_design(path))
+    assert plan.base.design is not None
+    extra = []
+    for words in dict.fromkeys(changes):
+        key, equals, value = words.partition("=")
+        if not equals:
+            raise InputError(f"--set {words!r}: allowed: KEY=VALUE")
+        overrides = {key.strip(): _value(value.strip())}
+        extra.append(Variant(words, slug(words), with_overrides(plan.base.design, overrides), overrides))
+    return replace(plan, variants=(*plan.variants, *extra))
+
+
+def _value(words: str) -> str | float | int:
+    """A plain number where it is one, else the text with its unit."""
+    for kind in (int, float):
+        try:
+            return kind(words)
+        except ValueError:
+            continue
+    return words

@@ -1,0 +1,172 @@
+"""Figures of a comparison: overlaid Bode and step, tornado charts of what matters to the requirements."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.names import LOOPS
+
+if TYPE_CHECKING:
+    from analyses.sensitivity import Sensitivity
+    from analyses.variants import Compared, Comparison
+
+MOST_CURVES = 7
+MOST_BARS = 10
+MOST_CHARTS = 8
+
+
+def sections(comparison: Comparison) -> list[dict[str, Any]]:
+    """Make the sections with overlaid responses and tornado charts."""
+    return [overlays(comparison), tornadoes(comparison)]
+
+
+def overlays(comparison: Comparison) -> dict[str, Any]:
+    """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
+    drawn = comparison.all[:MOST_CURVES]
+    blocks: list[dict[str, Any]] = []
+    for name, title in LOOPS.items():
+        if name not in comparison.base.loops:
+            continue
+        blocks += [_bode(name, title, drawn, closed) for closed in (False, True)]
+        blocks += _step(name, title, drawn)
+    left_out = len(comparison.all) - len(drawn)
+    intro = f"The first {MOST_CURVES} designs; {left_out} more are in the tables." if left_out else ""
+    return doc.section("overlays", "Responses over one another", [b for b in blocks if b], intro=intro)
+
+
+def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> dict[str, Any]:
+    from analyses.responses import curve, frequency_grid
+
+    series = []
+    for one in drawn:
+        found = one.loops.get(name)
+        if found is None or (closed and not found.stable):
+            continue
+        grid = frequency_grid(found, 140)
+        made = curve(found.response if closed else found.loop.open_loop, grid)
+        series.append({
+            "label": one.variant.name[:60], "frequency_hz": rounded(made.frequency_hz),
+            "magnitude_db": rounded(made.magnitude_db - (_dc_db(found) if closed else 0.0)),
+            "phase_deg": rounded(made.phase_deg),
+        })  # fmt: skip
+    if not series:
+        return {}
+    which = "closed loop" if closed else "open loop"
+    return doc.figure(
+        "overlay", {"kind": "bode", "series": series, "title": f"{title}, {which}"},
+        caption=f"{title}, {which}: the base and its variants.",
+        alt=f"Bode diagram of the {which} of the {name} loop of {len(series)} designs.",
+    )  # fmt: skip
+
+
+def _dc_db(found: Any) -> float:
+    """Gain at DC of the closed loop, so that loops in any unit start at 0 dB."""
+    if found.bandwidth is None or not found.bandwidth.dc_gain:
+        return 0.0
+    return float(20.0 * np.log10(abs(found.bandwidth.dc_gain)))
+
+
+def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[dict[str, Any]]:
+    series = []
+    for one in drawn:
+        step = one.loops[name].step if name in one.loops else None
+        if step is None:
+            continue
+        keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
+        response = np.asarray(step.response)[keep] / step.final_value
+        series.append({
+            "label": one.variant.name[:60], "time_s": rounded(np.asarray(step.time_s)[keep]),
+            "response": rounded(response),
+        })  # fmt: skip
+    if not series:
+        return []
+    return [doc.figure(
+        "overlay", {"kind": "step", "series": series, "title": f"{title}, step"},
+        caption=f"{title}, unit step: the base and its variants.",
+        alt=f"Step responses of the {name} loop of {len(series)} designs.",
+    )]  # fmt: skip
+
+
+def tornadoes(comparison: Comparison) -> dict[str, Any]:
+    """Tornado charts of the figures that the requirements look at, then every slope in a table."""
+    wanted = _wanted(comparison)
+    blocks: list[dict[str, Any]] = []
+    for key, limit in wanted.items():
+        bars = comparison.sensitivities.tornado(key)
+        if bars:
+            blocks.append(_tornado(comparison, key, bars[:MOST_BARS], limit))
+    blocks = blocks[:MOST_CHARTS]
+    blocks.append(doc.details("Every sensitivity", [_slopes(comparison)]))
+    intro = (
+        "Which parameter of the base moves a figure, and how far: each parameter alone at both ends of its "
+        "tolerance, or 10 % off where it has none. Slopes are central differences of 0.1 % over the exact "
+        "sampled loops."
+    )
+    return doc.section("sensitivities", "Sensitivities", blocks, intro=intro)
+
+
+def _wanted(comparison: Comparison) -> dict[str, float | None]:
+    """Figures behind the requirements with their limit; without requirements the margins of each loop."""
+    found: dict[str, float | None] = {}
+    for verdict in comparison.base.verdicts:
+        r = verdict.requirement
+        place = verdict.loop or "drive"
+        key = f"{place}.{r.quantity}" + (f"@{r.load_Nm or 0.0:g}" if place == "drive" else "")
+        if key in comparison.sensitivities.base:
+            found[key] = r.minimum if r.minimum is not None else r.maximum
+    if not found:
+        margins = ("gain_margin", "phase_margin", "bandwidth")
+        found = {f"{loop}.{q}": None for loop in comparison.base.loops for q in margins}
+    order = sorted(found, key=lambda key: not key.startswith(("position", "drive")))
+    return {key: found[key] for key in order}
+
+
+def _tornado(
+    comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], limit: float | None
+) -> dict[str, Any]:
+    name = next((n for n in comparison.names if n.key == key), None)
+    words = f"{LOOPS.get(key.partition('.')[0], 'Drive')}: {name.label if name else key}"
+    base = comparison.sensitivities.base[key]
+    ends = [v for bar in bars for v in (bar.low, bar.high)]
+    near = limit is not None and min(ends) - 3 * abs(base - min(ends)) <= limit <= max(ends) + 3 * abs(
+        max(ends) - base
+    )
+    data = {
+        "label": words, "unit": name.unit if name else "", "base": base, "limit": limit if near else None,
+        "low_label": "parameter low", "high_label": "parameter high",
+        "bars": [{"label": _bar_label(bar), "low": bar.low, "high": bar.high} for bar in bars],
+    }  # fmt: skip
+    return doc.figure(
+        "tornado", data, caption=f"{words}: each parameter alone at both its ends.",
+        alt=f"Tornado chart of {words}; the strongest is {bars[0].path}.",
+    )  # fmt: skip
+
+
+def _bar_label(bar: Sensitivity) -> str:
+    nominal = 0.5 * (bar.low_value + bar.high_value)
+    width = 50.0 * (bar.high_value - bar.low_value) / abs(nominal) if nominal else 0.0
+    return f"{bar.path} ±{width:.3g} %"
+
+
+def _slopes(comparison: Comparison) -> dict[str, Any]:
+    """Slopes of the strongest figures, one row a parameter and figure."""
+    columns = [
+        doc.column("figure", "Figure"),
+        doc.column("path", "Parameter"),
+        doc.column("slope", "Change per +1 %", format="sig:3"),
+        doc.column("low", "At its low end", format="sig:5"),
+        doc.column("base", "Nominal", format="sig:5"),
+        doc.column("high", "At its high end", format="sig:5"),
+    ]
+    known = comparison.sensitivities
+    rows = [
+        {"figure": key, "path": e.path, "slope": e.per_percent, "low": e.low, "base": known.base[key],
+         "high": e.high}
+        for key in known.base
+        for e in known.tornado(key)[:MOST_BARS]
+    ]  # fmt: skip
+    return doc.table("Slopes and swings, the ten strongest parameters of each figure", columns, rows)
