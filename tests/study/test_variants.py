@@ -1,0 +1,228 @@
+"""Study files as data, and variants against their base."""
+
+import json
+import math
+
+import pytest
+from typer.testing import CliRunner
+
+from actuator_lti import load_design
+from actuator_lti.errors import InputError
+from analyses.sensitivity import sensitivities
+from analyses.slugs import slug
+from analyses.study import is_study, load_study, study_of
+from analyses.variants import compare
+
+HEAD = '[study]\nname = "s"\nbase = "ilr33-amber"\n'
+
+
+def study(tmp_path, text):
+    path = tmp_path / "s.toml"
+    path.write_text(text)
+    return path
+
+
+def test_variants_sweeps_and_grids_are_listed_in_order(tmp_path):
+    path = study(
+        tmp_path,
+        HEAD
+        + """
+[[variant]]
+name = "slow"
+override = { "gear.worm.ratio" = 50 }
+[[sweep]]
+parameter = "motor.resistance"
+from = "50 mohm"
+to = "60 mohm"
+points = 3
+[[grid]]
+axes = [{ parameter = "limits.voltage", values = ["11 V", "13 V"] },
+        { parameter = "gear.worm.ratio", values = [30, 40] }]
+[monte_carlo]
+samples = 50
+""",
+    )
+    found = load_study(path)
+    assert is_study(path)
+    assert [v.name for v in found.variants][:2] == ["slow", "motor.resistance = 0.05 ohm"]
+    assert [v.design.motor.resistance_ohm for v in found.variants[1:4]] == [0.05, 0.055, 0.06]
+    assert [(v.design.limits.voltage_V, v.design.total_ratio) for v in found.variants[4:]] == [
+        (11, 66 * 30), (11, 66 * 40), (13, 66 * 30), (13, 66 * 40)]  # fmt: skip
+    assert found.monte_carlo.samples == 50
+    assert len({v.slug for v in found.all}) == len(found.all)
+
+
+def test_another_motor_file_replaces_the_motor(tmp_path):
+    motor = (
+        'rotor_inertia = "9.2 g*cm^2"\nresistance = "0.22 ohm"\ninductance = "24 uH"\n'
+        'torque_constant = "11.8 mN*m/A"\nback_emf_constant = "11.8 mV*s/rad"\n'
+    )
+    (tmp_path / "m.toml").write_text("[motor]\n" + motor)
+    found = load_study(
+        study(
+            tmp_path,
+            HEAD
+            + """
+[[variant]]
+name = "24 V winding"
+motor = "m.toml"
+override = { "limits.voltage" = "24 V" }
+""",
+        )
+    )
+    assert found.variants[0].design.motor.inductance_H == pytest.approx(24e-6)
+
+
+def test_requirements_of_the_study_replace_those_with_the_same_id(tmp_path):
+    found = load_study(
+        study(
+            tmp_path,
+            HEAD
+            + """
+[[requirement]]
+id = "gain-margin"
+quantity = "gain_margin"
+loop = "every"
+minimum = "10 dB"
+""",
+        )
+    )
+    limits = {r.id: r.minimum for r in found.base.design.requirements}
+    assert limits["gain-margin"] == 10.0
+    assert limits["phase-margin"] == 45.0
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("[study]\nname = 's'\n", "study.base"),
+    (HEAD + "[[varient]]\n", 'nearest known: "variant"'),
+    (HEAD + "[[variant]]\nname = 'a'\n[[variant]]\nname = 'a'\n", "twice"),
+    (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistence' = '1 ohm' }\n", "resistence"),
+    (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistance' = '1 V' }\n", "motor.resistance"),
+    (HEAD + "[[sweep]]\nparameter = 'motor.resistance'\nvalues = []\n", "values"),
+    (HEAD + "[[grid]]\naxes = [{ parameter = 'limits.voltage', from='1 V', to='9 V', points=0 }]\n", "points"),
+    (HEAD + "[monte_carlo]\nsamples = 0\n", "samples"),
+])  # fmt: skip
+def test_bad_studies_are_refused_in_one_line(tmp_path, text, message):
+    with pytest.raises(InputError, match=message) as caught:
+        load_study(study(tmp_path, text))
+    assert "\n" not in str(caught.value)
+    assert "s.toml" in str(caught.value)
+
+
+def test_a_refused_variant_is_kept_where_others_shall_go_on(tmp_path):
+    path = study(tmp_path, HEAD + "[[variant]]\nname = 'bad'\noverride = { 'motor.resistance' = '-1 ohm' }\n"
+                 "[[variant]]\nname = 'good'\n")  # fmt: skip
+    with pytest.raises(InputError, match="bad"):
+        load_study(path)
+    found = load_study(path, keep_going=True)
+    assert [v.design is None for v in found.variants] == [True, False]
+    assert "motor.resistance" in found.variants[0].error
+
+
+@pytest.mark.parametrize("name", ["../../etc", "a/b", "a" * 500, "‮", "..", "", "CON\n", "Ä"])
+def test_names_cannot_become_paths(name):
+    made = slug(name)
+    assert 0 < len(made) <= 70
+    assert set(made) <= set("abcdefghijklmnopqrstuvwxyz0123456789-")
+
+
+def test_different_names_have_different_slugs():
+    names = ["A", "a", "a b", "a-b", "a_b", "a.b"]
+    assert len({slug(name) for name in names}) == len(names)
+
+
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    path = study(
+        tmp_path_factory.mktemp("v"),
+        HEAD
+        + """
+[[variant]]
+name = "same"
+override = { "motor.resistance" = "0.055 ohm" }
+[[variant]]
+name = "half the velocity gain"
+override = { "control.velocity.gain" = "0.06 A*s/rad" }
+[[variant]]
+name = "two changes"
+override = { "control.velocity.gain" = "0.06 A*s/rad", "control.current.gain" = "10 mohm" }
+[[variant]]
+name = "slower gear"
+override = { "gear.worm.ratio" = 50 }
+""",
+    )
+    return compare(load_study(path))
+
+
+def test_a_variant_equal_to_its_base_differs_in_nothing(compared):
+    same = compared.variants[0]
+    assert same.differences == {}
+    assert same.figures == compared.base.figures
+
+
+def test_half_the_gain_is_six_decibels_and_says_so(compared):
+    half = compared.variants[1]
+    assert half.differences["velocity.gain_margin"] == pytest.approx(20 * math.log10(2))
+    assert [p.path for p in half.moved_by["velocity.gain_margin"]] == ["control.velocity.gain"]
+    assert "current.gain_margin" not in half.differences
+
+
+def test_of_two_changes_each_has_its_share(compared):
+    both = compared.variants[2]
+    current = both.moved_by["current.gain_margin"]
+    assert [p.path for p in current] == ["control.current.gain"]
+    assert current[0].amount == pytest.approx(both.differences["current.gain_margin"], rel=1e-6)
+    shares = {p.path: p.amount for p in both.moved_by["position.phase_margin"]}
+    assert shares["control.velocity.gain"] == pytest.approx(
+        compared.variants[1].differences["position.phase_margin"], rel=1e-6
+    )
+
+
+def test_best_and_worst_are_marked_in_the_right_direction(compared):
+    names = {name.key: name for name in compared.names}
+    best, worst = compared.ends(names["velocity.gain_margin"])
+    assert best > worst
+    best, worst = compared.ends(names["velocity.sensitivity_peak"])
+    assert best < worst
+    assert compared.ends(names["drive.motor_current@0"]) is None or best != worst
+
+
+def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
+    assert [v.id for v in compared.variants[3].verdicts if v.passed is False] == ["output-rate"]
+
+
+def test_slopes_are_those_of_closed_forms():
+    """Gain margin falls 0.0864 dB per percent of the loop's own gain (20 log10 1.01)."""
+    found = sensitivities(load_design("ilr33-amber"), ["control.velocity.gain"])
+    entry = next(e for e in found.entries if e.figure == "velocity.gain_margin")
+    assert entry.per_percent == pytest.approx(-20 * math.log10(math.e) / 100, rel=1e-5)
+    assert entry.low - entry.high == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
+
+
+def test_the_page_escapes_names_and_has_every_figure(tmp_path):
+    path = study(
+        tmp_path,
+        HEAD
+        + """
+[[variant]]
+name = "<script>alert(1)</script>"
+override = { "control.position.gain" = "90 1/s" }
+""",
+    )
+    from reports.cli.app import build
+
+    done = CliRunner().invoke(build(), ["compare", str(path), "--out", str(tmp_path / "o"), "--quiet"])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "o" / "compare.html").read_text()
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert" in page
+    made = json.loads((tmp_path / "o" / "compare.json").read_text())
+    assert {p.name for p in (tmp_path / "o").iterdir()} == {"compare.html", "compare.json"}
+    kinds = [b["figure"] for s in made["sections"] for b in s["blocks"] if b["kind"] == "figure"]
+    assert kinds.count("overlay") == 9
+    assert "tornado" in kinds
+
+
+def test_a_single_design_is_a_study_of_one():
+    alone = study_of(load_design("emps"))
+    assert alone.variants == ()
