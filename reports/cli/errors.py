@@ -34,6 +34,7 @@ def leave_with(passed: bool) -> None:
 
 def run(call: Callable[[], object]) -> int:
     """Run a command and give its exit status; an expected failure becomes one line on standard error."""
+    output = sys.stdout
     try:
         status = call()
         sys.stdout.flush()
@@ -42,6 +43,11 @@ def run(call: Callable[[], object]) -> int:
     except NumericalError as error:
         return _say(f"numerical failure: {error}", NUMERICAL_FAILURE)
     except BrokenPipeError:
+        return _quiet_pipe()
+    except SystemExit as leaving:
+        if sys.stdout is output:
+            return leaving.code if isinstance(leaving.code, int) else DONE
+        sys.stdout = output  # typer met the closed pipe first and put a wrapper there
         return _quiet_pipe()
     except (KeyboardInterrupt, typer.Abort):
         return _say("interrupted", INTERRUPTED)

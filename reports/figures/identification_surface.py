@@ -23,7 +23,12 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
         ax.plot(
             level["line_speed_rad_s"], level["line_torque_mNm"], color=colour, linestyle=style.DASHES[k % 7]
         )
-        look = {"color": colour, "marker": "osD^v"[k % 5], "markersize": 4.5, "linestyle": "none"}
+        look: dict[str, Any] = {
+            "color": colour,
+            "marker": "osD^v"[k % 5],
+            "markersize": 4.5,
+            "linestyle": "none",
+        }
         ax.plot(level["speed_rad_s"], level["torque_mNm"], label=level["label"], **look)
     for point in data["outliers"]:
         at = (point["speed_rad_s"], point["torque_mNm"])

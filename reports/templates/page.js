@@ -12,8 +12,12 @@
   if (matchMedia("(max-width: 68rem)").matches) document.querySelectorAll(".toc details").forEach((d) => (d.open = false));
   let closed = [];
   addEventListener("beforeprint", () => {
-    closed = [...folds()].filter((d) => !d.open);
-    closed.forEach((d) => (d.open = true));
+    const shut = [...folds()].filter((d) => !d.open);
+    shut.forEach((d) => (d.open = true));
+    closed = closed.concat(shut);
   });
-  addEventListener("afterprint", () => closed.forEach((d) => (d.open = false)));
+  addEventListener("afterprint", () => {
+    closed.forEach((d) => (d.open = false));
+    closed = [];
+  });
 })();

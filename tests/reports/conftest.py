@@ -1,0 +1,32 @@
+"""The report of the shipped baseline, built once for all tests of this folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from actuator_lti import load_design
+from reports.build import design_report, write_report
+
+
+class Built(NamedTuple):
+    """A report on disk and the document it was made of."""
+
+    document: dict[str, Any]
+    page: Path
+    data: Path
+
+
+HOSTILE = "<script>alert(1)</script> \"quoted\" 'single' & $x^2$ ]]> \u202e {{ 7*7 }}"
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """Build the report of ilr33-amber at a fixed time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+        document = design_report(load_design("ilr33-amber"))
+    page, data = write_report(document, tmp_path_factory.mktemp("report"))
+    return Built(document, page, data)

@@ -1,0 +1,51 @@
+"""Files are whole or not there."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.errors import InputError
+from reports import atomic
+
+
+def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "a.txt"
+    atomic.write_text(target, "one")
+    atomic.write_text(target, "two µ")
+    assert target.read_text(encoding="utf-8") == "two µ"
+    assert os.listdir(target.parent) == ["a.txt"]
+
+
+def test_files_written_together_stay_old_if_one_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "a").write_text("old")
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match="cannot write"):
+        atomic.write_together({tmp_path / "a": b"new", tmp_path / "file" / "b": b"new"})
+    assert (tmp_path / "a").read_text() == "old"
+    assert sorted(os.listdir(tmp_path)) == ["a", "file"]
+
+
+def test_an_interrupt_while_writing_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "a"
+    target.write_text("old")
+
+    def interrupted(_handle: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(atomic.os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        atomic.write_text(target, "new")
+    assert target.read_text() == "old"
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path: Path) -> None:
+    plain, written = tmp_path / "plain", tmp_path / "written"
+    plain.write_text("x")
+    atomic.write_text(written, "x")
+    assert written.stat().st_mode == plain.stat().st_mode

@@ -1,0 +1,138 @@
+"""The page in a real browser: no error, no request, every figure to be seen, on any screen and on paper."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from conftest import Built
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Start a headless Chromium, or skip where there is none."""
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no Chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as running:
+        started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+def opened(browser: Browser, built: Built, **context: Any) -> tuple[Page, list[str]]:
+    """Open the report; whatever the browser complains about or asks for is collected."""
+    page = browser.new_context(offline=True, **context).new_page()
+    trouble: list[str] = []
+    page.on("console", lambda message: trouble.append(f"console: {message.text}"))
+    page.on("pageerror", lambda error: trouble.append(f"error: {error}"))
+    page.on("request", lambda request: trouble.append(request.url) if request.url != page.url else None)
+    url = built.page.as_uri()
+    page.goto(url)
+    return page, [entry for entry in trouble if entry != url]
+
+
+SCREENS = {
+    "desktop, light": {"viewport": {"width": 1360, "height": 900}, "color_scheme": "light"},
+    "desktop, dark": {"viewport": {"width": 1360, "height": 900}, "color_scheme": "dark"},
+    "phone": {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"},
+}
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_no_error_no_request_and_no_sideways_scrolling(browser: Browser, built: Built, screen: str) -> None:
+    page, trouble = opened(browser, built, **SCREENS[screen])
+    assert trouble == []
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert width <= SCREENS[screen]["viewport"]["width"]  # type: ignore[index]
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+def test_every_figure_is_seen_with_ink_in_it(browser: Browser, built: Built, screen: str) -> None:
+    page, _ = opened(browser, built, **SCREENS[screen])
+    figures = page.locator("figure svg")
+    assert figures.count() == built.page.read_text(encoding="utf-8").count("<svg") > 10
+    for k in range(figures.count()):
+        box = figures.nth(k).bounding_box()
+        assert box is not None
+        assert box["width"] > 250
+        assert box["height"] > 100
+        assert figures.nth(k).locator("path").count() > 10
+
+
+CONTRAST = """(element) => {
+  const lum = (c) => {
+    const [r, g, b] = c.match(/[\\d.]+/g).map(Number).map((v) => v / 255)
+      .map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  let back = element;
+  while (back && getComputedStyle(back).backgroundColor === "rgba(0, 0, 0, 0)") back = back.parentElement;
+  const style = getComputedStyle(element);
+  const front = element.namespaceURI.includes("svg") ? style.fill : style.color;
+  const [a, b] = [lum(front), lum(getComputedStyle(back).backgroundColor)].sort((x, y) => y - x);
+  return (a + 0.05) / (b + 0.05);
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_stands_out_in_light_and_dark(browser: Browser, built: Built, scheme: str) -> None:
+    page, _ = opened(browser, built, color_scheme=scheme, viewport={"width": 1360, "height": 900})
+    for selector in (
+        "h1",
+        ".intro",
+        "td",
+        "thead th",
+        "figcaption",
+        ".mark.pass",
+        ".toc a",
+        "figure svg text",
+        ".unit",
+    ):
+        assert page.locator(selector).first.evaluate(CONTRAST) >= 4.5, selector
+
+
+def test_dark_and_light_differ(browser: Browser, built: Built) -> None:
+    colours = set()
+    for scheme in ("light", "dark"):
+        page, _ = opened(browser, built, color_scheme=scheme)
+        colours.add(page.locator("figure svg text").first.evaluate("e => getComputedStyle(e).fill"))
+        colours.add(page.evaluate("getComputedStyle(document.body).backgroundColor"))
+    assert len(colours) == 4
+
+
+def test_contents_lead_to_the_sections(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
+    page.locator('.toc a[href="#limits"]').click()
+    box = page.locator("#limits").bounding_box()
+    assert box is not None
+    assert abs(box["y"]) < 120
+
+
+def test_the_keyboard_reaches_the_content(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "content"
+
+
+def test_paper_shows_everything(browser: Browser, built: Built) -> None:
+    page, trouble = opened(browser, built, color_scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("details:not([open])").count() == 0
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert not page.locator(".toc").is_visible()
+    assert len(page.pdf()) > 50_000
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("details.fold:not([open])").count() > 0
+    assert trouble == []

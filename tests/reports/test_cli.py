@@ -1,0 +1,182 @@
+"""The command line: exit statuses, one line an error, JSON alone on standard output."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from actuator_lti.errors import InputError, NumericalError
+from reports.cli import errors
+from reports.cli.app import PANELS
+from reports.cli.main import main
+
+
+def shipped_text(name: str = "ilr33-amber") -> str:
+    """Give the text of a shipped design file."""
+    from actuator_lti.design.shipped import shipped_path
+
+    return shipped_path(name).read_text(encoding="utf-8")
+
+
+def one_line(error: str) -> str:
+    """Check that a message is one line without a traceback."""
+    assert error.endswith("\n")
+    assert error.count("\n") == 1
+    assert "Traceback" not in error
+    return error
+
+
+def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    words = capsys.readouterr().out
+    for command in ("margins", "report"):
+        assert command in words
+    assert {name for names in PANELS.values() for name in names} >= {
+        "designs", "init", "margins", "report", "simulate", "validate", "identify", "correlate",
+        "compare", "montecarlo", "tune", "nightly",
+    }  # fmt: skip
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("actuator-lti ")
+
+
+def test_starting_up_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, typer.main; from reports.cli.app import build; typer.main.get_command(build());"
+        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pint', 'pydantic', 'pandas'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "--json"]) == 0
+    captured = capsys.readouterr()
+    found = json.loads(captured.out)
+    assert captured.err == ""
+    assert found["passed"] is True
+    assert found["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
+    assert len(found["verdicts"]) == 12
+
+
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_margins_on_the_terminal_name_every_loop(form: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "ilr33-amber", "--form", form]) == 0
+    words = capsys.readouterr().out
+    for name in ("Current loop", "Velocity loop", "Position loop", "Phase margin, deg", "✓ met"):
+        assert name in words
+
+
+def test_a_failed_requirement_is_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    design = tmp_path / "strict.toml"
+    design.write_text(shipped_text().replace('minimum = "15 Hz"', 'minimum = "50 Hz"'), encoding="utf-8")
+    assert main(["margins", str(design)]) == 1
+    assert "✗ not met" in capsys.readouterr().out
+    assert main(["report", str(design), "--out", str(tmp_path / "out"), "--quiet", "--processes", "1"]) == 1
+    assert "11 of 12 requirements met" in capsys.readouterr().out
+    document = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert document["verdict"]["failed"] == 1
+    assert "1 of 12 requirements not met" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["margins", "ilr33-ambre"], 'nearest known: "ilr33-amber"'),
+        (["margins", "--form", "digital"], "form = 'digital'"),
+        (["margins", "--load", "nan"], "load"),
+        (["margins", "--operating-point", "flying"], "flying"),
+        (["margins", "--no-such-option"], "--no-such-option"),
+        (["no-such-command"], "no-such-command"),
+        (["report", "missing.toml"], "missing.toml"),
+        (["report", "--processes", "0"], "--processes"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert words in one_line(captured.err)
+
+
+def test_a_bad_design_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    design = tmp_path / "bad.toml"
+    design.write_text(shipped_text().replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
+    assert main(["report", str(design), "--out", str(tmp_path / "out")]) == 2
+    assert "rotor_inertia" in one_line(capsys.readouterr().err)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_is_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "out").write_text("in the way")
+    assert main(["report", "ctms-motor-position", "--out", str(tmp_path / "out"), "--processes", "1"]) == 2
+    assert str(tmp_path / "out") in one_line(capsys.readouterr().err)
+
+
+def test_report_writes_both_files_and_gives_the_document(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["report", "ctms-motor-position", "--out", str(tmp_path), "--json", "--processes", "1"]
+    assert main(arguments) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(
+        (tmp_path / "report.json").read_text(encoding="utf-8")
+    )
+    assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
+
+
+@pytest.mark.parametrize(
+    ("raised", "status", "words"),
+    [
+        (InputError("a = 1: must be 2", where="x.toml"), 2, "actuator-lti: x.toml: a = 1: must be 2"),
+        (NumericalError("try a\nlarger band"), 3, "numerical failure: try a larger band"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (typer.Abort(), 130, "interrupted"),
+        (FileNotFoundError(2, "No such file or directory", "a.csv"), 2, "a.csv: No such file or directory"),
+        (typer.BadParameter("no"), 2, "no"),
+    ],
+)
+def test_statuses(raised: BaseException, status: int, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def call() -> None:
+        raise raised
+
+    assert errors.run(call) == status
+    assert words in one_line(capsys.readouterr().err)
+
+
+def test_a_mistake_of_the_program_is_not_hidden() -> None:
+    def call() -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        errors.run(call)
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    code = "from reports.cli.main import main; import sys; sys.exit(main(['margins', '--json']))"
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(
+        [sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False
+    )
+    os.close(write)
+    assert done.stderr == ""
+    assert done.returncode == 141
+
+
+def test_progress_stays_off_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
+    from reports.cli.progress import progress
+
+    with progress("work") as report:
+        report(1, 2)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,88 @@
+"""The document: plain JSON, versioned, complete."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuator_lti.errors import InputError
+from reports import document as doc
+from reports.numbers import fixed, show, significant
+
+
+def made(**changes: Any) -> dict[str, Any]:
+    """Give a small document."""
+    blocks = [
+        doc.verdicts(
+            [
+                doc.verdict("a", "A", value=1.0, limit=2.0, unit="dB", distance=-1.0, passed=False),
+                doc.verdict("b", "B", value=None, limit=2.0, unit="dB", distance=None, passed=None),
+            ]
+        ),
+        doc.details(
+            "More",
+            [
+                doc.verdicts(
+                    [doc.verdict("c", "C", value=3.0, limit=2.0, unit="dB", distance=1.0, passed=True)]
+                )
+            ],
+        ),
+    ]
+    parts = [doc.section("one", "One", blocks, status="fail")]
+    base = doc.document(title="t", subtitle="", design={}, provenance={}, sections=parts)
+    return {**base, **changes}
+
+
+def test_verdicts_are_counted_wherever_they_stand() -> None:
+    assert made()["verdict"] == {"passed": False, "failed": 1, "not_judged": 1, "total": 3}
+
+
+def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
+    assert doc.plain({"a": np.array([1.0, np.nan, np.inf]), 2: np.int64(3), "b": np.bool_(True)}) == {
+        "a": [1.0, None, None],
+        "2": 3,
+        "b": True,
+    }
+    with pytest.raises(TypeError, match="complex"):
+        doc.plain([1j])
+
+
+def test_a_document_survives_writing_and_reading() -> None:
+    assert doc.loads(doc.dumps(made())) == made()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("{", "not a report in JSON"),
+        ("[" * 100_000, "not a report in JSON"),
+        ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
+        ("[]", "schema must be"),
+        (json.dumps({"schema": doc.SCHEMA, "version": 2, "sections": []}), "version = 2"),
+        (
+            json.dumps(made(sections=[doc.section("x", "X", [{"kind": "magic"}])])),
+            "unknown kind of block 'magic'",
+        ),
+        (json.dumps(made(sections=[doc.section("x", "X", [{"kind": "text"}])])), "a text lacks text"),
+        (json.dumps(made(sections=[doc.section("x", "X", [], status="good")])), "status must be one of"),
+        (json.dumps(made(sections=[doc.section("x", "X", [])] * 2)), "section 'x' occurs twice"),
+    ],
+)
+def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        doc.loads(content, "some.json")
+    assert str(caught.value).startswith("some.json: ")
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_carry_their_digits_and_a_true_minus() -> None:
+    assert significant(0.00099996, 3) == "0.00100"
+    assert significant(999_999.6, 3) == "1.00×10⁶"
+    assert significant(-2.5e-7, 2) == "−2.5×10⁻⁷"
+    assert fixed(-0.001, 2) == "0.00"
+    assert show(True) == "yes"
+    assert show(9.40) == "9.4"
+    assert show("<b>") == "<b>"

@@ -1,0 +1,280 @@
+"""The report of a design: page and JSON say the same, nothing comes through unescaped."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import HOSTILE, Built
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.errors import InputError
+from reports import document as doc
+from reports.build import design_report, write_report
+from reports.html import page
+from reports.numbers import show
+
+
+class Reader(HTMLParser):
+    """Collect the tags, their attributes and the text of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.skipping = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        self.skipping += tag in ("style", "script")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.skipping -= tag in ("style", "script")
+
+    def handle_data(self, data: str) -> None:
+        if not self.skipping:
+            self.words.append(data)
+
+
+def read(content: str) -> Reader:
+    """Parse a page."""
+    reader = Reader()
+    reader.feed(content)
+    return reader
+
+
+def rows_of(document: dict[str, Any], section: str, caption: str) -> list[dict[str, Any]]:
+    """Give the rows of a table by its place."""
+    part = next(part for part in document["sections"] if part["id"] == section)
+    blocks = [block for block in doc.walk(part) if block["kind"] == "table"]
+    return next(block["rows"] for block in blocks if block["caption"].startswith(caption))
+
+
+def test_every_section_that_a_review_asks_for_is_there(built: Built) -> None:
+    ids = [part["id"] for part in built.document["sections"]]
+    assert ids[0] == "verdicts"
+    wanted = {"margins", "loop-current", "loop-velocity", "loop-position", "forms", "break-points"}
+    wanted |= {"operating-points", "delays", "limits", "parameters", "provenance"}
+    assert wanted <= set(ids)
+    drawn = [block["figure"] for block in doc.figures(built.document)]
+    for name in ("bode", "closed_bode", "nyquist", "sensitivity", "step"):
+        assert drawn.count(name) == 3
+
+
+def test_the_json_is_the_document_and_holds_no_nan(built: Built) -> None:
+    content = built.data.read_text(encoding="utf-8")
+    assert doc.loads(content) == json.loads(json.dumps(built.document))
+    assert "NaN" not in content
+
+
+@pytest.mark.parametrize("name", ["current", "velocity", "position"])
+def test_the_tables_hold_the_margins_of_the_engine(built: Built, name: str) -> None:
+    margins = stability_margins(getattr(assemble_loops(load_design("ilr33-amber")), name).open_loop)
+    row = next(
+        row
+        for row in rows_of(built.document, "margins", "Stability margins")
+        if row["loop"] == f"{name.capitalize()} loop"
+    )
+    assert row["gain_margin_db"] == margins.gain_margin_db
+    assert row["phase_margin_deg"] == margins.phase_margin_deg
+    assert row["crossover_hz"] == pytest.approx(margins.phase_margin.frequency_hz)
+    assert row["delay_margin_ms"] == pytest.approx(1e3 * margins.delay_margin_s)
+    crossings = [
+        row
+        for row in rows_of(built.document, "margins", "Every gain and phase")
+        if row["loop"] == f"{name.capitalize()} loop"
+    ]
+    assert len(crossings) == len(margins.gain_margins) + len(margins.phase_margins)
+
+
+def test_the_page_shows_what_the_json_holds(built: Built) -> None:
+    words = " ".join(read(built.page.read_text(encoding="utf-8")).words)
+    for section in built.document["sections"]:
+        for block in doc.walk(section):
+            if block["kind"] != "table":
+                continue
+            for row in block["rows"]:
+                for column in block["columns"]:
+                    value = row.get(column["key"])
+                    value = value["text"] if isinstance(value, dict) else value
+                    assert show(value, column["format"]) in words
+
+
+def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
+    figures = [block for block in doc.figures(built.document) if block["figure"] == "bode"]
+    loops = assemble_loops(load_design("ilr33-amber")).present.values()
+    for block, loop in zip(figures, loops, strict=True):
+        margins = stability_margins(loop.open_loop)
+        assert len(block["data"]["gain_margins"]) == len(margins.gain_margins)
+        assert [m["deg"] for m in block["data"]["phase_margins"]] == [m.deg for m in margins.phase_margins]
+
+
+def test_the_phase_of_a_figure_does_not_jump(built: Built) -> None:
+    for block in doc.figures(built.document):
+        for panel in block["data"].get("panels", [block["data"]]):
+            for series in panel.get("series", ()):
+                phase = series.get("phase_deg", [])
+                assert all(abs(b - a) < 90.0 for a, b in itertools.pairwise(phase))
+
+
+def test_forms_and_operating_points_are_all_there(built: Built) -> None:
+    assert len(rows_of(built.document, "forms", "Margins")) == 9
+    points = rows_of(built.document, "operating-points", "PM")
+    assert {row["load"] for row in points} == {"any", 0.0, 8.0}
+    matrix = rows_of(built.document, "break-points", "Break-point")
+    assert len({row["point"] for row in matrix}) == 4
+
+
+def test_parameters_come_with_source_and_grade(built: Built) -> None:
+    rows = {row["path"]: row for row in rows_of(built.document, "parameters", "Values")}
+    assert rows["friction.dry_torque"]["grade"] == "A"
+    assert "Table 1" in rows["friction.dry_torque"]["source"]
+    assert rows["load.inertia"]["tolerance"] == "±50 %"
+
+
+def test_the_same_input_gives_the_same_bytes(
+    built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    document = design_report(load_design("ilr33-amber"))
+    page_path, data = write_report(document, tmp_path, processes=2)
+    assert data.read_bytes() == built.data.read_bytes()
+    assert page_path.read_bytes() == built.page.read_bytes()
+
+
+def test_a_time_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from reports.provenance import build_time
+
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
+        build_time()
+
+
+def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
+    content = built.page.read_text(encoding="utf-8")
+    assert len(content) < 3_000_000
+    for tag, attributes in read(content).tags:
+        for key in ("src", "href", "xlink:href", "action", "data"):
+            value = attributes.get(key)
+            assert value is None or value.startswith(("#", "data:,")), (tag, key, value)
+    outside = re.sub(r'xmlns(:\w+)?="[^"]*"', "", content)
+    assert not re.search(r"https?://|@import|url\((?!#)", outside)
+
+
+def test_ids_are_unique(built: Built) -> None:
+    found = read(built.page.read_text(encoding="utf-8"))
+    ids = [attributes["id"] for _, attributes in found.tags if attributes.get("id")]
+    assert len(ids) == len(set(ids))
+    targets = {str(attributes["href"])[1:] for tag, attributes in found.tags if tag == "a"}
+    assert targets <= set(ids)
+
+
+def test_tables_have_captions_and_scoped_headers(built: Built) -> None:
+    tags = read(built.page.read_text(encoding="utf-8")).tags
+    names = [tag for tag, _ in tags]
+    assert names.count("table") == names.count("caption") > 8
+    assert all(attributes.get("scope") in ("row", "col") for tag, attributes in tags if tag == "th")
+    assert all(
+        attributes.get("role") == "img" and attributes.get("aria-label")
+        for tag, attributes in tags
+        if tag == "svg"
+    )
+
+
+def test_names_from_a_design_file_stay_text() -> None:
+    design = load_design("ilr33-amber")
+    requirement = replace(design.requirements[0], id=HOSTILE, source=HOSTILE, note=HOSTILE)
+    parameters = {
+        path: replace(item, text=HOSTILE, source=HOSTILE)
+        for path, item in list(design.parameters.items())[:3]
+    }
+    hostile = replace(
+        design,
+        name=HOSTILE,
+        title=HOSTILE,
+        description=HOSTILE,
+        revision=HOSTILE,
+        origin=HOSTILE,
+        requirements=(requirement,),
+        parameters=parameters,
+    )
+    content = page(design_report(hostile))
+    reader = read(content)
+    assert [tag for tag, _ in reader.tags].count("script") == 1
+    assert not any(key.startswith("on") for _, attributes in reader.tags for key in attributes)
+    assert HOSTILE in "".join(reader.words)
+    assert "49" not in re.findall(r"<h1>(.*?)</h1>", content)[0]
+
+
+@pytest.mark.parametrize(
+    ("figure", "data"),
+    [
+        ("step", {"time_s": [0.0, 1.0], "series": [{"label": HOSTILE, "response": [0.0, 1.0]}] * 2}),
+        (
+            "curves",
+            {
+                "series": [{"label": HOSTILE, "x": [1, 2], "y": [1, None]}] * 2,
+                "x_label": HOSTILE,
+                "y_label": "$",
+            },
+        ),
+        ("delay_budget", {"bars": [{"label": HOSTILE, "parts": [{"name": HOSTILE, "deg": 10.0}]}]}),
+    ],
+)
+@pytest.mark.parametrize("on_page", [True, False])
+def test_names_in_a_figure_stay_text(figure: str, data: dict[str, Any], on_page: bool) -> None:
+    from xml.etree import ElementTree
+
+    from reports.figures.registry import draw_svg
+
+    svg = draw_svg(figure, data, page=on_page)
+    assert "<script" not in svg
+    words = [
+        "".join(node.itertext()) for node in ElementTree.fromstring(svg).iter() if node.tag.endswith("text")
+    ]
+    assert HOSTILE in words
+    assert ("var(--" in svg) is on_page
+
+
+def test_an_unknown_figure_is_refused() -> None:
+    from reports.figures.registry import draw_svg
+
+    with pytest.raises(InputError, match="no figure is called 'pie'"):
+        draw_svg("pie", {})
+
+
+@pytest.mark.parametrize("name", ["ctms-motor-position", "ilr33-amber-multirate", "emps"])
+def test_every_shipped_design_has_its_report(name: str) -> None:
+    document = design_report(load_design(name))
+    content = page(document)
+    assert document["verdict"]["passed"]
+    assert content.count("<svg") == len(doc.figures(document)) > 5
+
+
+def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
+    from actuator_lti.design import with_values
+
+    design = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 5.0})
+    document = design_report(design)
+    assert document["verdict"]["failed"] > 0
+    rows = {row["loop"]: row for row in rows_of(document, "margins", "Stability margins")}
+    assert rows["Velocity loop"]["stable"] == {"text": "unstable", "status": "fail"}
+    assert rows["Velocity loop"]["delay_margin_ms"] == 0.0
+    assert "unstable" in page(document)
+
+
+def test_limits_are_those_of_the_linear_onset(built: Built) -> None:
+    from actuator_lti.limiters import onset
+
+    design = load_design("ilr33-amber")
+    loops = assemble_loops(design)
+    for row in rows_of(built.document, "limits", "How far"):
+        found = onset(loops, [2 * math.pi * row["hz"]])
+        assert math.degrees(found.amplitude_rad[0]) == pytest.approx(row["amplitude"], rel=5e-3)

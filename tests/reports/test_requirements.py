@@ -1,0 +1,129 @@
+"""Verdict and distance of requirements."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.errors import InputError
+from analyses.drive_figures import drive_figures
+from analyses.requirements import all_pass, evaluate_requirements
+
+
+def with_requirement(design: Design, **keys: Any) -> Design:
+    """Give the design with one requirement only."""
+    return replace(design, requirements=(Requirement(id="r", **keys),))
+
+
+@pytest.fixture(scope="module")
+def amber() -> Design:
+    return load_design("ilr33-amber")
+
+
+def test_every_shipped_requirement_is_met_with_its_distance(amber: Design) -> None:
+    verdicts = evaluate_requirements(amber)
+    assert all_pass(verdicts)
+    by_id = {verdict.id: verdict for verdict in verdicts}
+    assert len(by_id) == len(verdicts) == 12
+    margins = stability_margins(assemble_loops(amber).velocity.open_loop)
+    found = by_id["phase-margin/velocity"]
+    assert found.value == pytest.approx(margins.phase_margin_deg, rel=1e-12)
+    assert found.distance == pytest.approx(margins.phase_margin_deg - 45.0, rel=1e-12)
+
+
+def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
+    wanted = with_requirement(amber, quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
+    (verdict,) = evaluate_requirements(wanted)
+    assert verdict.passed is False
+    assert verdict.distance == pytest.approx(verdict.value - 30.0)
+    assert not all_pass((verdict,))
+
+
+def test_a_maximum_counts_the_other_way(amber: Design) -> None:
+    wanted = with_requirement(amber, quantity="overshoot", unit="%", maximum=5.0, loop="velocity")
+    (verdict,) = evaluate_requirements(wanted)
+    assert verdict.passed is False
+    assert verdict.distance == pytest.approx(5.0 - verdict.value)
+
+
+def test_exactly_at_the_limit_is_met(amber: Design) -> None:
+    value = stability_margins(assemble_loops(amber).position.open_loop).phase_margin_deg
+    wanted = with_requirement(amber, quantity="phase_margin", unit="deg", minimum=value, loop="position")
+    assert evaluate_requirements(wanted)[0].passed is True
+
+
+def test_an_unstable_loop_meets_nothing(amber: Design) -> None:
+    broken = with_values(amber, {"control.velocity.gain": 5.0})
+    wanted = with_requirement(broken, quantity="overshoot", unit="%", maximum=1e9, loop="every")
+    verdicts = {verdict.loop: verdict for verdict in evaluate_requirements(wanted)}
+    assert verdicts["current"].passed is True
+    assert verdicts["velocity"].passed is False
+    assert "unstable" in verdicts["velocity"].reason
+
+
+def test_a_lower_gain_margin_counts_by_its_size() -> None:
+    assert all(
+        verdict.value > 0
+        for verdict in evaluate_requirements(load_design("emps"))
+        if verdict.requirement.quantity == "gain_margin"
+    )
+
+
+def test_a_loop_that_the_design_lacks_is_not_judged() -> None:
+    design = load_design("ctms-motor-position")
+    wanted = with_requirement(design, quantity="gain_margin", unit="dB", minimum=6.0, loop="current")
+    (verdict,) = evaluate_requirements(wanted)
+    assert verdict.passed is None
+    assert verdict.reason == "the design has no current loop"
+    assert all_pass((verdict,))
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"quantity": "beauty", "unit": "1", "minimum": 1.0}, "quantity = 'beauty': allowed are gain_margin"),
+        (
+            {"quantity": "bandwidth", "unit": "Hz", "minimum": 1.0, "loop": "outer"},
+            "loop = 'outer': allowed are",
+        ),
+    ],
+)
+def test_what_is_not_known_is_refused_by_name(amber: Design, keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        evaluate_requirements(with_requirement(amber, **keys))
+
+
+# -- the drive's own figures, against the paper's equations by hand ------------------------------------
+
+
+def test_rate_and_current_at_8_Nm_follow_from_the_friction_of_table_1(amber: Design) -> None:
+    found = drive_figures(amber, 8.0)
+    torque = 2.25e-3 + 1.34e-3 * 8.0 + 5.25e-6 * 942.5
+    assert found.motor_current_A == pytest.approx(torque / 5.9e-3, rel=1e-12)
+    assert math.degrees(found.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)  # paper: 22.7 deg/s
+    assert found.rate_limit == "speed limit"
+
+
+def test_a_low_supply_limits_the_speed(amber: Design) -> None:
+    low = replace(amber, limits=replace(amber.limits, voltage_V=4.0))
+    found = drive_figures(low, 0.0)
+    speed = found.output_rate_rad_s * 2376.0
+    current = (2.25e-3 + 5.25e-6 * speed) / 5.9e-3
+    assert found.rate_limit == "voltage"
+    assert 0.055 * current + 5.9e-3 * speed == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_drive_that_friction_holds_does_not_move(amber: Design) -> None:
+    found = drive_figures(amber, 1e3)
+    assert (found.output_rate_rad_s, found.acceleration_rad_s2, found.rate_limit) == (0.0, 0.0, "force")
+
+
+def test_a_load_that_is_no_number_is_refused(amber: Design) -> None:
+    with pytest.raises(InputError, match="must be finite"):
+        drive_figures(amber, math.nan)
