@@ -67,7 +67,7 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     for name, formula, terms in _LAWS:
         extra = terms(speed, load, side)
         if name == "per direction" and len(set(side)) < 2:
-            scores.append(_impossible(name, formula, "the runs turn in one direction only"))
+            scores.append(_impossible(name, formula, "one direction only"))
         elif len(points) < 2 * (3 + extra.shape[1]):
             scores.append(_impossible(name, formula, "too few runs"))
         else:
@@ -84,7 +84,7 @@ _LAWS: tuple[tuple[str, str, Terms], ...] = (
     ("quadratic", "+ C2 w^2", lambda w, m, s: (w**2)[:, None]),
     ("load-dependent viscous", "+ CvM w |M|", lambda w, m, s: (w * m)[:, None]),
     ("load squared", "+ CM2 M^2", lambda w, m, s: (m**2)[:, None]),
-    ("per direction", "C0 and Cv per direction", lambda w, m, s: np.column_stack([s, s * w])),
+    ("per direction", "+ s (CS0 + CS1 w)", lambda w, m, s: np.column_stack([s, s * w])),
 )
 
 

@@ -132,9 +132,8 @@ def law_table(laws: RicherLaws) -> dict[str, Any]:
     columns = [
         doc.column("name", "Law"),
         doc.column("formula", "Terms"),
-        doc.column("parameters", "Parameters", format="fix:0"),
-        doc.column("error", "Error on unseen runs", "µN m", format="sig:3"),
-        doc.column("gain", "Less squared error", "%", format="fix:1"),
+        doc.column("error", "Error, unseen runs", "µN m", format="sig:3"),
+        doc.column("gain", "Squared error less by", "%", format="fix:1"),
         doc.column("std", "± standard error", "%", format="fix:1"),
         doc.column("verdict", "Warranted"),
     ]
@@ -144,7 +143,6 @@ def law_table(laws: RicherLaws) -> dict[str, Any]:
         row: dict[str, Any] = {"name": score.name, "formula": score.formula, "verdict": verdict}
         if score.possible:
             row |= {
-                "parameters": float(score.parameters),
                 "error": 1e6 * score.error_Nm,
                 "gain": 100.0 * score.gain,
                 "std": 100.0 * score.gain_std,

@@ -1,0 +1,134 @@
+"""`actuator-lti correlate`: the model against measured records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.options import JsonOption, QuietOption
+
+if TYPE_CHECKING:
+    from analyses.correlation.closed_loop import CorrelationResult
+
+DesignPlace = Annotated[
+    str, typer.Argument(metavar="DESIGN", help="Name of a shipped design, or path of a design file.")
+]
+RecordsArgument = Annotated[
+    list[Path], typer.Argument(metavar="RECORD...", help="Records: CSV, .mat, or record files (TOML).")
+]
+FolderOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Write the page with the pictures, and its JSON, there."),
+]
+ChirpOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--predict", metavar="CHIRP", help="Fit a motor to the RECORDs (voltage steps), predict this chirp."
+    ),
+]
+
+
+def correlate(
+    design: DesignPlace,
+    records: RecordsArgument,
+    out: FolderOption = None,
+    predict: ChirpOption = None,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Run the model with each record's own command, load and supply, and say how far off it is.
+
+    For every signal that both have: relative error, fit, largest error, delay; with --out also pictures of
+    both and the difference.
+
+    A CSV file with columns such as time_s, reference_deg, output_angle_deg, motor_speed_rpm, current_A, load_Nm
+    is read as it is; so is what simulate writes, and the EMPS benchmark's file. Any other layout is told by a
+    record file in TOML, a line for each: file = "log.csv", separator = ";", decimal = ",",
+    time = { column = "t", unit = "ms" }, signals.reference = { column = "cmd", unit = "deg" }.
+
+    Try: actuator-lti correlate emps DATA_EMPS.mat
+
+    With --predict the records are steps of a motor on a voltage (ODrive recorder): gain and time constant are
+    fitted to them and predict the speed over a chirp.
+    """
+    if predict is not None:
+        _predict(records, predict, out, as_json, quiet)
+        return
+    from actuator_lti.design import load_design
+    from analyses.correlation import correlate_record
+    from analyses.records import open_record
+    from reports.cli.output import print_json
+    from reports.cli.progress import progress
+    from reports.sections import correlation as pages
+
+    drive = load_design(design)
+    results = []
+    for path in records:
+        with progress(f"simulating {path.name}", quiet=quiet) as bar:
+            results.append(correlate_record(drive, open_record(path), progress=bar))
+    sections = [pages.section(result, k) for k, result in enumerate(results, 1)]
+    if out is not None:
+        from reports.study_pages import study_document, write_pages
+
+        title = f"{drive.title or drive.name} against measured records"
+        subtitle = ", ".join(result.record for result in results)
+        document = study_document(drive, sections, title=title, subtitle=subtitle, kind="correlation")
+        with progress("drawing figures", quiet=quiet) as bar:
+            write_pages(document, out, "correlation", progress=bar)
+    if as_json:
+        print_json([_plain(result) for result in results])
+    else:
+        _show(sections)
+
+
+def _show(sections: list[dict[str, Any]]) -> None:
+    from reports.cli.output import print_line
+    from reports.terminal import print_blocks
+
+    for made in sections:
+        print_line(made["intro"])
+        print_blocks([block for block in made["blocks"] if block["kind"] in ("table", "text")])
+
+
+def _plain(result: CorrelationResult) -> dict[str, Any]:
+    keys = ("unit", "samples", "relative_error", "fit_percent", "max_error", "max_error_time_s", "delay_s")
+    return {
+        "record": result.record,
+        "sha256": result.sha256,
+        "design": result.design,
+        "rows": result.counts,
+        "limits": result.limits,
+        "notes": result.notes,
+        "signals": {s.name: {key: getattr(s, key) for key in keys} for s in result.signals},
+    }
+
+
+def _predict(steps: list[Path], chirp: Path, out: Path | None, as_json: bool, quiet: bool) -> None:
+    from dataclasses import asdict
+
+    from actuator_lti.errors import InputError
+    from analyses.correlation.chirp import predict_chirp
+    from analyses.correlation.voltage_motor import fit_step
+    from analyses.records import open_record
+    from reports.cli.output import print_json
+    from reports.sections import chirp as pages
+
+    if out is not None:
+        raise InputError("--out goes with a design; --predict prints its table only")
+    motor = fit_step([open_record(path) for path in steps])
+    found = predict_chirp(motor, open_record(chirp))
+    if as_json:
+        bands = [{"from_hz": a, "to_hz": b, "relative_error": c.relative_error} for a, b, c in found.bands]
+        print_json(
+            {
+                "motor": asdict(motor),
+                "chirp": asdict(found.law),
+                "relative_error": found.whole.relative_error,
+                "fit_percent": found.whole.fit_percent,
+                "bands": bands,
+            }
+        )
+    else:
+        _show([pages.section(motor, found, chirp.name)])
