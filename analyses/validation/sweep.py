@@ -1,0 +1,352 @@
+"""Frequency response by injection, the way it is measured on a bench (stepped sine).
+
+A sine is added at the break point; in front of the instrument the loop answers ``before = -L after``, so one
+run gives the open loop ``-before/after``, the closed loop ``-before/injected``, the sensitivity
+``after/injected`` and the plant ``measured/after``.  The fundamentals come from correlation over whole
+periods that fill whole ticks (of the slowest loop), so there is no leakage.  The drive rides on a constant
+speed, where dry friction is a constant torque; amplitudes are chosen so that no limit acts and the speed
+keeps its sign, and both are checked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, inf, log
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.validation.coherent import Coherent, coherent, hold_factor
+from analyses.validation.rig import Rig, rig
+from nonlinear._kernels import layout as at
+from nonlinear.batch import injection_place, put_sine, repeat_row, run_rows
+from nonlinear.reduced import BatchResult
+
+Floats = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+Flags = npt.NDArray[np.bool_]
+
+STEADY = 1e-5  # relative change of the fundamental from one window to the next (rule H3)
+USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the amplitude takes
+SETTLE_TIME_CONSTANTS = 14.0
+LONGEST_SETTLE_TICKS = 400_000
+EXTENSIONS = 3
+PLANT_SIGNAL = {"u": "current_A", "i_ref": "motor_speed_rad_s", "w_ref": "motor_speed_rad_s"}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A measured frequency response at one break point.
+
+    Attributes
+    ----------
+    design_name, loop, point : str
+    period_s : float
+        Sampling period of the loop at the point.
+    frequency_hz : ndarray, shape (K,)
+    open_loop, closed_loop, sensitivity, plant : ndarray of complex, shape (K,)
+        L, T = L/(1 + L), S = 1/(1 + L); the plant from the signal behind the instrument to the motor's
+        current (``u``) or speed, at every tick.  NaN where ``valid`` is False.
+    amplitude : ndarray, shape (K,)
+        Injected, peak, in the unit of the point.
+    distortion : ndarray, shape (K,)
+        Everything but mean and fundamental in front of the instrument, relative to the larger fundamental on
+        either side of it (rms; the stairs of a held signal are no distortion, the images of a periodically
+        time-varying loop are).
+    unsteadiness : ndarray, shape (K,)
+        Relative change of the fundamental between the last two windows.
+    reason : tuple of str
+        Empty where the point is valid; otherwise ``"not steady"``, the limiter that acted, or ``"speed
+        reversal"``.
+    speed_rad_s : float
+        Of the ride, motor side.
+    """
+
+    design_name: str
+    loop: str
+    point: str
+    period_s: float
+    frequency_hz: Floats
+    open_loop: Complexes
+    closed_loop: Complexes
+    sensitivity: Complexes
+    plant: Complexes
+    amplitude: Floats
+    distortion: Floats
+    unsteadiness: Floats
+    reason: tuple[str, ...]
+    speed_rad_s: float
+
+    @property
+    def valid(self) -> Flags:
+        """Which points are steady, without a limit and without a reversal."""
+        return np.array([not text for text in self.reason])
+
+    def joined(self, other: Sweep) -> Sweep:
+        """Both sweeps of the same loop as one, in order of frequency."""
+        order = np.argsort(np.concatenate([self.frequency_hz, other.frequency_hz]), kind="stable")
+        both: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in ARRAYS
+        }
+        reasons = (*self.reason, *other.reason)
+        return replace(self, reason=tuple(reasons[k] for k in order), **both)
+
+
+ARRAYS = (
+    "frequency_hz",
+    "open_loop",
+    "closed_loop",
+    "sensitivity",
+    "plant",
+    "amplitude",
+    "distortion",
+    "unsteadiness",
+)
+
+
+@dataclass(frozen=True)
+class SweepErrors:
+    """Measured less linear, point by point; NaN where a point is not valid."""
+
+    gain_db: Floats
+    phase_deg: Floats
+
+    @property
+    def worst_gain_db(self) -> float:
+        """Largest magnitude of the gain error."""
+        return float(np.nanmax(np.abs(self.gain_db), initial=0.0))
+
+    @property
+    def worst_phase_deg(self) -> float:
+        """Largest magnitude of the phase error."""
+        return float(np.nanmax(np.abs(self.phase_deg), initial=0.0))
+
+
+def frequency_response(
+    design: Design,
+    loop: str,
+    frequency_hz: npt.ArrayLike,
+    *,
+    settle_s: float | None = None,
+    threads: int | None = None,
+) -> Sweep:
+    """Measure a loop by stepped sine.
+
+    Parameters
+    ----------
+    design : Design
+    loop : str
+        ``"current"``, ``"velocity"``, ``"position"`` (inner loops closed, outer ones out of action), or a
+        break point ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
+    frequency_hz : array_like
+        Asked for; each is moved to the next that fits (`analyses.validation.coherent`).
+    settle_s : float, optional
+        Wait before the two windows; by default from the closed loop's slowest pole. A point that is not
+        steady by rule H3 is measured again with four times the wait, up to three times.
+
+    Raises
+    ------
+    InputError
+        For an unknown loop, a frequency that is not below Nyquist, or a drive that cannot ride.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> sweep = frequency_response(load_design("ilr33-amber"), "position", [5.0, 20.0], settle_s=0.15)
+    >>> sweep.reason
+    ('', '')
+    """
+    setup = rig(design, loop)
+    asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    nyquist = 0.5 / setup.period_s
+    if not asked.size or not (np.isfinite(asked) & (asked > 0.0) & (asked < nyquist)).all():
+        raise InputError(f"frequency_hz: positive and below the Nyquist frequency of {nyquist:g} Hz")
+    wait = settling_ticks(setup) if settle_s is None else ceil(settle_s / design.controller.period_s)
+    return stepped_sine(setup, asked, wait, threads)
+
+
+def stepped_sine(setup: Rig, frequency_hz: Floats, settle_ticks: int, threads: int | None = None) -> Sweep:
+    """Measure at a rig that has been set up; see `frequency_response`."""
+    window = coherent(frequency_hz, setup.design.controller.period_s, setup.base_ticks)
+    amplitude = fitting_amplitude(setup, window, settle_ticks, threads)
+    result = _run(setup, window, amplitude, settle_ticks, threads)
+    for _ in range(EXTENSIONS):
+        poor = np.flatnonzero([bool(text) for text in _reasons(setup, result)])
+        if not poor.size:
+            break
+        limited = np.array([_reasons(setup, result)[k] != "not steady" for k in poor])
+        amplitude[poor[limited]] *= 0.4
+        settle_ticks = min(4 * settle_ticks, LONGEST_SETTLE_TICKS)
+        part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
+        again = _run(setup, part, amplitude[poor], settle_ticks, threads)
+        result.rows[poor], result.outs[poor], result.status[poor] = again.rows, again.outs, again.status
+    return _sweep(setup, window, amplitude, result)
+
+
+def settling_ticks(setup: Rig) -> int:
+    """Ticks until the slowest mode of the closed loop has died out, by its pole.
+
+    Raises
+    ------
+    InputError
+        If the loop is not stable: nothing settles.
+    """
+    from actuator_lti.loops import assemble_loops
+
+    loops = assemble_loops(setup.design)
+    loop = loops.present[setup.loop] if setup.loop in loops.present else loops.break_points[setup.loop]
+    return settling_ticks_of(loop.closed_loop, setup.hold_ticks, setup.design.name)
+
+
+def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
+    """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
+    size = np.abs(closed_loop.poles())
+    if (size > 1.0 + 1e-9).any():
+        raise InputError("the loop is not stable: nothing can be measured on it", where=where)
+    slowest = size[size < 1.0 - 1e-9].max(initial=0.0)
+    if slowest <= 0.0:
+        return 20 * hold_ticks
+    samples = SETTLE_TIME_CONSTANTS / -log(slowest)
+    return int(min(ceil(samples + 20.0) * hold_ticks, LONGEST_SETTLE_TICKS))
+
+
+def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: int | None = None) -> Floats:
+    """Injected amplitudes that keep clear of limits and of standstill, from a faint run first."""
+    rooms = {name: room for name, room in setup.room.items() if room < inf}
+    smallest = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
+    scale = rooms.get(smallest.get(setup.point, ""), 1.0)
+    if setup.point == "output":
+        scale = rooms.get("motor_speed_rad_s", 1.0) / (
+            setup.design.total_ratio * setup.design.controller.position.gain
+        )
+    faint = np.full(window.ticks.size, 1e-4 * scale)
+    result = _run(setup, window, faint, settle_ticks, threads)
+    most = np.full(faint.size, inf)
+    for name, room in rooms.items():
+        low, high = result.span(name)
+        moved = np.maximum(high - result.mean(name), result.mean(name) - low)
+        most = np.minimum(most, room * faint / np.maximum(moved, 1e-300))
+    most = np.minimum(most, _acceleration_room(setup, window, result, faint))
+    return np.where(np.isfinite(most), USED_ROOM * most, faint)
+
+
+def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
+    """Amplitude at which the speed command would change by the acceleration limit in one update."""
+    limit, controller = setup.design.limits.acceleration_rad_s2, setup.design.controller
+    if setup.outer != "position" or controller.velocity is None or not np.isfinite(limit):
+        return np.full(faint.size, inf)
+    T = controller.position.every * controller.period_s
+    signal = "probe_w_ref_before" if setup.point == "w_ref" else "speed_command_rad_s"
+    low, high = result.span(signal)
+    change = (high - low) * np.abs(np.sin(np.pi * window.frequency_hz * T))
+    return limit * T * faint / np.maximum(change, 1e-300)
+
+
+def _run(
+    setup: Rig, window: Coherent, amplitude: Floats, settle_ticks: int, threads: int | None
+) -> BatchResult:
+    """Run one row a frequency."""
+    rows = repeat_row(setup.row(), window.ticks.size)
+    rows[:, at.TICKS] = settle_ticks + 2 * window.ticks
+    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window.ticks, window.cycles, 1
+    put_sine(rows, injection_place(setup.point), amplitude, window.frequency_hz)
+    return run_rows(rows, threads=threads)
+
+
+def _reasons(setup: Rig, result: BatchResult) -> list[str]:
+    """Why a point cannot be reported, or nothing."""
+    reasons = [""] * result.status.size
+    steady = unsteadiness(setup, result) <= STEADY
+    for k in range(len(reasons)):
+        acting = [name for name in at.LIMITERS if result.window_limit_fraction(name)[k] > 0.0]
+        if not result.ok[k]:
+            reasons[k] = "run stopped"
+        elif acting:
+            reasons[k] = f"{acting[0]} limit"
+        elif result.events[k]:
+            reasons[k] = "speed reversal"
+        elif not steady[k]:
+            reasons[k] = "not steady"
+    return reasons
+
+
+def unsteadiness(setup: Rig, result: BatchResult) -> Floats:
+    """Change between the last two windows, the larger of both sides of the instrument."""
+    found = np.zeros(result.status.size)
+    for signal in (setup.before, setup.after):
+        a, b = (phasor(setup, result, signal, last) for last in (0, 1))
+        found = np.maximum(found, np.abs(a - b) / np.maximum(np.abs(a), 1e-300))
+    return found
+
+
+def phasor(setup: Rig, result: BatchResult, signal: str, last: int = 0) -> Complexes:
+    """Fundamental of a signal, freed from the ramp of the ride where it is an angle."""
+    found = result.phasor(signal, 1, last)
+    if "output" not in signal and "reference" not in signal:
+        return found
+    from analyses.validation.coherent import ramp_phasor
+
+    ticks, length = result.rows[:, at.TICKS], result.rows[:, at.WINDOW]
+    window = Coherent(found.real, length.astype(np.int64), result.rows[:, at.CYCLES].astype(np.int64))
+    slope = setup.ride.speed_rad_s / setup.design.total_ratio * setup.design.controller.period_s
+    return found - ramp_phasor(slope, window, ticks - (last + 1) * length)
+
+
+def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult) -> Sweep:
+    """Make the responses from the fundamentals."""
+    tick, f = setup.design.controller.period_s, window.frequency_hz
+    held = hold_factor(f, tick, setup.hold_ticks)
+    before, after = (phasor(setup, result, signal) for signal in (setup.before, setup.after))
+    injected = amplitude * held
+    reasons = _reasons(setup, result)
+    good = np.where([not text for text in reasons], 1.0, np.nan)
+    plant = PLANT_SIGNAL.get(setup.point, "motor_speed_rad_s")
+    if setup.point == "u" and "current" not in setup.stages:
+        plant = "motor_speed_rad_s"
+    return Sweep(
+        design_name=setup.design.name,
+        loop=setup.loop,
+        point=setup.point,
+        period_s=setup.period_s,
+        frequency_hz=f,
+        open_loop=-before / after * good,
+        closed_loop=-before / injected * good,
+        sensitivity=after / injected * good,
+        plant=phasor(setup, result, plant) / after * good,
+        amplitude=amplitude,
+        distortion=_distortion(setup, result, held),
+        unsteadiness=unsteadiness(setup, result),
+        reason=tuple(reasons),
+        speed_rad_s=setup.ride.speed_rad_s,
+    )
+
+
+def _distortion(setup: Rig, result: BatchResult, held: Complexes) -> Floats:
+    """What is neither mean nor fundamental in front of the instrument (at the output: in the speed)."""
+    angle = setup.point == "output"
+    signal, factor = ("motor_speed_rad_s", 1.0) if angle else (setup.before, np.abs(held))
+    power = result.rms(signal) ** 2 - result.mean(signal) ** 2
+    alone = 0.5 * np.abs(result.phasor(signal) / factor) ** 2
+    other = alone if angle else 0.5 * np.abs(result.phasor(setup.after) / factor) ** 2
+    return np.sqrt(np.maximum(power - alone, 0.0) / np.maximum(np.maximum(alone, other), 1e-300))
+
+
+def sweep_errors(sweep: Sweep, loop: Any, response: str = "open_loop") -> SweepErrors:
+    """Compare a sweep with an assembled loop (`actuator_lti.loops.Loop`, sampled).
+
+    Parameters
+    ----------
+    response : {"open_loop", "closed_loop", "sensitivity"}
+    """
+    expected = linear_response(getattr(loop, response), sweep.frequency_hz)
+    ratio = getattr(sweep, response) / expected
+    return SweepErrors(20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio)))
+
+
+def linear_response(system: Any, frequency_hz: npt.ArrayLike) -> Complexes:
+    """Response of a sampled python-control system at frequencies in Hz."""
+    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    return np.atleast_1d(system(np.exp(1j * omega * system.dt)))
