@@ -143,7 +143,7 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     return Bandwidth(
         minus3db_rad_s=falls[0] * unit if falls else None,
         minus90deg_rad_s=None if turn is None else turn * unit,
-        resonance_peak_db=max(resonance, 0.0),
+        resonance_peak_db=resonance if resonance > 1e-9 else 0.0,
         resonance_rad_s=place * unit if resonance > 1e-9 else 0.0,
         dc_gain=dc,
         definition=level,

@@ -11,6 +11,7 @@ A may be singular (delays z^-q) and may have an eigenvalue at z = -1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 NEAR_AXIS = 0.1
+_APART = 6.0  # shifts of a careful search lie this factor apart
 _DEGENERATE = 1e-9
 
 
@@ -124,33 +126,44 @@ class Circles:
         At least one state.
     poles : array (n,), complex
         Eigenvalues of A, to keep the shift away from them.
+    careful : bool
+        Gather the candidates of shifts all over the spectrum: for loops whose gain spans so much that one
+        shift leaves candidates too coarse.
     """
 
-    def __init__(self, loop: RationalLoop, poles: Complex) -> None:
+    def __init__(self, loop: RationalLoop, poles: Complex, careful: bool = False) -> None:
         self._loop = loop
         self._shifts = _shifts(loop, poles)
-        self._tried: list[ShiftedLoop] = []
+        self._careful = careful
+        self._tried: dict[int, ShiftedLoop] = {}
 
     def _system(self, k: int) -> ShiftedLoop:
-        while len(self._tried) <= k:
-            self._tried.append(shifted(self._loop, float(self._shifts[len(self._tried)])))
+        if k not in self._tried:
+            self._tried[k] = shifted(self._loop, float(self._shifts[k]))
         return self._tried[k]
 
     def circle(self, a: float, b: float, e: float) -> Complex | None:
         """All s on the circle (see module); ``None`` if every frequency is on it."""
-        for k in range(len(self._shifts)):
-            zeros = self._system(k).circle(a, b, e)
-            if zeros is not None:
-                return zeros
-        return None
+        return self._zeros(lambda system: system.circle(a, b, e))
 
     def real_axis(self) -> Complex | None:
         """All s at which L is real, but for 0 and infinity; ``None`` if L is real at every frequency."""
+        return self._zeros(lambda system: system.real_axis())
+
+    def _zeros(self, equation: Callable[[ShiftedLoop], Complex | None]) -> Complex | None:
+        found: list[Complex] = []
+        used: list[float] = []
         for k in range(len(self._shifts)):
-            zeros = self._system(k).real_axis()
+            shift = float(self._shifts[k])
+            if any(_APART * u > shift > u / _APART for u in used):
+                continue
+            zeros = equation(self._system(k))
             if zeros is not None:
-                return zeros
-        return None
+                found.append(zeros)
+                used.append(shift)
+                if not self._careful:
+                    break
+        return np.concatenate(found) if found else None
 
 
 def on_axis(zeros: Complex) -> Complex:
@@ -161,7 +174,7 @@ def on_axis(zeros: Complex) -> Complex:
 
 
 def _shifts(loop: RationalLoop, poles: Complex) -> Real:
-    """Shifts in order of merit: L(+-shift) not above one, far from the poles, near their mean frequency.
+    r"""Shifts in order of merit: L(+-shift) not above one, far from the poles, near their mean frequency.
 
     Where \|L(shift)\| were large, the one of \|L\| = 1 would be lost beside it in rounding.
     """

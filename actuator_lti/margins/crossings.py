@@ -16,6 +16,7 @@ TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve cou
 _POSSIBLE_TOUCH = 1e-3
 _NEWTON_STEP = 1e-9
 _NEWTON_STEPS = 8
+_SAME = 1e-8
 _NONE = np.empty(0, dtype=complex)
 
 
@@ -129,6 +130,11 @@ def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
 def _candidates(zeros: Complex, border_x: Real, in_z: bool) -> _Candidates:
     near = on_axis(zeros)
     w, touch = near.imag, np.abs(near.real) <= _POSSIBLE_TOUCH * near.imag
+    if (
+        w.size > 1 and (w[1:] - w[:-1] <= _SAME * w[1:]).any()
+    ):  # one candidate twice, or a pair: looked at as one
+        first = np.flatnonzero(np.concatenate(([True], w[1:] - w[:-1] > _SAME * w[1:])))
+        w, touch = w[first], np.logical_or.reduceat(touch, first)
     pole = np.zeros(w.size, dtype=bool)
     if border_x.size:
         w = np.concatenate((w, warped(border_x, in_z)))
@@ -223,16 +229,21 @@ def _near_touch(
     if abs(value) <= TOUCH:
         more.append(top)
         touch.append(True)
-    elif value * side < 0.0:
-        more.extend((_bracketed(loop, low, top, gain), _bracketed(loop, top, high, gain)))
-        touch.extend((False, False))
+        return
+    if value * side < 0.0:
+        more.append(_bracketed(loop, low, top, gain))
+        touch.append(False)
+    if value * _function(loop, high, gain) < 0.0:
+        more.append(_bracketed(loop, top, high, gain))
+        touch.append(False)
 
 
 def _merged(loop: RationalLoop, x: Real, L: Complex, more: Real, touch: Mask) -> tuple[Real, Complex, Mask]:
     keep = np.ones(more.size, dtype=bool)
     for k in range(more.size):
-        known = np.concatenate((x, more[:k][keep[:k]]))
-        keep[k] = not (np.abs(known - more[k]) <= 1e-9 * more[k]).any()
+        near_known = np.abs(x - more[k]) <= 1e-6 * more[k]
+        near_new = np.abs(more[:k][keep[:k]] - more[k]) <= 1e-9 * more[k]
+        keep[k] = not (near_known.any() or near_new.any())
     more, touch = more[keep], touch[keep]
     if not more.size:
         return x, L, np.zeros(x.size, dtype=bool)

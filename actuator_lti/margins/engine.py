@@ -3,29 +3,110 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delay_form import delay_form, from_rational
 from actuator_lti.margins.delayed import delayed_margins
 from actuator_lti.margins.loop import rational_loop
+from actuator_lti.margins.measured import measured_margins
 from actuator_lti.margins.rational import rational_margins
 from actuator_lti.margins.results import StabilityMargins
+
+_MOST_SAMPLES = 100
 
 
 def stability_margins(
     system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None
 ) -> StabilityMargins:
-    """Find all margins of a loop L with negative unit feedback."""
+    r"""Find all margins of a loop L closed by negative unit feedback.
+
+    Rational loops need no grid: crossovers are eigenvalues (Boyd, Balakrishnan, Kabamba 1989), each held by a
+    change of sign and polished by Newton. With delays, inside or in series, intervals are split until a bound
+    on the change of L shows that nothing hides between two points. Stability is found twice: from closed-loop
+    poles (with delays, by collocation) and from the Nyquist curve alone; where they disagree no figure is
+    given. Quoted are, see `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to
+    0 deg with its sign, the smallest delay margin (0 for an unstable loop), the smallest distance to -1.
+
+    Parameters
+    ----------
+    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
+        The open loop L, one input and one output, continuous or sampled. With ``dt=True`` the period counts
+        as 1 s. Measured data give bounds between neighbouring points and no verdict.
+    delay_s : float, optional
+        Exact extra delay in series, s. In a sampled loop whole samples become states; a fraction of a sample
+        is the factor exp(-j w delay) up to the Nyquist frequency, and the verdict is that of the Nyquist curve.
+    band_rad_s : tuple of float, optional
+        Where margins are listed. Default: everywhere; under a delay, whose phase crossovers never end, up to
+        where the gain stays below -40 dB (``.band_rad_s`` of the result). The verdict, the modulus and the
+        disk margin are those of the whole axis in any case.
+
+    Returns
+    -------
+    StabilityMargins
+        Printing it shows units.
+
+    Raises
+    ------
+    InputError
+        Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a pole on the border of stability
+        cancelled by a zero, a direct feed-through behind a delay of 1 or more (neutral type), data too coarse.
+    NumericalError
+        \|L\| is one at every frequency, or a search was not settled to its accuracy.
+
+    Examples
+    --------
+    >>> import control
+    >>> m = stability_margins(control.tf([100], [1, 0]), delay_s=0.005)
+    >>> m.stable, round(m.gain_margin_db, 4), round(m.phase_margin_deg, 4), round(1e3 * m.delay_margin_s, 5)
+    (True, 9.943, 61.3521, 10.70796)
+    """
     if not (math.isfinite(delay_s) and delay_s >= 0.0):
         raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
+    if band_rad_s is not None and not 0.0 <= band_rad_s[0] < band_rad_s[1]:
+        raise InputError(f"band_rad_s = {band_rad_s}: two frequencies, 0 <= low < high, in rad/s")
+    if hasattr(system, "frdata"):
+        return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
             return delayed_margins(delay_form(system, delay_s), band_rad_s)
         system = system.to_state_space()
+    if not (hasattr(system, "num") or hasattr(system, "A")):
+        raise InputError(
+            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or FrequencyResponseData"
+        )
     if delay_s:
-        return delayed_margins(from_rational(rational_loop(system), delay_s), band_rad_s)
+        return _behind_delay(system, delay_s, band_rad_s)
     loop = rational_loop(system, warp=True)
     if loop.period_s is not None and not loop.in_z and abs(1.0 + loop.d) <= 1e-9:
         loop = rational_loop(system)  # a closed-loop pole at z = -1, at infinity of the s-plane
-    return rational_margins(loop)
+    return within(rational_margins(loop), band_rad_s)
+
+
+def _behind_delay(system: Any, delay_s: float, band: tuple[float, float] | None) -> StabilityMargins:
+    loop = rational_loop(system)
+    if loop.period_s is not None:
+        samples = delay_s / loop.period_s
+        whole = round(samples)
+        if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES:
+            return replace(within(rational_margins(loop.delayed(whole)), band), delay_s=delay_s)
+    return delayed_margins(from_rational(loop, delay_s), band)
+
+
+def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:
+    """The same with only the margins of a band listed."""
+    if band is None:
+        return margins
+    low, high = band
+
+    def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
+
+    return replace(
+        margins,
+        gain_margins=inside(margins.gain_margins),
+        phase_margins=inside(margins.phase_margins),
+        delay_margins=inside(margins.delay_margins),
+        band_rad_s=(low, high),
+    )

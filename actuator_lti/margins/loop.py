@@ -113,6 +113,16 @@ class RationalLoop:
             return L, 1j * points * d_point, -points * (d_point + points * dd_point)
         return L, 1j * d_point, -dd_point
 
+    def delayed(self, samples: int) -> RationalLoop:
+        """The loop behind whole samples of delay (z-plane only), each a further state."""
+        n = self.order
+        A = np.zeros((n + samples, n + samples))
+        A[:n, :n], A[n, :n] = self.A, self.c
+        A[n + 1 :, n:-1] = np.eye(samples - 1)
+        b, c = np.zeros(n + samples), np.zeros(n + samples)
+        b[:n], b[n], c[-1] = self.b, self.d, 1.0
+        return from_matrices(A, b, c, 0.0, self.period_s)
+
     def _resolvent(self, points: Complex) -> Complex:
         n = self.order
         matrix = np.empty((points.size, n, n), dtype=complex)

@@ -28,6 +28,7 @@ _HIDDEN = (
     "one mode at zero frequency that the loop neither drives nor sees is left out (it is no instability)"
 )
 
+_WIDE = 1e11
 _BELOW = np.array([0.01, 0.05, 0.2, 0.5])
 _ABOVE = np.array([2.0, 5.0, 20.0, 100.0])
 
@@ -63,10 +64,10 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
     closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     end_x = loop.end
     inner = np.array([pole.x for pole in poles.border if 0.0 < pole.x < end_x])
-    circles = Circles(loop, poles.values)
-    found = find_crossings(loop, circles, inner, _typical(poles, loop.in_z))
-    ends = _ends(loop, poles, found)
-    count = nyquist_count(loop, found, poles, ends.dc_order, ends.dc or 0j, ends.end or 0j)
+    inspected = _inspect(loop, poles, inner, careful=False)
+    if inspected.dynamic_range > _WIDE or inspected.count != closed.unstable:
+        inspected = _inspect(loop, poles, inner, careful=True)
+    circles, found, ends, count = inspected.circles, inspected.found, inspected.ends, inspected.count
     border = closed.border_count - ends.hidden
     agreement = Agreement(closed.unstable, count, border)
     x, L = _starts(loop, found, closed, ends)
@@ -81,6 +82,28 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
         disk=(alpha, alpha_x),
         notes=(_HIDDEN,) if ends.hidden else (),
     )
+
+
+@dataclass(frozen=True)
+class _Inspected:
+    circles: Circles
+    found: Crossings
+    ends: Ends
+    count: int  # unstable closed-loop poles by Nyquist
+
+    @property
+    def dynamic_range(self) -> float:
+        """Largest over smallest gain between the lowest and the highest pole, about."""
+        size = np.abs(self.found.between_L[len(_BELOW) : -len(_ABOVE)])
+        return float(size.max() / max(float(size.min()), 1e-300)) if size.size else 1.0
+
+
+def _inspect(loop: RationalLoop, poles: SortedPoles, inner: Real, careful: bool) -> _Inspected:
+    circles = Circles(loop, poles.values, careful)
+    found = find_crossings(loop, circles, inner, _typical(poles, loop.in_z))
+    ends = _ends(loop, poles, found)
+    count = nyquist_count(loop, found, poles, ends.dc_order, ends.dc or 0j, ends.end or 0j)
+    return _Inspected(circles, found, ends, count)
 
 
 def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, float]:
@@ -238,9 +261,7 @@ def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: End
     """Where to look for the smallest distance first: crossings, and the resonances of the closed loop."""
     values = closed.values
     own = np.abs(np.angle(values)) if loop.in_z else np.abs(values)
-    own = own[
-        (values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.in_z else own > 0.0)
-    ]
+    own = own[(values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.in_z else own > 0.0)]
     x = np.concatenate((found.gain_x, found.real_x, found.between_x, own))
     L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own)))
     if ends.dc is not None:

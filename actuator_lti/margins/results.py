@@ -170,13 +170,15 @@ class Agreement:
     def __str__(self) -> str:
         if self.border_poles:
             return f"{self.border_poles} closed-loop pole(s) on the border"
+        if self.unstable_poles is None and self.unstable_nyquist is None:
+            return "neither poles nor a Nyquist count"
         if self.unstable_poles is None or self.unstable_nyquist is None:
             which, count = (
                 ("Nyquist count", self.unstable_nyquist)
                 if self.unstable_poles is None
                 else ("poles", self.unstable_poles)
             )
-            return f"{which} only: {'no answer' if count is None else f'{count} unstable'}"
+            return f"{which} only: {count} unstable"
         word = "agree" if self.agree else "DISAGREE"
         return f"poles ({self.unstable_poles} unstable) and Nyquist ({self.unstable_nyquist}) {word}"
 
@@ -260,29 +262,27 @@ class StabilityMargins:
 
     @property
     def gain_margin_db(self) -> float | None:
-        """Gain margin to quote, dB (``inf``: none; ``None``: withheld)."""
-        if self.withheld:
-            return None
+        """Gain margin to quote, dB (``inf``: none; ``None``: withheld, or none in measured data)."""
         quoted = self.gain_margin
-        return math.inf if quoted is None else quoted.db
+        return self._none if quoted is None else quoted.db
 
     @property
     def phase_margin_deg(self) -> float | None:
-        """Phase margin to quote, deg (``inf``: none; ``None``: withheld)."""
-        if self.withheld:
-            return None
+        """Phase margin to quote, deg (``inf``: none; ``None``: withheld, or none in measured data)."""
         quoted = self.phase_margin
-        return math.inf if quoted is None else quoted.deg
+        return self._none if quoted is None else quoted.deg
 
     @property
     def delay_margin_s(self) -> float | None:
-        """Delay margin to quote, s (``inf``: none; 0: not stable; ``None``: withheld)."""
-        if self.withheld:
-            return None
+        """Delay margin to quote, s (``inf``: none; 0: not stable; ``None``: withheld, or none in data)."""
         if self.stable is False:
             return 0.0
         quoted = self.delay_margin
-        return math.inf if quoted is None else quoted.seconds
+        return self._none if quoted is None else quoted.seconds
+
+    @property
+    def _none(self) -> float | None:
+        return None if self.stable is None else math.inf
 
     @property
     def sensitivity_peak_db(self) -> float | None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
-from mpmath import mp, mpc, mpf, polyval
+from mpmath import mp, mpc, mpf
 
 DIGITS = 50
+EXACT = 260  # digits in which products of a dozen doubles are exact
 REAL = mpf(10) ** -22
 
 
@@ -24,9 +24,16 @@ class Truth:
     nearest_to_border: float
 
 
+def polyval(p: list[mpf], x: mpc) -> mpc:
+    out = mpc(0)
+    for c in p:
+        out = out * x + c
+    return out
+
+
 def product(factors: list[list[float]]) -> list[mpf]:
     """Polynomial product, exact at the working precision; highest power first."""
-    with mp.workdps(DIGITS):
+    with mp.workdps(EXACT):
         out = [mpf(1)]
         for factor in factors:
             out = multiply(out, [mpf(c) for c in factor])
@@ -54,43 +61,67 @@ def divided(p: list[mpf], root: mpf) -> list[mpf]:
     return out
 
 
-def roots(p: list[mpf], ends_too: bool = False) -> list[mpc]:
-    """All roots: companion eigenvalues, then Durand-Kerner until 25 digits stand."""
+def roots(p: list[mpf]) -> list[mpc]:
+    """All roots but -1: Aberth in double precision, then at high precision until 25 digits stand."""
     size = max(abs(c) for c in p)
     while p and abs(p[0]) <= size * mpf(10) ** -40:
         p = p[1:]
     at_zero = 0
     while len(p) > 1 and p[-1] == 0:
         p, at_zero = p[:-1], at_zero + 1
-    for end in (2, -2) if ends_too else ():
-        while len(p) > 1 and abs(polyval(p, mpf(end))) <= size * mpf(10) ** -40:
-            p = divided(p, mpf(end))
+    while len(p) > 1 and abs(polyval(p, -1)) <= size * mpf(10) ** -40:  # delays z^-q: multiple, not wanted
+        p = divided(p, mpf(-1))
     n = len(p) - 1
     if n < 1:
         return [mpc(0)] * at_zero
-    # scale the variable so that the roots are about one
-    scale = abs(p[-1] / p[0]) ** (mpf(1) / n)
-    q = [c / p[0] / scale**k for k, c in enumerate(p)]
-    start = np.roots(np.array([float(c) for c in q]))
-    z = [mpc(complex(s)) * (1 + mpc(1e-12 * (k + 1), 2e-12)) for k, s in enumerate(start)]
-    for _ in range(2000):
+    z = [mpc(complex(s)) for s in _estimates(p)]
+    derivative = [c * (n - k) for k, c in enumerate(p[:-1])]
+    for _ in range(100):
         worst = mpf(0)
         for k in range(n):
-            below = mpc(1)
-            for j in range(n):
-                if j != k:
-                    below *= z[k] - z[j]
-            step = polyval(q, z[k]) / below
+            newton = polyval(p, z[k]) / polyval(derivative, z[k])
+            push = sum((1 / (z[k] - z[j]) for j in range(n) if j != k), mpc(0))
+            step = newton / (1 - newton * push)
             z[k] -= step
             worst = max(worst, abs(step) / abs(z[k]))
         if worst < mpf(10) ** -26:
-            return [s * scale for s in z] + [mpc(0)] * at_zero
+            return [*z, *[mpc(0)] * at_zero]
     raise AssertionError("the roots did not settle")
 
 
-def _real_roots(p: list[mpf], low: float, high: float) -> list[mpf]:
-    found = [r.real for r in roots(p, low == -2) if abs(r.imag) < REAL * (abs(r) + mpf(10) ** -30)]
-    return sorted(r for r in found if low < r < high)
+def _estimates(p: list[mpf]) -> np.ndarray:
+    """Aberth in double precision, from circles whose radii the Newton polygon of the coefficients gives."""
+    n = len(p) - 1
+    logs = [float(mp.log(abs(c))) if c else -1e300 for c in reversed(p)]
+    hull: list[int] = []
+    for k in range(n + 1):
+        while len(hull) > 1 and (logs[hull[-1]] - logs[hull[-2]]) * (k - hull[-1]) <= (
+            logs[k] - logs[hull[-1]]
+        ) * (hull[-1] - hull[-2]):
+            hull.pop()
+        hull.append(k)
+    start = []
+    for low, high in zip(hull[:-1], hull[1:], strict=True):
+        radius = np.exp((logs[low] - logs[high]) / (high - low))
+        angles = 2 * np.pi * np.arange(high - low) / (high - low) + 0.7 + 0.3 * low
+        start += list(radius * np.exp(1j * angles))
+    z = np.array(start)
+    centre = np.exp(np.mean(np.log(np.abs(z))))
+    q = np.array([float(c / p[0] / mpf(centre) ** k) for k, c in enumerate(p)])
+    z = z / centre
+    derivative = np.polyder(q)
+    for _ in range(60):
+        newton = np.polyval(q, z) / np.polyval(derivative, z)
+        gap = z[:, None] - z[None, :] + np.eye(n)
+        step = newton / (1 - newton * ((1 / gap).sum(axis=1) - 1))
+        z = z - step
+        if (np.abs(step) < 1e-13 * np.abs(z)).all():
+            break
+    return z * centre * (1 + 1e-14 * np.arange(n))
+
+
+def _positive_roots(p: list[mpf]) -> list[mpf]:
+    return sorted(r.real for r in roots(p) if abs(r.imag) < REAL * abs(r) and r.real > 0)
 
 
 def _at(num: list[mpf], den: list[mpf], point: mpc) -> mpc:
@@ -99,29 +130,29 @@ def _at(num: list[mpf], den: list[mpf], point: mpc) -> mpc:
 
 def truth(num: list[mpf], den: list[mpf], sampled: bool) -> Truth:
     """Everything of num/den (highest power first) under negative unit feedback."""
-    with mp.workdps(DIGITS):
-        gain, phase = _sampled_equations(num, den) if sampled else _continuous_equations(num, den)
+    with mp.workdps(EXACT):
         if sampled:
-            gains = sorted(mp.acos(c / 2) for c in _real_roots(gain, -2, 2))
-            phases = sorted(mp.acos(c / 2) for c in _real_roots(phase, -2, 2))
-        else:
-            gains = [mp.sqrt(v) for v in _real_roots(gain, 0, math.inf)]
-            phases = [mp.sqrt(v) for v in _real_roots(phase, 0, math.inf)]
+            degree = len(den) - 1
+            num, den = bilinear(num, degree), bilinear(den, degree)
+        gain, phase = _equations(num, den)
+    with mp.workdps(DIGITS):
+        gains = [mp.sqrt(v) for v in _positive_roots(gain)]
+        phases = [mp.sqrt(v) for v in _positive_roots(phase)]
 
-        def border(x: mpf) -> mpc:
-            return mp.expj(x) if sampled else mpc(0, x)
+        def border(w: mpf) -> mpc:
+            return mpc(0, w)
+
+        def frequency(w: mpf) -> float:
+            return float(2 * mp.atan(w) if sampled else w)
 
         degrees = [float(mp.degrees(mp.arg(-_at(num, den, border(x))))) for x in gains]
         real = [(x, _at(num, den, border(x)).real) for x in phases]
         real = [(x, L) for x, L in real if L < 0]
         closed = roots(subtract(den, [-c for c in num]))
-        size = [abs(p) - 1 if sampled else p.real for p in closed]
-        nearest = min(
-            (abs(d) / (1 if sampled else abs(p)) for d, p in zip(size, closed, strict=True) if p != 0),
-            default=mpf(0),
-        )
+        size = [p.real for p in closed]
+        nearest = min((abs(p.real) / abs(p) for p in closed if p != 0), default=mpf(0))
         return Truth(
-            [float(x) for x in gains], degrees, [float(x) for x, _ in real],
+            [frequency(x) for x in gains], degrees, [frequency(x) for x, _ in real],
             [float(-1 / L) for _, L in real], sum(d > 0 for d in size), float(nearest),
         )  # fmt: skip
 
@@ -134,7 +165,7 @@ def _split(p: list[mpf]) -> tuple[list[mpf], list[mpf]]:
     return even or [mpf(0)], odd or [mpf(0)]
 
 
-def _continuous_equations(num: list[mpf], den: list[mpf]) -> tuple[list[mpf], list[mpf]]:
+def _equations(num: list[mpf], den: list[mpf]) -> tuple[list[mpf], list[mpf]]:
     (ne, no), (de, do) = _split(num), _split(den)
     v = [mpf(1), mpf(0)]
     square_n = subtract(multiply(ne, ne), [-c for c in multiply(v, multiply(no, no))])
@@ -142,24 +173,13 @@ def _continuous_equations(num: list[mpf], den: list[mpf]) -> tuple[list[mpf], li
     return subtract(square_n, square_d), subtract(multiply(no, de), multiply(ne, do))
 
 
-def _sampled_equations(num: list[mpf], den: list[mpf]) -> tuple[list[mpf], list[mpf]]:
-    n = max(len(num), len(den))
-    a = [mpf(0)] * (n - len(num)) + num
-    b = [mpf(0)] * (n - len(den)) + den
-    first, second = [[mpf(2)], [mpf(1), mpf(0)]], [[mpf(0)], [mpf(1)]]
-    for table in (first, second):
-        while len(table) <= n:
-            table.append(subtract(multiply([mpf(1), mpf(0)], table[-1]), table[-2]))
-
-    def correlation(p: list[mpf], q: list[mpf], k: int) -> mpf:
-        return sum((p[i] * q[i + k] for i in range(n - k)), mpf(0))
-
-    gain, phase = [mpf(0)], [mpf(0)]
-    for k in range(n):
-        r = correlation(a, a, k) - correlation(b, b, k)
-        weight = r / 2 if k == 0 else r
-        gain = subtract(gain, [-weight * c for c in first[k]])
-        # a(z) b(1/z) - a(1/z) b(z): coefficient of z^k - z^-k
-        q = correlation(a, b, k) - correlation(b, a, k)
-        phase = subtract(phase, [-q * c for c in second[k]])
-    return gain, phase
+def bilinear(p: list[mpf], degree: int) -> list[mpf]:
+    """(1 - s)^degree p((1 + s)/(1 - s)), highest power first: the unit circle becomes the imaginary axis."""
+    up, down = [[mpf(1)]], [[mpf(1)]]
+    for _ in range(degree):
+        up.append(multiply(up[-1], [mpf(1), mpf(1)]))
+        down.append(multiply(down[-1], [mpf(-1), mpf(1)]))
+    out = [mpf(0)]
+    for k, c in enumerate(reversed(p)):
+        out = subtract(out, [-c * x for x in multiply(up[k], down[degree - k])])
+    return out
