@@ -40,9 +40,10 @@ class SurfaceFit:
     ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
     errors, whose bounds move the coefficients by ``shared_shifts[name]`` and the torques of the runs by the
     columns of ``shared_effects``. ``half_widths`` are those of the 95 % intervals, from propagated
-    distributions. ``residuals_Nm`` and ``residual_stds_Nm`` are those of the runs used, in the order of
-    ``points``. ``run_scatter_Nm`` is the scatter between runs that their own noise does not explain,
-    ``birge_ratio`` the ratio of the two (1: explained).
+    distributions. ``residuals_Nm`` (``own_residuals_Nm``: less the most likely shared errors) and
+    ``residual_stds_Nm`` are those of the runs used, in the order of ``points``. ``run_scatter_Nm`` is the
+    scatter between runs that their own noise does not explain, ``birge_ratio`` the ratio of the two (1:
+    explained).
     """
 
     points: tuple[SteadyPoint, ...]
@@ -54,6 +55,7 @@ class SurfaceFit:
     draws: ErrorDraws
     shared_effects: FloatArray
     residuals_Nm: FloatArray
+    own_residuals_Nm: FloatArray
     residual_stds_Nm: FloatArray
     run_scatter_Nm: float
     birge_ratio: float
@@ -164,6 +166,7 @@ def _fitted(
         draws=draws,
         shared_effects=effects_of(shared, len(y)),
         residuals_Nm=y - x @ theta,
+        own_residuals_Nm=_own_residuals(y - x @ theta, variance, effects_of(shared, len(y))),
         residual_stds_Nm=np.sqrt(variance),
         run_scatter_Nm=float(np.sqrt(scatter)),
         birge_ratio=birge,
@@ -196,6 +199,15 @@ def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatAr
     along = np.array([1.0, -theta[1], -theta[2]])
     own = np.array([along @ p.covariance @ along for p in points])
     return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
+
+
+def _own_residuals(rest: FloatArray, variance: FloatArray, effects: FloatArray) -> FloatArray:
+    """Residuals less the most likely shared errors, which bend them together (best linear prediction)."""
+    if not effects.shape[1]:
+        return rest
+    scaled = effects / variance[:, None]
+    likely = np.linalg.solve(3.0 * np.eye(effects.shape[1]) + effects.T @ scaled, scaled.T @ rest)
+    return np.asarray(rest - effects @ likely)
 
 
 def torque_covariance(variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:

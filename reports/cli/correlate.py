@@ -38,20 +38,24 @@ def correlate(
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Run the model with each record's own command, load and supply, and say how far off it is.
+    """Run the model with each record's own command, load and supply, and say how
+    far off it is.
 
-    For every signal that both have: relative error, fit, largest error, delay; with --out also pictures of
-    both and the difference.
+    For every signal that both have: relative error, fit, largest error,
+    delay; with --out also pictures of both and the difference.
 
-    A CSV file with columns such as time_s, reference_deg, output_angle_deg, motor_speed_rpm, current_A, load_Nm
-    is read as it is; so is what simulate writes, and the EMPS benchmark's file. Any other layout is told by a
-    record file in TOML, a line for each: file = "log.csv", separator = ";", decimal = ",",
-    time = { column = "t", unit = "ms" }, signals.reference = { column = "cmd", unit = "deg" }.
+    A CSV file with columns such as time_s, reference_deg, output_angle_deg,
+    motor_speed_rpm, current_A, load_Nm is read as it is; so is what simulate
+    writes, and the EMPS benchmark's file. Any other layout is told by a
+    record file in TOML, a line for each: file = "log.csv", separator = ";",
+    decimal = ",", time = { column = "t", unit = "ms" }, signals.reference = {
+    column = "cmd", unit = "deg" }.
 
     Try: actuator-lti correlate emps DATA_EMPS.mat
 
-    With --predict the records are steps of a motor on a voltage (ODrive recorder): gain and time constant are
-    fitted to them and predict the speed over a chirp.
+    With --predict the records are steps of a motor on a voltage (ODrive
+    recorder): gain and time constant are fitted to them and predict the speed
+    over a chirp.
     """
     if predict is not None:
         _predict(records, predict, out, as_json, quiet)

@@ -76,19 +76,21 @@ def identify(
     quiet: QuietOption = False,
     example: ExampleOption = False,
 ) -> None:
-    """Identify a drive from bench records, and write the result as a design with tolerances.
+    """Identify a drive from bench records, and write the result as a design with
+    tolerances.
 
     Three ways to call it:
 
-    identify campaign.toml --out result: C0, Cv and CM from the steady parts of many runs. A bad run is set
-    aside and named, the others go on.
+    identify campaign.toml --out result: C0, Cv and CM from the steady parts
+    of many runs. A bad run is set aside and named, the others go on.
 
-    identify --dynamic record.toml --design my.toml: inertia, friction and offset from one motion, by the
-    inverse dynamic model; --refine simulates the closed loop as well. The EMPS benchmark's file is known as
-    it is.
+    identify --dynamic record.toml --design my.toml: inertia, friction and
+    offset from one motion, by the inverse dynamic model; --refine simulates
+    the closed loop as well. The EMPS benchmark's file is known as it is.
 
-    identify --virtual-bench folder --seed 1: simulate a campaign of 54 runs, and write logs and campaign.toml
-    as a bench would. Try the first way on it.
+    identify --virtual-bench folder --seed 1: simulate a campaign of 54 runs,
+    and write logs and campaign.toml as a bench would. Try the first way on
+    it.
     """
     from actuator_lti.errors import InputError
 
@@ -146,7 +148,8 @@ def _campaign(
         from analyses.identification.to_design import design_with_estimate, surface_estimate
 
         source = f"identified from {len(result.fit.points)} runs, {listed.name}"
-        _write(drive, design_with_estimate(drive, surface_estimate(result.fit, source)), made, out, quiet)
+        identified = design_with_estimate(drive, surface_estimate(result.fit, source))
+        _write(drive, identified, made, source, out, quiet)
     if as_json:
         print_json(_campaign_json(result, shares, suggestion, at))
         return
@@ -257,8 +260,9 @@ def _dynamic(
             refined = refine_record(drive, record, model, progress=bar)
     made = pages.section(model, drive.axis, (f"{record.name}: {record.counts}", *notes), refined)
     if out is not None:
-        estimate = dynamic_estimate(model, f"identified from {record.name}")
-        _write(drive, design_with_estimate(drive, estimate), made, out, quiet)
+        source = f"identified from {record.name}"
+        identified = design_with_estimate(drive, dynamic_estimate(model, source))
+        _write(drive, identified, made, source, out, quiet)
     if as_json:
         values = zip(model.names, model.values, model.standard_errors, strict=True)
         print_json(
@@ -301,7 +305,9 @@ def _bench(folder: Path, name: str, seed: int, as_json: bool, quiet: bool) -> No
         print_line(f"{len(logs)} runs written; next: actuator-lti identify {path}")
 
 
-def _write(drive: Design, identified: Design, made: dict[str, Any], out: Path, quiet: bool) -> None:
+def _write(
+    drive: Design, identified: Design, made: dict[str, Any], source: str, out: Path, quiet: bool
+) -> None:
     from actuator_lti.design import write_design
     from reports.atomic import write_text
     from reports.cli.progress import progress
@@ -311,7 +317,7 @@ def _write(drive: Design, identified: Design, made: dict[str, Any], out: Path, q
         identified,
         [made],
         title=f"Identification of {drive.title or drive.name}",
-        subtitle=made["intro"],
+        subtitle=source,
         kind="identification",
     )
     with progress("drawing figures", quiet=quiet) as bar:

@@ -23,7 +23,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     look = {"color": style.ORANGE, "linewidth": 1.2, "linestyle": style.DASHES[1]}
     upper.plot(data["time_s"], style.gaps(data["modelled"]), label="model", **look)
     upper.set_ylabel(data["label"])
-    upper.legend(loc="best", ncols=2)
+    upper.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     lower.axhline(0.0, color=style.MUTED, linewidth=0.9)
     lower.plot(data["time_s"], style.gaps(data["difference"]), color=style.RED, linewidth=0.9)
     lower.set_ylabel(data["difference_label"])

@@ -304,7 +304,7 @@ def _residual_figure(fit: SurfaceFit) -> dict[str, Any]:
     data = {
         "speed_rad_s": rounded([p.speed_rad_s for p in fit.points]),
         "load_Nm": rounded([p.load_Nm for p in fit.points]),
-        "residual_uNm": rounded(1e6 * fit.residuals_Nm),
+        "residual_uNm": rounded(1e6 * fit.own_residuals_Nm),
         "std_uNm": rounded(1e6 * fit.residual_stds_Nm),
         "outlier": [p.run in named for p in fit.points],
         "run": [p.run for p in fit.points],
@@ -312,7 +312,7 @@ def _residual_figure(fit: SurfaceFit) -> dict[str, Any]:
     return doc.figure(
         "identification_residuals",
         data,
-        caption="Residuals of the runs, with two standard deviations of their own noise",
+        caption="Residuals of the runs less the most likely shared errors, with two standard deviations",
         alt="Residual torque of every run against speed and against load",
     )
 
