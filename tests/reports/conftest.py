@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any, NamedTuple
-
 import pytest
+from built_report import Built
 
 from actuator_lti import load_design
 from reports.build import design_report, write_report
-
-
-class Built(NamedTuple):
-    """A report on disk and the document it was made of."""
-
-    document: dict[str, Any]
-    page: Path
-    data: Path
-
-
-HOSTILE = "<script>alert(1)</script> \"quoted\" 'single' & $x^2$ ]]> \u202e {{ 7*7 }}"
 
 
 @pytest.fixture(scope="session")

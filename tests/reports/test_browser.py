@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from conftest import Built
+from built_report import Built
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

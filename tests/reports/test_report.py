@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import HOSTILE, Built
+from built_report import HOSTILE, Built
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.errors import InputError
