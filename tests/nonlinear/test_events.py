@@ -1,0 +1,108 @@
+"""Stick, slip and breakaway against scipy.integrate.solve_ivp with event functions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+import pytest
+from stick_slip_reference import bare_drive, bare_source, drive_open, reference
+
+from actuator_lti.design.model import Design, Friction
+from nonlinear import State
+
+DRY = Friction(dry_torque_Nm=0.02, viscous_Nms_rad=5e-6)
+HARD = Friction(
+    dry_torque_Nm=0.02,
+    viscous_Nms_rad=5e-6,
+    dry_torque_reverse_Nm=0.03,
+    viscous_reverse_Nms_rad=2e-5,
+    breakaway_ratio=1.5,
+    offset_torque_Nm=0.004,
+)
+LONG = 2e-3  # a tick longer than every time constant: much happens in it
+
+
+def double_inductance(design: Design) -> float:
+    """Inductance at which the eigenvalues of (i, w) coincide."""
+    m, J, Cv = design.motor, design.inertia_kgm2, design.friction.viscous_Nms_rad
+    # (R/L - Cv/J)^2 = 4 kE kM/(L J), solved for 1/L
+    R, k = m.resistance_ohm, m.torque_constant_Nm_A * m.back_emf_constant_Vs_rad
+    b, c = Cv / J, 4.0 * k / J
+    return 1.0 / float(max(np.roots([R * R, -(2.0 * R * b + c), b * b]).real))
+
+
+def assert_same(
+    design: Design, voltages: np.ndarray, start: State, events: int, load_Nm: float = 0.0
+) -> None:
+    run = drive_open(design, voltages, start, load_Nm)
+    expected = reference(design, voltages, start, load_Nm)
+    simulated = np.column_stack([run.current_A, run.motor_speed_rad_s, run.motor_angle_rad])
+    assert run.events_per_tick >= events
+    scale = np.abs(expected).max(axis=0) + 1e-12
+    np.testing.assert_allclose(simulated / scale, expected / scale, atol=2e-9, rtol=0)
+
+
+@pytest.mark.parametrize("friction", [DRY, HARD], ids=["plain", "asymmetric"])
+@pytest.mark.parametrize("inductance", ["real", "complex", "double"])
+@pytest.mark.parametrize("delay", [0.0, 0.4, 1.3])
+def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: float) -> None:
+    design = bare_drive(friction, LONG, delay * LONG)
+    value = {"real": 6e-6, "complex": 4e-5, "double": double_inductance(design)}[inductance]
+    design = replace(design, motor=replace(design.motor, inductance_H=value))
+    rng = np.random.default_rng(3)
+    voltages = rng.uniform(0.15, 0.9, 40) * (-1.0) ** np.arange(40)
+    voltages[10:14] = 0.0
+    assert_same(design, voltages, State(motor_speed_rad_s=40.0), 2)
+
+
+def test_ringing_faster_than_the_tick() -> None:
+    # electromechanical resonance above Nyquist: the speed crosses zero several times under one held voltage
+    design = bare_drive(replace(DRY, dry_torque_Nm=5e-4), 0.2, inductance_H=6e-3, resistance_ohm=0.005)
+    assert_same(design, np.array([0.5, 0.0, -0.3, 0.2, 0.0, 0.0]), State(), 4)
+
+
+def test_events_with_a_load_that_drives_back() -> None:
+    design = bare_drive(HARD, LONG)
+    design = replace(design, load=replace(design.load, path="back-drivable"))
+    voltages = 0.6 * np.sin(np.arange(40.0))
+    assert_same(design, voltages, State(), 1, load_Nm=60.0)
+
+
+def test_torque_source() -> None:
+    design = bare_source(HARD, LONG, gain=0.1, delay_s=0.3 * LONG)
+    voltages = 0.5 * np.sin(0.9 * np.arange(60.0))
+    assert_same(design, voltages, State(motor_speed_rad_s=5.0), 2)
+
+
+def test_breakaway_at_the_edge_of_a_tick() -> None:
+    design = bare_drive(DRY, 1e-4)
+    m, Ts = design.motor, 1e-4
+    reached = 1.0 - exp(-Ts * m.resistance_ohm / m.inductance_H)
+    edge = DRY.dry_torque_Nm * m.resistance_ohm / (m.torque_constant_Nm_A * reached)
+    for u in np.nextafter(edge, [0.0, edge, 1.0]):
+        assert_same(design, np.full(30, u), State(), 1)
+
+
+def test_start_from_rest_without_friction() -> None:
+    design = bare_drive(Friction(), 1e-4)
+    assert_same(design, np.sin(0.3 * np.arange(100.0)), State(), 0)
+
+
+def test_friction_above_the_stall_torque_never_moves() -> None:
+    design = bare_drive(Friction(dry_torque_Nm=2.0), 1e-4)
+    run = drive_open(design, np.full(2000, 12.0), State())
+    assert run.current_A[-1] == pytest.approx(12.0 / 0.055, rel=1e-12)  # stall current, 1.29 N m
+    assert not run.motor_speed_rad_s.any()
+    assert not run.motor_angle_rad.any()
+    assert run.events == 0
+    assert run.stick_fraction == 1.0
+
+
+def test_comes_to_rest_and_stays() -> None:
+    design = bare_drive(DRY, 1e-4)
+    run = drive_open(design, np.zeros(3000), State(motor_speed_rad_s=300.0))
+    assert run.motor_speed_rad_s[-1] == 0.0
+    assert np.ptp(run.motor_angle_rad[-100:]) == 0.0
+    assert run.events == 1
