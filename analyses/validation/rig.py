@@ -24,7 +24,6 @@ from nonlinear.probe import Probe, write_probe
 
 Floats = npt.NDArray[np.float64]
 STAGES = ("current", "velocity", "position")
-POINTS = at.POINTS
 
 
 @dataclass(frozen=True)
@@ -97,13 +96,15 @@ class Rig:
         Parameters
         ----------
         gain : float
-            Factor on the loop gain at the point.
+            Factor on the controller in front of the point, proportional and integral part: the loop gain.
         delay_samples : float
             Extra delay at the point, in its own samples.
         """
         row = self._base.copy()
-        write_probe(Probe(point=self.point, gain=gain, delay_samples=delay_samples), row)  # type: ignore[arg-type]
-        self._start(row, gain)
+        write_probe(Probe(point=self.point, delay_samples=delay_samples), row)  # type: ignore[arg-type]
+        for place in GAINS[producer(self.design, self.point)]:
+            row[place] *= gain
+        self._start(row)
         return row
 
     @cached_property
@@ -119,14 +120,12 @@ class Rig:
             row[at.VELOCITY_GAIN] = row[at.VELOCITY_INTEGRAL] = 0.0
         return row
 
-    def _start(self, row: Floats, gain: float) -> None:
-        """Write the steady state; a signal is that behind the instrument over its gain in front of it."""
-        factor = dict.fromkeys(POINTS, 1.0) | {self.point: gain}
+    def _start(self, row: Floats) -> None:
+        """Write the steady state, from the motor outwards."""
         row[at.SPEED_START], row[at.CURRENT_START] = self.ride.speed_rad_s, self.ride.current_A
-        value, point = self.ride.voltage_V, "u"  # behind the instrument at that point
-        row[at.VOLTAGE_START] = value
+        wanted, point = self.ride.voltage_V, "u"
+        row[at.VOLTAGE_START] = wanted
         for stage in self._running:
-            wanted = value / factor[point]
             if stage == "position":
                 row[at.ANGLE_START] = -wanted / row[at.POSITION_GAIN]
                 if point == "w_ref":
@@ -136,13 +135,13 @@ class Rig:
             integral, step, kp = INTEGRALS[stage]
             base = self.ride.current_A if stage == "current" else self.ride.speed_rad_s
             if row[step] != 0.0:
-                row[integral], value = wanted, base
+                row[integral], wanted = wanted, base
             else:
-                value = base + wanted / row[kp]
+                wanted = base + wanted / row[kp]
             point = "i_ref" if stage == "current" else "w_ref"
             if point == "i_ref":
-                row[at.CURRENT_COMMAND_START] = value / factor[point]
-        self._constant(row, point, value)
+                row[at.CURRENT_COMMAND_START] = wanted
+        self._constant(row, point, wanted)
 
     def _command(self, row: Floats) -> None:
         """Let the command run with the motor."""
@@ -174,6 +173,12 @@ class Rig:
 INTEGRALS = {
     "current": (at.CURRENT_INTEGRATOR_START, at.CURRENT_INTEGRAL, at.CURRENT_GAIN),
     "velocity": (at.VELOCITY_INTEGRATOR_START, at.VELOCITY_INTEGRAL, at.VELOCITY_GAIN),
+}
+
+GAINS = {
+    "current": (at.CURRENT_GAIN, at.CURRENT_INTEGRAL),
+    "velocity": (at.VELOCITY_GAIN, at.VELOCITY_INTEGRAL),
+    "position": (at.POSITION_GAIN,),
 }
 
 

@@ -1,0 +1,228 @@
+"""Where oscillations no longer die out: the border of stability found in time, many searches side by side.
+
+A search varies one thing of a rig (loop gain up or down, or a delay added at the point), watches how an
+oscillation grows from one window of whole periods to the next, and closes in on the value at which it
+neither grows nor decays.  Each round runs a dozen values of every search in one batch and keeps the first
+interval in which the verdict changes; at the end the growth rate, which is smooth there, is interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from analyses.validation.coherent import coherent
+from analyses.validation.rig import Rig
+from nonlinear._kernels import layout as at
+from nonlinear.batch import injection_place, run_rows
+from nonlinear.reduced import BatchResult
+
+Floats = npt.NDArray[np.float64]
+Kind = Literal["gain up", "gain down", "delay"]
+Progress = Callable[[int, int], None]
+
+VALUES = 12  # of each search in one round
+ROUNDS = 6
+CLOSE = 3e-3  # relative width at which the bracket is interpolated
+CYCLES = 20  # periods in a window
+FAINT = 1e-3  # kick, relative to the room of the signal
+NOTHING = 1e-9  # of the kick: what is left counts as nothing
+GAIN_RANGE = 1e3
+LONGEST_DELAY_SAMPLES = 2000.0
+SHORTEST_DELAY_SAMPLES = 0.02
+
+
+@dataclass(frozen=True)
+class Search:
+    """One border to be found.
+
+    Attributes
+    ----------
+    setup : Rig
+        The loop; it rides, and limits may be on (a limit that acts after the faint kick counts as growth).
+    kind : {"gain up", "gain down", "delay"}
+        What is varied at the rig's point: the loop gain as a factor from 1 up or down, or a delay in samples
+        of the point from 0 up.
+    frequency_hz : float
+        Where the oscillation is expected: sets the length of the windows, not the answer.
+    settle_ticks : int
+        Before the two windows.
+    reach : float
+        Largest factor of gain (up or down).
+    """
+
+    setup: Rig
+    kind: Kind
+    frequency_hz: float
+    settle_ticks: int
+    reach: float = GAIN_RANGE
+
+    def rows(self, values: Floats) -> Floats:
+        """One run a value."""
+        window = coherent(
+            self.frequency_hz, self.setup.design.controller.period_s, self.setup.base_ticks, CYCLES
+        )
+        rows = np.array([self.row(float(value)) for value in values])
+        rows[:, at.TICKS] = self.settle_ticks + 2 * window.ticks[0]
+        rows[:, at.WINDOW], rows[:, at.CYCLES] = window.ticks[0], window.cycles[0]
+        rows[:, at.HARMONICS] = 1
+        return rows
+
+    def row(self, value: float) -> Floats:
+        """The rig at one value, with a faint impulse at the point in its first sample."""
+        setup = self.setup
+        row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
+        place = injection_place(setup.point)
+        row[place], row[place + 1] = at.TABLE, self.kick
+        row[place + 3], row[place + 4] = 0, IMPULSE.size
+        return row
+
+    @property
+    def kick(self) -> float:
+        """Size of the impulse, in the unit of the point."""
+        signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
+        room = self.setup.room[signal[self.setup.point]]
+        if room == inf:
+            room = max(abs(self.setup.ride.speed_rad_s), 1.0)
+        return FAINT * room
+
+    def growth(self, result: BatchResult) -> Floats:
+        """Growth of the oscillation from window to window as a logarithm; +-inf where it is plain."""
+        last, earlier = (np.abs(result.phasor(self.setup.before, 1, k)) for k in (0, 1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.log(last / earlier)
+        gone = (last <= NOTHING * self.kick) | ~np.isfinite(found)
+        limited = np.any([result.limit_fraction(name) > 0.0 for name in at.LIMITERS], axis=0)
+        burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.friction_on)
+        return np.where(burst, inf, np.where(gone, -inf, found))
+
+    def grid(self) -> Floats:
+        """First values to try, outwards from the nominal drive."""
+        if self.kind == "delay":
+            return np.geomspace(SHORTEST_DELAY_SAMPLES, LONGEST_DELAY_SAMPLES, 2 * VALUES)
+        steps = np.geomspace(1.0 + 1e-3, self.reach, 2 * VALUES)
+        return steps if self.kind == "gain up" else 1.0 / steps
+
+    def frequency(self, result: BatchResult) -> Floats:
+        """Frequency of the oscillation, Hz, from the turn of the fundamental between the windows."""
+        turn = np.angle(result.phasor(self.setup.before, 1, 0) / result.phasor(self.setup.before, 1, 1))
+        seconds = result.rows[:, at.WINDOW] * result.rows[:, at.PERIOD]
+        return (result.rows[:, at.CYCLES] + turn / (2.0 * np.pi)) / seconds
+
+
+IMPULSE = np.array([1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Border:
+    """Where an oscillation neither grows nor decays.
+
+    Attributes
+    ----------
+    value : float or None
+        Factor of the gain, or delay in samples of the point; ``None`` where none was found within the reach.
+    bracket : tuple of float
+        Decays at the first, grows at the second (the ends of the search where none was found).
+    frequency_hz : float or None
+        Of the oscillation at the border.
+    runs : int
+    """
+
+    value: float | None
+    bracket: tuple[float, float]
+    frequency_hz: float | None
+    runs: int
+
+
+@dataclass
+class _Hunt:
+    """A search under way."""
+
+    search: Search
+    values: Floats
+    low: float = 0.0
+    high: float = 0.0
+    growths: tuple[float, float] = (-inf, inf)
+    frequency_hz: float | None = None
+    runs: int = 0
+    found: bool | None = None
+
+    def take(self, result: BatchResult) -> None:
+        """Keep the first interval in which decay turns into growth."""
+        growth, hertz = self.search.growth(result), self.search.frequency(result)
+        self.runs += growth.size
+        above = np.flatnonzero(growth >= 0.0)
+        if self.found is None:
+            self.found = bool(above.size)
+            self.low, self.high = self._nominal(), float(self.values[-1])
+            if not self.found:
+                return
+        k = int(above[0]) if above.size else growth.size
+        if k > 0:
+            self.low, self.growths = float(self.values[k - 1]), (float(growth[k - 1]), self.growths[1])
+            self.frequency_hz = float(hertz[k - 1])
+        if k < growth.size:
+            self.high, self.growths = float(self.values[k]), (self.growths[0], float(growth[k]))
+        self.values = np.geomspace(max(self.low, 1e-300), self.high, VALUES + 2)[1:-1]
+
+    def _nominal(self) -> float:
+        return SHORTEST_DELAY_SAMPLES / 10.0 if self.search.kind == "delay" else 1.0
+
+    @property
+    def done(self) -> bool:
+        if self.found is None:
+            return False
+        narrow = abs(log(self.high / self.low)) < CLOSE and all(np.isfinite(self.growths))
+        return not self.found or narrow
+
+    def border(self) -> Border:
+        """Interpolate the growth between the ends."""
+        bracket = (self.low, self.high)
+        if not self.found:
+            return Border(None, bracket, None, self.runs)
+        a, b = self.growths
+        part = -a / (b - a) if np.isfinite(a) and np.isfinite(b) and b > a else 0.5
+        value = exp(log(self.low) + part * log(self.high / self.low))
+        return Border(value, bracket, self.frequency_hz, self.runs)
+
+
+def find_borders(
+    searches: Sequence[Search], *, threads: int | None = None, progress: Progress | None = None
+) -> list[Border]:
+    """Find the borders of many searches together.
+
+    Returns
+    -------
+    list of Border
+        In the order of the searches.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> from analyses.validation.rig import rig
+    >>> loop = rig(load_design("ilr33-amber"), "current")
+    >>> border, = find_borders([Search(loop, "gain up", 1900.0, 400)])
+    >>> round(border.value, 2)
+    2.95
+    """
+    hunts = [_Hunt(search, search.grid()) for search in searches]
+    for k in range(ROUNDS):
+        waiting = [hunt for hunt in hunts if not hunt.done]
+        if not waiting:
+            break
+        parts = [hunt.search.rows(hunt.values) for hunt in waiting]
+        result = run_rows(np.concatenate(parts), IMPULSE, threads=threads)
+        ends = np.cumsum([len(part) for part in parts])
+        for hunt, part, end in zip(waiting, parts, ends, strict=True):
+            piece = slice(end - len(part), end)
+            hunt.take(
+                BatchResult(rows=result.rows[piece], outs=result.outs[piece], status=result.status[piece])
+            )
+        if progress is not None:
+            progress(k + 1, ROUNDS)
+    return [hunt.border() for hunt in hunts]
