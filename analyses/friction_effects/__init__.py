@@ -1,0 +1,1 @@
+"""What dry friction does at small signals: threshold, hysteresis, standing error, limit cycles."""

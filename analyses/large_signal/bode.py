@@ -1,0 +1,96 @@
+"""Frequency response at several amplitudes, and bandwidth against amplitude, read from the map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.large_signal.map import AmplitudeMap
+
+MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
+
+
+@dataclass(frozen=True)
+class AmplitudeBode:
+    """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude.
+
+    Attributes
+    ----------
+    load_Nm : float
+    frequency_hz : ndarray, shape (f,)
+    fractions : tuple of float
+        Of full deflection.
+    amplitude_rad : ndarray, shape (k,)
+    gain_db, phase_deg : ndarray, shape (k, f)
+        Of the fundamental; -inf and NaN where nothing moves.
+    linear_db, linear_deg : ndarray, shape (f,)
+    all_amplitude_rad : ndarray, shape (a,)
+        Every amplitude of the map.
+    minus3db_hz, minus90deg_hz : ndarray, shape (a,)
+        First crossing, interpolated on the logarithm of frequency; NaN where there is none in the range
+        (`lowest_hz`: already below at the lowest frequency).
+    below_from_start : ndarray of bool, shape (a,)
+        Whether the gain is below -3 dB at the lowest frequency already.
+    linear_minus3db_hz, linear_minus90deg_hz : float or None
+    """
+
+    load_Nm: float
+    frequency_hz: np.ndarray
+    fractions: tuple[float, ...]
+    amplitude_rad: np.ndarray
+    gain_db: np.ndarray
+    phase_deg: np.ndarray
+    linear_db: np.ndarray
+    linear_deg: np.ndarray
+    all_amplitude_rad: np.ndarray
+    minus3db_hz: np.ndarray
+    minus90deg_hz: np.ndarray
+    below_from_start: np.ndarray
+    linear_minus3db_hz: float | None
+    linear_minus90deg_hz: float | None
+
+
+def amplitude_bode(design: Design, found: AmplitudeMap) -> AmplitudeBode:
+    """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
+    full = design.validation.full_deflection_rad
+    fractions = tuple(sorted(design.validation.amplitude_fractions))
+    places = [int(np.argmin(np.abs(found.amplitude_rad - fraction * full))) for fraction in fractions]
+    gain, phase, hz = found.gain_db, found.phase_deg, found.frequency_hz
+    linear_db = 20.0 * np.log10(np.abs(found.linear))
+    linear_deg = np.degrees(np.unwrap(np.angle(found.linear)))
+    first_3 = np.array([_crossing(hz, row, MINUS_3DB) for row in gain])
+    first_90 = np.array([_crossing(hz, row, -90.0) for row in phase])
+    return AmplitudeBode(
+        load_Nm=found.load_Nm,
+        frequency_hz=hz,
+        fractions=fractions,
+        amplitude_rad=found.amplitude_rad[places],
+        gain_db=gain[places],
+        phase_deg=phase[places],
+        linear_db=linear_db,
+        linear_deg=linear_deg,
+        all_amplitude_rad=found.amplitude_rad,
+        minus3db_hz=first_3,
+        minus90deg_hz=first_90,
+        below_from_start=gain[:, 0] < MINUS_3DB,
+        linear_minus3db_hz=_number(_crossing(hz, linear_db, MINUS_3DB)),
+        linear_minus90deg_hz=_number(_crossing(hz, linear_deg, -90.0)),
+    )
+
+
+def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:
+    """Give the first frequency at which the values fall through a level; NaN where they do not."""
+    above = values >= level
+    falls = np.flatnonzero(above[:-1] & ~above[1:] & np.isfinite(values[1:]))
+    if not falls.size:
+        return math.nan
+    k = int(falls[0])
+    part = (values[k] - level) / (values[k] - values[k + 1])
+    return float(hz[k] * (hz[k + 1] / hz[k]) ** part)
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None

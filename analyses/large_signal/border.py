@@ -1,0 +1,140 @@
+"""The border of linear validity, found in the simulator by bisection, against the smallest A_k(w)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.limiters import onset
+from actuator_lti.loops import Loops
+from analyses.large_signal.classify import limiter_fractions
+from analyses.large_signal.grid import frequency_range_hz, tone
+from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones_run import run_tones
+from nonlinear._kernels import layout as at
+
+FREQUENCIES, ROUNDS = 14, 9
+TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)
+TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class BorderCheck:
+    """Amplitude at which a limit first acts, linear and simulated, at each frequency.
+
+    Attributes
+    ----------
+    friction_on : bool
+    frequency_hz : ndarray, shape (f,)
+    predicted_rad, simulated_rad : ndarray, shape (f,)
+        Smallest A_k(w); what the simulation shows. NaN where no limit acts within the range tried, or
+        where nothing limits.
+    predicted_limiter, simulated_limiter : tuple of str
+        Empty where there is none.
+    resolution : float
+        Relative width of the last interval of the bisection.
+    """
+
+    friction_on: bool
+    frequency_hz: np.ndarray
+    predicted_rad: np.ndarray
+    simulated_rad: np.ndarray
+    predicted_limiter: tuple[str, ...]
+    simulated_limiter: tuple[str, ...]
+    resolution: float
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Simulated over predicted."""
+        return np.asarray(self.simulated_rad / self.predicted_rad)
+
+    @property
+    def largest_error(self) -> float | None:
+        """Largest relative difference; ``None`` where nothing limits."""
+        known = np.abs(self.ratio - 1.0)[np.isfinite(self.ratio)]
+        return float(known.max()) if known.size else None
+
+    @property
+    def same_limiter(self) -> tuple[bool, ...]:
+        """Whether the limiter that acts is the one foreseen; also true where two are foreseen together."""
+        return tuple(a == b for a, b in zip(self.predicted_limiter, self.simulated_limiter, strict=True))
+
+    @property
+    def passed(self) -> bool:
+        """Within `TOLERANCE` with the same limiter at every frequency (friction off)."""
+        error = self.largest_error
+        return error is None or (error <= TOLERANCE and all(self.same_limiter))
+
+
+def check_border(
+    design: Design,
+    loops: Loops,
+    *,
+    friction_on: bool = False,
+    load_Nm: float = 0.0,
+    count: int = FREQUENCIES,
+    rounds: int = ROUNDS,
+) -> BorderCheck | None:
+    """Bisect the amplitude at which a limit first acts in steady state, at each of several frequencies.
+
+    Every run begins in the linear steady state just below the border and is judged by its last window, so
+    that no start-up counts. ``None`` where the loop is unstable: it has no border.
+
+    Parameters
+    ----------
+    friction_on : bool
+        Without dry friction the border is that of the linear loop; with it, the shift is what is asked for.
+    """
+    low, high = frequency_range_hz(design, loops)
+    chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
+    omega = np.array([t.omega_rad_s for t in chosen])
+    border, start = onset(loops, omega), linear_steady_state(loops, omega)
+    if not start.stable:
+        return None
+    tries, limited = WIDE if friction_on else TIGHT, np.flatnonzero(np.isfinite(border.amplitude_rad))
+    simulated, names = np.full(len(omega), np.nan), [""] * len(omega)
+    if len(limited):
+        foreseen = border.amplitude_rad[limited]
+
+        def acting(amplitude: np.ndarray) -> np.ndarray:
+            begin = np.minimum(amplitude, 0.99 * foreseen)
+            result = run_tones(
+                design, chosen, limited, amplitude, start, begin,
+                load_Nm=load_Nm, friction_on=friction_on, harmonics=1,
+            )  # fmt: skip
+            return limiter_fractions(result)
+
+        found, first = _bisect(acting, foreseen, tries, rounds)
+        simulated[limited] = found
+        for place, name in zip(limited, first, strict=True):
+            names[place] = name
+    return BorderCheck(
+        friction_on,
+        omega / (2.0 * np.pi),
+        np.where(np.isfinite(border.amplitude_rad), border.amplitude_rad, np.nan),
+        simulated,
+        border.active,
+        tuple(names),
+        (tries[1] / tries[0]) ** (0.5**rounds) - 1.0,
+    )
+
+
+def _bisect(
+    acting: Callable[[np.ndarray], np.ndarray], foreseen: np.ndarray, tries: tuple[float, float], rounds: int
+) -> tuple[np.ndarray, list[str]]:
+    """Close in on the border from both sides, all frequencies at once, on a logarithmic scale."""
+    low, high = np.log(tries[0] * foreseen), np.log(tries[1] * foreseen)
+    at_low, at_high = acting(np.exp(low)), acting(np.exp(high))
+    valid = (at_low.max(axis=1) == 0.0) & (at_high.max(axis=1) > 0.0)
+    last = at_high
+    for _ in range(rounds):
+        middle = 0.5 * (low + high)
+        seen = acting(np.exp(middle))
+        hit = seen.max(axis=1) > 0.0
+        low, high = np.where(hit, low, middle), np.where(hit, middle, high)
+        last = np.where(hit[:, None], seen, last)
+    names = [at.LIMITERS[int(np.argmax(row))] if ok else "" for row, ok in zip(last, valid, strict=True)]
+    return np.where(valid, np.exp(0.5 * (low + high)), np.nan), names

@@ -1,0 +1,80 @@
+"""What a cell of the map shows: which limit acts, and what the output looks like; criteria stated here."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyses.large_signal.formulas import PARABOLA_THIRD, TRIANGLE_THIRD
+from nonlinear._kernels import layout as at
+from nonlinear.reduced import BatchResult
+
+CAUSES = ("none", "friction", "stiction", *at.LIMITERS)
+WAVEFORMS = ("sine", "triangle", "parabola", "stick-slip", "no motion", "distorted", "not steady")
+SINE_DISTORTION = 0.02
+STICK_FRACTION = 0.10
+TRIANGLE_SHARE = 0.65  # of the third harmonic of a triangle
+PARABOLA_SHARE = 0.6  # how far from that of a parabola train
+FRICTION_DB, FRICTION_DEG = 1.0, 10.0
+STEADY = 0.02
+CRITERIA = (
+    f"no motion: at rest at every tick of the last window; stick-slip: at rest at {STICK_FRACTION:.0%} of its "
+    f"ticks or more; triangle: third harmonic, in phase as in a triangle, above {TRIANGLE_SHARE:.0%} of 1/9; "
+    f"parabola: the same within {PARABOLA_SHARE:.0%} of 1/27, with the other sign (both only where a limit "
+    f"acts); sine: distortion below {SINE_DISTORTION:.0%}; else distorted. Not steady: fundamental still changing by more than "
+    f"{STEADY:.0%} from one window to the next."
+)
+CAUSE_RULE = (
+    "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if the "
+    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more, friction if the fundamental is off the linear "
+    f"one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°, else none: the linear model holds."
+)
+
+
+def waveforms(result: BatchResult) -> np.ndarray:
+    """Classify the output of each run in the last window (`CRITERIA`); index into `WAVEFORMS`."""
+    first = result.phasor("output_angle_rad", 1)
+    third = result.phasor("output_angle_rad", 3)
+    size = np.maximum(np.abs(first), 1e-300)
+    in_phase = np.real(third * np.exp(-3j * np.angle(first))) / size
+    stick = result.window_stick_fraction
+    limited = limiter_fractions(result).max(axis=1) > 0.0
+    conditions = [
+        (stick >= 1.0, "no motion"),
+        (result.unsteadiness("output_angle_rad") > STEADY, "not steady"),
+        (stick >= STICK_FRACTION, "stick-slip"),
+        (limited & (in_phase < TRIANGLE_SHARE * TRIANGLE_THIRD), "triangle"),
+        (limited & (np.abs(in_phase / PARABOLA_THIRD - 1.0) < PARABOLA_SHARE), "parabola"),
+        (result.distortion("output_angle_rad") < SINE_DISTORTION, "sine"),
+    ]
+    codes = [WAVEFORMS.index(name) for _, name in conditions]
+    return np.select([mask for mask, _ in conditions], codes, WAVEFORMS.index("distorted"))
+
+
+def limiter_fractions(result: BatchResult) -> np.ndarray:
+    """Fraction of the last window in which each limiter acts, shape (runs, 4)."""
+    return np.stack([result.window_limit_fraction(name) for name in at.LIMITERS], axis=1)
+
+
+def causes(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
+    """Name what keeps each run from being linear (`CAUSE_RULE`); index into `CAUSES`.
+
+    Parameters
+    ----------
+    linear : ndarray of complex
+        Linear response from command to output at each run's frequency.
+    amplitude_rad : ndarray
+        Command amplitude of each run.
+    """
+    fractions = limiter_fractions(result)
+    ratio = result.phasor("output_angle_rad") / (linear * amplitude_rad)
+    magnitude = np.abs(ratio)
+    off = np.abs(20.0 * np.log10(np.maximum(magnitude, 1e-300))) > FRICTION_DB
+    off |= np.abs(np.degrees(np.angle(ratio))) > FRICTION_DEG
+    limited = fractions.max(axis=1) > 0.0
+    stuck = result.window_stick_fraction >= STICK_FRACTION
+    choices = [
+        CAUSES.index(at.LIMITERS[0]) + np.argmax(fractions, axis=1),
+        np.full(len(off), CAUSES.index("stiction")),
+        np.full(len(off), CAUSES.index("friction")),
+    ]
+    return np.select([limited, stuck, off], choices, CAUSES.index("none"))

@@ -1,0 +1,98 @@
+"""Closed forms for the far side of the border: rate limit, acceleration limit (model.md section 5)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+FULL_TRIANGLE = math.sqrt(1.0 + math.pi**2 / 4.0)  # x from which on the output is a whole triangle, 1.8621
+TRIANGLE_DISTORTION, PARABOLA_DISTORTION = 0.1212, 0.0380
+TRIANGLE_THIRD, PARABOLA_THIRD = -1.0 / 9.0, 1.0 / 27.0
+TRIANGLE_CREST = math.sqrt(3.0)
+
+
+@dataclass(frozen=True)
+class RateLimited:
+    """A sine through a pure rate limit R, with ``x = w A/R``.
+
+    Attributes
+    ----------
+    x : float
+    regime : {"linear", "between", "triangle"}
+    gain : float
+        Fundamental of the output over the command.
+    lag_deg : float
+        Positive: the output comes later.
+    peak : float or None
+        Peak of the output, in the unit of R times s; ``None`` between the two regimes.
+    """
+
+    x: float
+    regime: Literal["linear", "between", "triangle"]
+    gain: float
+    lag_deg: float
+    peak: float | None
+
+
+def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> RateLimited:
+    """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit).
+
+    Parameters
+    ----------
+    amplitude : float
+        Peak of the command.
+    omega_rad_s : float
+    rate_limit : float
+        R, in the unit of the amplitude per second.
+
+    Examples
+    --------
+    >>> found = rate_limited(10.0, 2 * math.pi * 5.0, 150.0)
+    >>> round(found.gain, 6), round(found.lag_deg, 4), found.peak
+    (0.607927, 41.4096, 7.5)
+    """
+    x = omega_rad_s * amplitude / rate_limit
+    if x <= 1.0:
+        return RateLimited(x, "linear", 1.0, 0.0, amplitude)
+    if x >= FULL_TRIANGLE:
+        peak = math.pi * rate_limit / (2.0 * omega_rad_s)
+        lag = math.degrees(math.acos(math.pi / (2.0 * x)))
+        return RateLimited(x, "triangle", 4.0 / (math.pi * x), lag, peak)
+    gain = ((0.2908 * x - 1.4396) * x + 1.9232) * x + 0.2230
+    angle = ((0.5280 * x - 2.6213) * x + 3.5056) * x - 1.4171
+    return RateLimited(x, "between", gain, -math.degrees(angle), None)
+
+
+def onset_frequency_rad_s(amplitude: float, rate_limit: float) -> float:
+    """Angular frequency at which a sine first reaches a pure rate limit."""
+    return rate_limit / amplitude
+
+
+def clamped_onset_amplitude(omega_rad_s: float, rate_limit: float, position_gain: float) -> float:
+    """Onset of a speed clamp behind a P position controller with ideal inner loops.
+
+    ``A = R sqrt(1 + (w/Kv)^2)/w`` (model.md section 5).
+    """
+    return rate_limit * math.hypot(1.0, omega_rad_s / position_gain) / omega_rad_s
+
+
+@dataclass(frozen=True)
+class ParabolaTrain:
+    """Output under a pure acceleration limit, both amplitudes in the unit of the limit times s^2."""
+
+    peak: float
+    fundamental: float
+
+
+def acceleration_limited(acceleration: float, frequency_hz: float) -> ParabolaTrain:
+    """Peak ``a T^2/32`` and fundamental ``a T^2/pi^3`` of a parabola train (model.md section 5).
+
+    Examples
+    --------
+    >>> found = acceleration_limited(20_000.0, 20.0)
+    >>> round(found.peak, 4), round(found.fundamental, 4)
+    (1.5625, 1.6126)
+    """
+    square = acceleration / frequency_hz**2
+    return ParabolaTrain(square / 32.0, square / math.pi**3)

@@ -1,0 +1,148 @@
+"""The map of amplitude and frequency: what limits, what the output looks like, gain and phase."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.limiters import onset
+from actuator_lti.loops import Loops
+from analyses.friction_effects.static import static_threshold
+from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, waveforms
+from analyses.large_signal.grid import amplitudes, tones
+from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones_run import run_tones
+from nonlinear._kernels import layout as at
+
+Progress = Callable[[int, int], None]
+AMPLITUDES, FREQUENCIES = 25, 40
+BELOW_ONSET = 0.95
+
+
+@dataclass(frozen=True)
+class AmplitudeMap:
+    """Sines of many amplitudes and frequencies, each settled; arrays of cells are (amplitude, frequency).
+
+    Attributes
+    ----------
+    load_Nm : float
+    amplitude_rad : ndarray, shape (a,)
+        Peak command at the output shaft (linear axis: m).
+    frequency_hz : ndarray, shape (f,)
+    cause, waveform : ndarray of int, shape (a, f)
+        Index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`.
+    limiter_fraction : ndarray, shape (a, f, 4)
+        Fraction of the last window in which speed, acceleration, current and voltage limits act.
+    stick_fraction, distortion, unsteadiness : ndarray, shape (a, f)
+        Of the output in the last window.
+    response : ndarray of complex, shape (a, f)
+        Fundamental of the output over the command.
+    linear : ndarray of complex, shape (f,)
+        The same from the linear sampled loop, sliding.
+    onset_rad : mapping of str to ndarray, shape (f,)
+        A_k(w) of each limiter from the linear loop, no load.
+    ticks : int
+        Simulated in all.
+    """
+
+    load_Nm: float
+    amplitude_rad: np.ndarray
+    frequency_hz: np.ndarray
+    cause: np.ndarray
+    waveform: np.ndarray
+    limiter_fraction: np.ndarray
+    stick_fraction: np.ndarray
+    distortion: np.ndarray
+    unsteadiness: np.ndarray
+    response: np.ndarray
+    linear: np.ndarray
+    onset_rad: Mapping[str, np.ndarray]
+    ticks: int
+
+    @property
+    def gain_db(self) -> np.ndarray:
+        """Gain of the fundamental in dB; -inf where nothing moves."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20.0 * np.log10(np.abs(self.response)))
+
+    @property
+    def phase_deg(self) -> np.ndarray:
+        """Phase of the fundamental, unwrapped along frequency; NaN where nothing moves."""
+        moving = np.abs(self.response) > 1e-4 * np.abs(self.linear)
+        phases = np.full(self.response.shape, np.nan)
+        for phase, row, ok in zip(phases, self.response, moving, strict=True):
+            phase[ok] = np.degrees(np.unwrap(np.angle(row[ok])))
+        return phases
+
+    @property
+    def gain_change_db(self) -> np.ndarray:
+        """Gain against the linear gain, dB."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20.0 * np.log10(np.abs(self.response / self.linear)))
+
+    @property
+    def phase_change_deg(self) -> np.ndarray:
+        """Phase against the linear phase, -180 to 180 degrees."""
+        return np.asarray(np.degrees(np.angle(self.response / self.linear)))
+
+    def share(self, names: tuple[str, ...], kinds: tuple[str, ...] = CAUSES) -> float:
+        """Fraction of the cells with one of these causes (or waveforms, with ``kinds=WAVEFORMS``)."""
+        table = self.waveform if kinds is WAVEFORMS else self.cause
+        return float(np.isin(table, [kinds.index(name) for name in names]).mean())
+
+
+def amplitude_map(
+    design: Design,
+    loops: Loops,
+    *,
+    load_Nm: float = 0.0,
+    friction_on: bool = True,
+    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
+    progress: Progress | None = None,
+) -> AmplitudeMap:
+    """Simulate sines over amplitude and frequency and say what each shows.
+
+    Parameters
+    ----------
+    design : Design
+    loops : Loops
+        Sampled, sliding, of this design.
+    load_Nm : float
+        Hinge moment.
+    counts : (int, int)
+        Amplitudes and frequencies.
+    progress : callable, optional
+        Called with (runs done, runs in all).
+    """
+    frequencies = tones(design, loops, counts[1])
+    omega = np.array([t.omega_rad_s for t in frequencies])
+    threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
+    levels = amplitudes(design, counts[0], threshold or None)
+    start = linear_steady_state(loops, omega)
+    border = onset(loops, omega)
+    which = np.tile(np.arange(len(omega)), len(levels))
+    amplitude = np.repeat(levels, len(omega))
+    begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
+    result = run_tones(
+        design, frequencies, which, amplitude, start, begin,
+        load_Nm=load_Nm, friction_on=friction_on, insist=True, progress=progress,
+    )  # fmt: skip
+    shape = (len(levels), len(omega))
+    return AmplitudeMap(
+        load_Nm=load_Nm,
+        amplitude_rad=levels,
+        frequency_hz=omega / (2.0 * np.pi),
+        cause=causes(result, start.output[which], amplitude).reshape(shape),
+        waveform=waveforms(result).reshape(shape),
+        limiter_fraction=limiter_fractions(result).reshape((*shape, 4)),
+        stick_fraction=result.window_stick_fraction.reshape(shape),
+        distortion=result.distortion("output_angle_rad").reshape(shape),
+        unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
+        response=(result.phasor("output_angle_rad") / amplitude).reshape(shape),
+        linear=start.output,
+        onset_rad=border.each_rad,
+        ticks=int(result.rows[:, at.TICKS].sum()),
+    )

@@ -1,0 +1,190 @@
+"""The sawtooth of the paper: a sine faster than the speed limit, against the formulas of a pure rate limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.drive_figures import drive_figures
+from analyses.large_signal.formulas import FULL_TRIANGLE, RateLimited, rate_limited
+from analyses.large_signal.grid import tone
+from nonlinear import State, commands, simulate
+
+OVERRUN = 3.0  # x = w A/R that is shown
+PERIODS_SHOWN = 2
+POINTS = 900
+FAST, REVERSAL_DEG = 50.0, 1.0  # Kv/w from which, reversal up to which the formulas hold to 1 % and 1 deg
+GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
+
+
+@dataclass(frozen=True)
+class SawtoothRun:
+    """The last periods at one hinge moment; output side, motor speed and current at the motor.
+
+    Attributes
+    ----------
+    load_Nm : float
+    time_s, reference_rad, output_rad, output_rate_rad_s, speed_command_rad_s, current_A : ndarray
+        Thinned for drawing; the rates are those of the output (motor over N).
+    gain, lag_deg, peak_rad, distortion, crest : float
+        Of the output over the last whole period: fundamental over the command, its lag, largest deflection
+        from the mean, everything but mean and fundamental over the fundamental, peak over rms.
+    formula : RateLimited
+        What a pure rate limit would do.
+    """
+
+    load_Nm: float
+    time_s: np.ndarray
+    reference_rad: np.ndarray
+    output_rad: np.ndarray
+    output_rate_rad_s: np.ndarray
+    speed_command_rad_s: np.ndarray
+    current_A: np.ndarray
+    gain: float
+    lag_deg: float
+    peak_rad: float
+    distortion: float
+    crest: float
+    formula: RateLimited
+
+    @property
+    def gain_error(self) -> float:
+        """Relative error of the fundamental gain against the formula."""
+        return self.gain / self.formula.gain - 1.0
+
+    @property
+    def lag_error_deg(self) -> float:
+        """Difference of the lag from the formula."""
+        return self.lag_deg - self.formula.lag_deg
+
+
+@dataclass(frozen=True)
+class Sawtooth:
+    """A sine command that the output can follow only at its top speed.
+
+    Attributes
+    ----------
+    amplitude_rad, frequency_hz : float
+        Of the command.
+    rate_limit_rad_s : float
+        R at the output.
+    gain_over_frequency : float
+        Kv/w: the formulas hold where this is large.
+    reversal_deg : float
+        Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
+        formulas reverse at once, so this much lag may come on top.
+    has_current : bool
+    runs : tuple of SawtoothRun
+        One a hinge moment.
+    reason : str
+        Why there is none; then ``runs`` is empty.
+    """
+
+    amplitude_rad: float
+    frequency_hz: float
+    rate_limit_rad_s: float
+    gain_over_frequency: float
+    reversal_deg: float
+    has_current: bool
+    runs: tuple[SawtoothRun, ...]
+    reason: str = ""
+
+    @property
+    def applicable(self) -> bool:
+        """Whether loops and torque are fast enough against the command for 1 % and 1 degree."""
+        return self.gain_over_frequency >= FAST and self.reversal_deg <= REVERSAL_DEG
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the formulas are met; ``None`` where they do not apply."""
+        if not self.runs or not self.applicable:
+            return None
+        return all(
+            abs(run.gain_error) <= GAIN_TOLERANCE and abs(run.lag_error_deg) <= LAG_TOLERANCE_DEG
+            for run in self.runs
+        )
+
+
+def sawtooth(
+    design: Design, *, amplitude_rad: float | None = None, frequency_hz: float | None = None
+) -> Sawtooth:
+    """Simulate a sine of which the output can only follow the flanks, at each hinge moment of the design.
+
+    Parameters
+    ----------
+    amplitude_rad : float, optional
+        Default: full deflection.
+    frequency_hz : float, optional
+        Default: where x = w A/R is three, well inside the range of whole triangles (x >= 1.862).
+    """
+    amplitude = design.validation.full_deflection_rad if amplitude_rad is None else amplitude_rad
+    limit = design.limits.speed_rad_s
+    if design.controller.velocity is None or not math.isfinite(limit):
+        reason = "the drive has no speed limit of its own, so its output is no sawtooth"
+        return Sawtooth(amplitude, 0.0, math.inf, 0.0, 0.0, False, (), reason)
+    figures = [drive_figures(design, load) for load in design.validation.loads_Nm]
+    slowest = min(found.output_rate_rad_s for found in figures)
+    rate = limit / design.total_ratio
+    if slowest < rate * (1.0 - 1e-9):
+        reason = (
+            f"the speed limit is not reached at every load: the drive stays at {slowest / rate:.0%} of it"
+        )
+        return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
+    wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
+    chosen = tone(wanted, design, least_updates=400)
+    runs = tuple(
+        _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
+        for load in design.validation.loads_Nm
+    )
+    swift = design.controller.position.gain / chosen.omega_rad_s
+    push = min(found.acceleration_rad_s2 for found in figures)
+    reversal = math.degrees(2.0 * rate / push * chosen.omega_rad_s)
+    electric = design.motor.has_electrical_dynamics
+    return Sawtooth(amplitude, chosen.frequency_hz, rate, swift, reversal, electric, runs)
+
+
+def _run(
+    design: Design, amplitude: float, frequency_hz: float, period_ticks: int, load_Nm: float, rate: float
+) -> SawtoothRun:
+    """Simulate from the flank of the triangle on, and keep the last periods."""
+    formula = rate_limited(amplitude, 2.0 * math.pi * frequency_hz, rate)
+    periods = 2 + PERIODS_SHOWN
+    ticks = periods * period_ticks
+    N = design.total_ratio
+    begin = State()
+    if formula.x >= FULL_TRIANGLE:
+        lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * frequency_hz)
+        begin = State(motor_angle_rad=-N * rate * lag_s)
+    run = simulate(
+        design,
+        commands.sine(amplitude, frequency_hz),
+        ticks * design.controller.period_s,
+        load_Nm,
+        initial=begin,
+    )
+    last = slice(-period_ticks, None)
+    y = run.output_angle_rad[last] - run.output_angle_rad[last].mean()
+    turn = np.exp(-2j * np.pi * frequency_hz * run.time_s[last])
+    phasor = 2j * np.mean(y * turn)
+    fundamental = abs(phasor)
+    rms = float(np.sqrt(np.mean(y**2)))
+    shown = slice(-PERIODS_SHOWN * period_ticks, None, max(1, PERIODS_SHOWN * period_ticks // POINTS))
+    time = run.time_s[shown]
+    return SawtoothRun(
+        load_Nm=load_Nm,
+        time_s=time - time[0],
+        reference_rad=run.reference_rad[shown],
+        output_rad=run.output_angle_rad[shown],
+        output_rate_rad_s=run.motor_speed_rad_s[shown] / N,
+        speed_command_rad_s=run.speed_command_rad_s[shown] / N,
+        current_A=run.current_A[shown],
+        gain=fundamental / amplitude,
+        lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0),
+        peak_rad=float(np.max(np.abs(y))),
+        distortion=math.sqrt(max(rms**2 - fundamental**2 / 2.0, 0.0)) / (fundamental / math.sqrt(2.0)),
+        crest=float(np.max(np.abs(y))) / rms,
+        formula=formula,
+    )

@@ -1,0 +1,114 @@
+"""Begin a sine where the linear drive would be in steady state, so that no start-up hits a limit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.loops import Loops
+from analyses.large_signal.formulas import FULL_TRIANGLE
+from nonlinear._kernels import layout as at
+
+PLACES = {
+    "i": at.CURRENT_START,
+    "w": at.SPEED_START,
+    "th": at.ANGLE_START,
+    "I_current": at.CURRENT_INTEGRATOR_START,
+    "I_velocity": at.VELOCITY_INTEGRATOR_START,
+    "hold_i_ref": at.CURRENT_COMMAND_START,
+    "u1": at.VOLTAGE_START,
+}
+DECAY = math.log(1e3)
+LONGEST_PERIODS = 20_000
+
+
+@dataclass(frozen=True)
+class LinearSteadyState:
+    """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part.
+
+    Attributes
+    ----------
+    output : ndarray of complex, shape (K,)
+        Command to output angle: the fundamental over all ticks.
+    states : dict of int to ndarray of complex, shape (K,)
+        By place in a parameter row: value at t = 0 is the imaginary part.
+    stable : bool
+    settling_ticks : int
+        Ticks in which the slowest mode falls to a thousandth.
+    """
+
+    output: np.ndarray
+    states: dict[int, np.ndarray]
+    stable: bool
+    settling_ticks: int
+
+    def put(self, rows: np.ndarray, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
+        """Write the initial state of each row: tone ``which[r]`` at an amplitude."""
+        if not self.stable:
+            return
+        for place, values in self.states.items():
+            rows[:, place] = amplitude_rad * values.imag[which]
+
+
+def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadyState:
+    """Solve the sampled loop for its periodic state at each frequency."""
+    system = loops.tick_system
+    assert system is not None
+    Ts, M, n = loops.design.controller.period_s, system.ticks, len(system.states)
+    phases = [system.matrices(j) for j in range(M)]
+    A, B = np.eye(n), np.zeros(n)
+    before = []
+    for A_j, B_j, _, _ in phases:
+        before.append((A, B))
+        A, B = A_j @ A, A_j @ B + B_j[:, 0]
+    z = np.exp(1j * omega_rad_s * M * Ts)
+    x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, None], (len(z), n, 1)))[..., 0]
+    th, speed = system.outputs.index("th"), "w_ref" in system.outputs
+    output = np.zeros(len(z), dtype=complex)
+    for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
+        seen = (x @ A_b.T + B_b) @ C[th] + D[th, 0]
+        output += seen * np.exp(-1j * omega_rad_s * j * Ts) / M
+    states = {PLACES[name]: x[:, k] for k, name in enumerate(system.states) if name in PLACES}
+    if speed:
+        row = system.outputs.index("w_ref")
+        C, D = phases[0][2], phases[0][3]
+        states[at.SPEED_COMMAND_START] = (x @ C[row] + D[row, 0]) / z
+    radius = float(np.max(np.abs(np.linalg.eigvals(A))))
+    stable = radius < 1.0
+    periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS) if 0.0 < radius < 1.0 else 1
+    if not stable:
+        periods = 500
+    return LinearSteadyState(output / loops.design.total_ratio, states, stable, periods * M)
+
+
+def triangle_start(design: Design, rows: np.ndarray, amplitude_rad: np.ndarray) -> None:
+    """Begin sines far beyond the speed limit on the flank of the triangle that they end in.
+
+    A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period; from the
+    right place it need not.  Rows with ``x = w A/R`` below that of a full triangle stay as they are.
+    """
+    limit = design.limits.speed_rad_s
+    if design.controller.velocity is None or not math.isfinite(limit):
+        return
+    rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows[:, at.COMMAND + 3]
+    x = omega * amplitude_rad / rate
+    which = np.flatnonzero(x >= FULL_TRIANGLE)
+    lag = np.arccos(np.pi / (2.0 * x[which]))
+    rows[which, at.ANGLE_START] = -limit * lag / omega[which]
+    rows[which, at.SPEED_START] = rows[which, at.SPEED_COMMAND_START] = limit
+    drag = design.friction.viscous(1) * limit
+    motor = design.motor
+    if motor.has_electrical_dynamics and motor.torque_constant_Nm_A:
+        current = drag / motor.torque_constant_Nm_A
+        voltage = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * limit
+    else:
+        current, voltage = 0.0, drag / (motor.source_gain_Nm_V or 1.0)
+    cascaded = design.controller.current is not None
+    rows[which, at.CURRENT_START] = current
+    rows[which, at.VOLTAGE_START] = voltage
+    rows[which, at.CURRENT_COMMAND_START] = current if cascaded else 0.0
+    rows[which, at.CURRENT_INTEGRATOR_START] = voltage if cascaded else 0.0
+    rows[which, at.VELOCITY_INTEGRATOR_START] = current if cascaded else voltage
