@@ -9,7 +9,7 @@ interval in which the verdict changes; at the end the growth rate, which is smoo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, inf, log
 from typing import Literal
 
@@ -31,7 +31,8 @@ ROUNDS = 6
 CLOSE = 3e-3  # relative width at which the bracket is interpolated
 CYCLES = 20  # periods in a window
 FAINT = 1e-3  # kick, relative to the room of the signal
-NOTHING = 1e-9  # of the kick: what is left counts as nothing
+NOTHING = 1e-6  # of the kick: what is left counts as nothing
+OFF_FREQUENCY = 3e-3  # relative: so far off, the windows are fitted anew
 GAIN_RANGE = 1e3
 LONGEST_DELAY_SAMPLES = 2000.0
 SHORTEST_DELAY_SAMPLES = 0.02
@@ -168,7 +169,11 @@ class _Hunt:
             self.frequency_hz = float(hertz[k - 1])
         if k < growth.size:
             self.high, self.growths = float(self.values[k]), (self.growths[0], float(growth[k]))
-        self.values = np.geomspace(max(self.low, 1e-300), self.high, VALUES + 2)[1:-1]
+        self.values = np.geomspace(self.low, self.high, VALUES + 2)[1:-1]
+        if self.frequency_hz is not None:
+            off = abs(self.frequency_hz / self.search.frequency_hz - 1.0)
+            if OFF_FREQUENCY < off < 0.5 / CYCLES:
+                self.search = replace(self.search, frequency_hz=self.frequency_hz)
 
     def _nominal(self) -> float:
         return SHORTEST_DELAY_SAMPLES / 10.0 if self.search.kind == "delay" else 1.0

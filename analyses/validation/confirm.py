@@ -1,0 +1,227 @@
+"""Margins confirmed in time: every gain and delay margin beside the border that the simulator shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, inf, isfinite, pi
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from analyses.validation.borders import Border, Kind, Search, find_borders
+from analyses.validation.rig import Rig
+from nonlinear.probe import fractional_delay
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+    from actuator_lti.margins import StabilityMargins
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+TOLERANCE = 1e-3  # of the ratio or the delay
+SETTLE_CYCLES = 20
+LONGEST_SETTLE_TICKS = 5_000
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """One margin and where the simulator finds it.
+
+    Attributes
+    ----------
+    loop : str
+        A stage (outer loops open) or a break point (all other loops closed).
+    point : str
+    kind : {"gain up", "gain down", "delay", "computing delay"}
+    predicted : float or None
+        Factor of the loop gain, or delay in samples of the point (computing delay: in ticks); ``None`` where
+        the linear loop has no such margin within the reach of the search.
+    predicted_hz : float or None
+        Where the linear loop would oscillate.
+    instrument : float or None
+        Delay in samples at which the loop with the instrument's own interpolated delay reaches its border:
+        what the instrument can find at best; ``None`` for gains.
+    border : Border
+    period_s : float
+        Sampling period of the point.
+    tolerance : float
+        Relative; the instrument's own error is added to it.
+    """
+
+    loop: str
+    point: str
+    kind: str
+    predicted: float | None
+    predicted_hz: float | None
+    instrument: float | None
+    border: Border
+    period_s: float
+    tolerance: float = TOLERANCE
+
+    @property
+    def instrument_error(self) -> float:
+        """Relative error of the interpolated delay at the border; 0 for gains."""
+        if self.instrument is None or not self.predicted:
+            return 0.0
+        return abs(self.instrument / self.predicted - 1.0)
+
+    @property
+    def difference(self) -> float | None:
+        """Measured over predicted less one."""
+        if self.predicted is None or self.border.value is None:
+            return None
+        return self.border.value / self.predicted - 1.0
+
+    @property
+    def passed(self) -> bool:
+        """Whether both agree: within the tolerance, or in that there is no border."""
+        if self.predicted is None or self.border.value is None:
+            return self.predicted is None and self.border.value is None
+        return abs(self.border.value / self.predicted - 1.0) <= self.tolerance + self.instrument_error
+
+
+class ComputingDelay(Search):
+    """A search over the computing delay itself, exact at any fraction of a tick."""
+
+    def row(self, value: float) -> Floats:
+        """The rig with the voltage acting ``value`` ticks later."""
+        design = self.setup.design
+        control = design.controller
+        later = replace(control, computing_delay_s=control.computing_delay_s + value * control.period_s)
+        moved = replace(self.setup, design=replace(design, controller=later))
+        return Search(moved, "gain up", self.frequency_hz, self.settle_ticks).row(1.0)
+
+
+@dataclass(frozen=True)
+class Question:
+    """A margin to be confirmed: the prediction and the search for it."""
+
+    search: Search
+    kind: str
+    predicted: float | None
+    predicted_hz: float | None
+    instrument: float | None = None
+
+    def answer(self, border: Border) -> Confirmation:
+        """The confirmation from the border found."""
+        setup = self.search.setup
+        return Confirmation(
+            loop=setup.loop,
+            point=setup.point,
+            kind=self.kind,
+            predicted=self.predicted,
+            predicted_hz=self.predicted_hz,
+            instrument=self.instrument,
+            border=border,
+            period_s=setup.period_s if self.kind != "computing delay" else setup.design.controller.period_s,
+        )
+
+
+def confirm_margins(
+    questions: Sequence[Question], *, threads: int | None = None, progress: Progress | None = None
+) -> tuple[Confirmation, ...]:
+    """Put all questions to the simulator together; see `stage_questions`, `point_questions`."""
+    borders = find_borders([q.search for q in questions], threads=threads, progress=progress)
+    return tuple(question.answer(border) for question, border in zip(questions, borders, strict=True))
+
+
+def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_ticks: int) -> list[Question]:
+    """Gain up, gain down and delay of one loop (inner loops closed, outer ones open)."""
+    ups = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio > 1.0]
+    downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
+    up, down = min(ups, default=None), max(downs, default=None)
+    found = [_gain(setup, "gain up", up, settle_ticks), _gain(setup, "gain down", down, settle_ticks)]
+    delay = margins.delay_margin
+    if delay is not None and delay.samples is not None and isfinite(delay.samples):
+        hertz = delay.frequency_rad_s / (2.0 * pi)
+        best = instrument_delay(loop.open_loop, delay.samples, delay.frequency_rad_s * loop.period_s)
+        search = Search(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
+        found.append(Question(search, "delay", delay.samples, hertz, best))
+    return found
+
+
+def point_questions(setups: Mapping[str, Rig], loops: Loops, settle_ticks: int) -> list[Question]:
+    """Gain up and down at each break point with all other loops closed, and the computing delay at ``u``.
+
+    Predicted by the eigenvalues of the whole loop over a position period (`exact_margins`), so also where it
+    is periodically time-varying.
+    """
+    from actuator_lti.loops import exact_margins
+
+    found = []
+    for point, setup in setups.items():
+        exact, loop = exact_margins(loops, point), loops.break_points[point]
+        if not exact.stable:
+            continue
+        for kind, ratio in (("gain up", exact.gain_upper), ("gain down", exact.gain_lower)):
+            there = isfinite(ratio) and ratio > 0.0
+            border = (ratio, 2.0 * pi * oscillation_hz(loop, gain=ratio)) if there else None
+            found.append(_gain(setup, kind, border, settle_ticks))  # type: ignore[arg-type]
+        if exact.delay_s is not None and isfinite(exact.delay_s):
+            ticks = exact.delay_s / setup.design.controller.period_s
+            hertz = oscillation_hz(loop, delay_s=exact.delay_s)
+            search = ComputingDelay(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
+            found.append(Question(search, "computing delay", ticks, hertz))
+    return found
+
+
+def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
+    """About where a loop oscillates at its border: the frequency at which ``gain L`` comes nearest to -1."""
+    from scipy.optimize import minimize_scalar
+
+    def distance(log_hz: npt.ArrayLike) -> Floats:
+        omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
+        z = np.exp(1j * omega * loop.period_s)
+        return np.abs(1.0 + gain * np.atleast_1d(loop.open_loop(z)) * np.exp(-1j * omega * delay_s))
+
+    grid = np.log(np.geomspace(1e-4, 0.999, 250) * 0.5 / loop.period_s)
+    k = int(np.argmin(distance(grid)))
+    ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
+    nearest = minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded")
+    return float(np.exp(nearest.x))
+
+
+def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
+    """A gain margin; where none is predicted the search still looks, at a middling frequency."""
+    nyquist = 0.5 / setup.period_s
+    if predicted is None:
+        hertz = nyquist / 8.0 if kind == "gain up" else nyquist / 100.0
+        return Question(Search(setup, kind, hertz, settle_ticks, reach=100.0), kind, None, None)
+    ratio, omega = predicted
+    hertz = min(omega / (2.0 * pi), 0.97 * nyquist)
+    far = max(ratio, 1.0 / ratio)
+    reach = 1e3 if far < 300.0 else inf
+    if reach == inf:
+        return Question(Search(setup, kind, hertz, settle_ticks, reach=100.0), kind, None, None)
+    return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks), reach), kind, ratio, hertz)
+
+
+def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:
+    """Wait for whatever is not the oscillation: some of its periods, and the nominal loop's slowest mode."""
+    tick_s = setup.design.controller.period_s
+    return max(ceil(SETTLE_CYCLES / (hertz * tick_s)), min(settle_ticks, LONGEST_SETTLE_TICKS))
+
+
+def instrument_delay(open_loop: Any, samples: float, turn: float) -> float | None:
+    """Delay in samples at which the loop with the interpolated delay of `Probe` reaches its border.
+
+    Parameters
+    ----------
+    open_loop : python-control system
+        Sampled.
+    samples, turn : float
+        Where the loop with an exact delay does: the delay, and the frequency in rad a sample.
+    """
+    from scipy.optimize import root
+
+    def excess(x: Floats) -> list[float]:
+        z = np.exp(1j * x[0])
+        whole, taps = fractional_delay(max(float(x[1]), 0.0))
+        delayed = z**-whole * np.sum(taps * z ** -np.arange(taps.size))
+        value = complex(open_loop(z)) * delayed + 1.0
+        return [value.real, value.imag]
+
+    solved = root(excess, [turn, samples], tol=1e-13)
+    return float(solved.x[1]) if abs(complex(*excess(solved.x))) < 1e-6 else None
