@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reports.atomic import write_bytes
+from actuator_lti.errors import InputError
 from reports.nightly.text import sha256
 
 MAGIC = b"actuator-lti/nightly-cache 1 "
@@ -62,7 +62,19 @@ class Cache:
             for name, data in files.items():
                 archive.writestr(f"files/{name}", data)
         body = buffer.getvalue()
-        write_bytes(self.path(key), MAGIC + sha256(body).encode() + b"\n" + body)
+        self._put(self.path(key), MAGIC + sha256(body).encode() + b"\n" + body)
+
+    @staticmethod
+    def _put(path: Path, data: bytes) -> None:
+        """Put a file in place whole; what a power cut does to it the checksum finds."""
+        temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.part")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary.write_bytes(data)
+            temporary.replace(path)
+        except OSError as error:
+            temporary.unlink(missing_ok=True)
+            raise InputError(f"cannot write: {error.strerror or error}", where=str(path)) from error
 
     def read(self, key: str) -> Entry | None:
         """Return an entry, or ``None`` where there is none.

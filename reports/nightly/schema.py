@@ -92,6 +92,8 @@ def checked_version(connection: sqlite3.Connection, path: Path) -> int:
         version = int(connection.execute("PRAGMA user_version").fetchone()[0])
         application = int(connection.execute("PRAGMA application_id").fetchone()[0])
         tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
+    except sqlite3.OperationalError:  # the disk, not the file
+        raise
     except sqlite3.DatabaseError as error:
         raise InputError(f"is no history of a nightly build ({error})", where=str(path)) from error
     if tables and application != APPLICATION_ID:

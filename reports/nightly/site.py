@@ -17,6 +17,7 @@ from pathlib import Path
 from actuator_lti.errors import InputError
 from reports.atomic import write_bytes, write_text
 from reports.nightly import machines, pages
+from reports.nightly.batch import Batch
 from reports.nightly.cache import Cache, CorruptEntry, Entry
 from reports.nightly.history import History
 from reports.nightly.text import sha256
@@ -63,13 +64,15 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
         Where the site cannot be written; it is as it was then.
     """
     folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
+    batch = Batch()
     try:
         kept = _reports_to_keep(history, night, keep_reports)
         for design in night.designs:
-            _lay_out_report(site, design, cache)
+            _lay_out_report(site, design, cache, batch)
         available = {path for path in kept if (site / path / "report.html").exists()}
         for name, text in pages.of_night(night, history, folder, available):
-            write_text(site / folder / name, text)
+            batch.write(site / folder / name, text)
+        batch.flush()
         write_text(site / "index.html", pages.index(night, folder))
     except InputError:
         shutil.rmtree(site / folder, ignore_errors=True)
@@ -88,7 +91,7 @@ def _machine_files(night: Overview) -> Mapping[str, str]:
     }
 
 
-def _lay_out_report(site: Path, design: DesignView, cache: Cache) -> None:
+def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) -> None:
     """Copy a report out of the cache unless the site has it, whole."""
     if design.broken:
         return
@@ -103,7 +106,8 @@ def _lay_out_report(site: Path, design: DesignView, cache: Cache) -> None:
             f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
         )
     for name in missing:
-        write_bytes(folder / name, entry.file(name))
+        write = write_bytes if (folder / name).exists() else batch.write
+        write(folder / name, entry.file(name))
 
 
 def _is_there(path: Path, digest: str) -> bool:

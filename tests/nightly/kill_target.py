@@ -1,0 +1,105 @@
+"""Kills nightlies at random moments and looks at what is left; run by the tests in a process of its own.
+
+``python kill_target.py SITE KILLS SEED``: each round starts a nightly of a study that has changed, kills it
+with SIGKILL at a random moment, and checks site and history.  Prints one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import ruptures  # noqa: F401 - here, not in every child
+from nightly_fakes import CODE, INLINE, job, study
+from site_checks import check_whole
+
+from reports.nightly.night import run_night
+
+DESIGNS = 6
+
+
+def jobs(round_: int) -> list:
+    """A study of which half changes with every round."""
+    return [job(f"design {k}", 10.0 + (round_ % 50 if k % 2 else 0), pause=0.003) for k in range(DESIGNS)]
+
+
+def night(site: Path, round_: int) -> None:
+    """One nightly, here."""
+    run_night(study(*jobs(round_)), site, INLINE, code=CODE)
+
+
+def child(site: Path, round_: int) -> int:
+    """Start a nightly in a process of its own; its number."""
+    number = os.fork()
+    if number == 0:
+        try:
+            night(site, round_)
+        finally:
+            if sys.exc_info()[1] is not None:
+                traceback.print_exc()
+            os._exit(0 if sys.exc_info()[1] is None else 1)
+    return number
+
+
+def check_history(path: Path) -> int:
+    """Every finished night has all of its results, and the file is sound; how many finished."""
+    database = sqlite3.connect(path)
+    assert database.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
+    assert not database.execute("PRAGMA foreign_key_check").fetchall()
+    rows = database.execute(
+        "SELECT r.state, count(x.run) FROM runs r LEFT JOIN results x ON x.run = r.id GROUP BY r.id"
+    ).fetchall()
+    database.close()
+    for state, count in rows:
+        assert count == (DESIGNS if state == "done" else 0), (state, count)
+    return sum(state == "done" for state, _ in rows)
+
+
+def main(site: Path, kills: int, seed: int) -> dict[str, object]:
+    """Kill until there were enough kills; every round is looked at."""
+    draw = random.Random(seed)
+    night(site, 0)
+    start = time.monotonic()
+    os.waitpid(child(site, 1), 0)
+    usual = time.monotonic() - start
+    round_, killed, finished, phases = 2, 0, 0, set()
+    while killed < kills:
+        number = child(site, round_)
+        time.sleep(draw.uniform(0.0, 1.3 * usual))
+        phases.add(phase(site))
+        os.kill(number, signal.SIGKILL)
+        _, status = os.waitpid(number, 0)
+        if os.WIFSIGNALED(status):
+            killed += 1
+        else:
+            assert os.WEXITSTATUS(status) == 0, status
+            finished += 1
+        check_whole(site)
+        check_history(site.with_name(site.name + ".state") / "history.sqlite")
+        round_ += 1
+    number = child(site, round_)
+    _, status = os.waitpid(number, 0)
+    assert status == 0, status
+    check_whole(site)
+    leftovers = [p for top in (site, site.with_name(site.name + ".state")) for p in top.rglob(".*.part")]
+    return {"killed": killed, "finished": finished, "phases": sorted(phases), "leftovers": len(leftovers)}
+
+
+def phase(site: Path) -> str:
+    """Roughly how far the nightly has come, seen from outside."""
+    index = json.loads((site / "summary.json").read_text())["run"]
+    nights = [int(p.name.partition("-")[0]) for p in (site / "nights").iterdir()]
+    if any(n > index for n in nights):
+        return "publishing"
+    return "building" if (site.with_name(site.name + ".state") / "holder.json").exists() else "outside"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))) + "\n")

@@ -1,0 +1,155 @@
+"""A full disk, a read-only site, damaged caches: told in one line, nothing lost."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from nightly_fakes import CODE, INLINE, job, study
+from site_checks import check_whole
+
+from actuator_lti.errors import InputError
+from reports.nightly.night import run_night
+
+TOLD = re.compile("No space left on device|disk is full|disk I/O error")
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 3 MB, where this process may mount one."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(place)]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    except OSError as error:
+        pytest.skip(f"no mount here: {error}")
+    if done.returncode:
+        pytest.skip(f"may not mount a small file system: {done.stderr.strip()}")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=False, capture_output=True)
+
+
+def fill(folder: Path, leave: int) -> Path:
+    """Fill a file system but for so many bytes."""
+    ballast = folder / "ballast"
+    free = os.statvfs(folder)
+    ballast.write_bytes(b"\0" * max(0, free.f_bavail * free.f_frsize - leave))
+    return ballast
+
+
+def attempt(site: Path, margin: float) -> str:
+    """Run a night; the words with which it was refused, empty where it was not."""
+    try:
+        nightly(site, margin)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def nightly(site: Path, margin: float):
+    return run_night(study(*(job(f"d{k}", margin) for k in range(5))), site, INLINE, code=CODE)
+
+
+def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Path) -> None:
+    site = small_disk / "site"
+    nightly(site, 10.0)
+    refused = 0
+    for step, leave in enumerate(range(0, 330_000, 11_000)):
+        ballast = fill(small_disk, leave)
+        before = (site / "index.html").read_bytes()
+        words = attempt(site, 11.0 + step)
+        if words:
+            refused += 1
+            assert TOLD.search(words), words
+            assert (site / "index.html").read_bytes() == before
+        check_whole(site)
+        ballast.unlink()
+    assert refused >= 5
+    nightly(site, 99.0)
+    page = check_whole(site)
+    assert "did not end" in page.text
+
+
+def test_a_disk_without_a_byte_is_told_in_one_line(small_disk: Path) -> None:
+    site = small_disk / "site"
+    nightly(site, 10.0)
+    fill(small_disk, 0)
+    with pytest.raises(InputError, match=TOLD.pattern) as caught:
+        nightly(site, 11.0)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_read_only_site_keeps_the_old_night_and_catches_up(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    nightly(site, 10.0)
+    done = subprocess.run(
+        ["sh", "-c", 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1"', "sh", str(site)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        pytest.skip(f"may not make a read-only mount: {done.stderr.strip()}")
+    before = (site / "index.html").read_bytes()
+    try:
+        with pytest.raises(InputError, match="Read-only file system"):
+            nightly(site, 11.0)
+        assert (site / "index.html").read_bytes() == before
+        check_whole(site)
+    finally:
+        subprocess.run(["umount", str(site)], check=True, capture_output=True)
+    nightly(site, 11.0)
+    check_whole(site)
+
+
+def test_a_site_that_cannot_be_written_at_the_end_is_published_next_time(tmp_path, monkeypatch) -> None:
+    site = tmp_path / "site"
+    nightly(site, 10.0)
+    before = (site / "index.html").read_bytes()
+    from reports.nightly import site as site_files
+
+    def refuse(_self, path, data) -> None:
+        if "nights" in Path(path).parts:
+            raise InputError("cannot write: Read-only file system", where=str(path))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(site_files.Batch, "write", refuse)
+        with pytest.raises(InputError, match="Read-only"):
+            nightly(site, 11.0)
+    assert (site / "index.html").read_bytes() == before
+    night = nightly(site, 11.0)
+    assert len(night.runs) == 3
+    assert all(d.result.cached for d in night.designs)
+    check_whole(site)
+
+
+@pytest.mark.parametrize("damage", ["flip", "truncate", "empty"])
+def test_a_corrupt_cache_entry_is_told_and_built_again(tmp_path, damage: str) -> None:
+    site, said = tmp_path / "site", []
+    nightly(site, 10.0)
+    for entry in (tmp_path / "site.state" / "cache").glob("*/*.entry"):
+        data = entry.read_bytes()
+        changed = {"flip": data[:200] + b"?" + data[201:], "truncate": data[:-9], "empty": b""}[damage]
+        entry.write_bytes(changed)
+    night = run_night(
+        study(*(job(f"d{k}", 10.0) for k in range(5))), site, INLINE, code=CODE, say=said.append
+    )
+    assert len(said) == 5
+    assert all("is corrupt" in line and "built again" in line for line in said)
+    assert not any(d.result.cached for d in night.designs)
+    check_whole(site)
+
+
+def test_a_report_that_was_damaged_on_the_site_is_put_right(tmp_path) -> None:
+    site = tmp_path / "site"
+    nightly(site, 10.0)
+    report = next(site.glob("reports/*/*/report.html"))
+    whole = report.read_bytes()
+    report.write_bytes(b"half")
+    nightly(site, 10.0)
+    assert report.read_bytes() == whole

@@ -1,0 +1,79 @@
+"""Worker processes: one design that raises, dies or never ends does not stop the others."""
+
+from __future__ import annotations
+
+import pytest
+from nightly_fakes import BUILD, CODE, Calendar, job, study
+from site_checks import check_whole
+
+from reports.nightly.night import Settings, run_night
+from reports.nightly.pool import Pool, Task
+
+
+@pytest.fixture(scope="module")
+def troubled(tmp_path_factory):
+    """One night with every kind of trouble, on two worker processes."""
+    site = tmp_path_factory.mktemp("pool") / "site"
+    jobs = [
+        job("first"),
+        job("raises", mode="raise", words="gear <b>lost</b>\nin line two"),
+        job("never ends", mode="hang"),
+        job("is killed", mode="die"),
+        job("leaves", mode="exit"),
+        job("fails", 5.0),
+        *(job(f"good {k}") for k in range(4)),
+    ]
+    settings = Settings(workers=2, time_limit_s=1.0, build=BUILD)
+    seen: list[tuple[int, int]] = []
+    clock = Calendar()
+    night = run_night(
+        study(*jobs), site, settings, code=CODE, clock=clock, progress=lambda *pair: seen.append(pair)
+    )
+    return site, night, seen
+
+
+def test_every_design_gets_its_own_end(troubled) -> None:
+    _, night, _ = troubled
+    ends = {d.name: d.result.status for d in night.designs}
+    assert ends.pop("raises") == "error"
+    assert ends.pop("never ends") == "timeout"
+    assert ends.pop("is killed") == "crash"
+    assert ends.pop("leaves") == "crash"
+    assert ends.pop("fails") == "fail"
+    assert set(ends.values()) == {"pass"}
+    assert len(ends) == 5
+
+
+def test_the_page_and_the_exit_status_name_who_failed_and_why(troubled) -> None:
+    site, night, _ = troubled
+    assert night.exit_status == 1
+    page = check_whole(site)
+    assert "did not end within 1 s" in page.text
+    assert "signal 9" in page.text
+    assert "ValueError: gear <b>lost</b> in line two" in page.text
+    junit = (site / "junit.xml").read_text()
+    assert 'errors="4"' in junit
+
+
+def test_progress_counts_to_the_end(troubled) -> None:
+    _, _, seen = troubled
+    assert seen[0] == (0, 10)
+    assert seen[-1] == (10, 10)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+
+
+def test_no_worker_stays_behind(troubled) -> None:
+    import multiprocessing
+
+    assert multiprocessing.active_children() == []
+
+
+def test_a_build_that_cannot_be_imported_fails_every_task_and_ends(tmp_path) -> None:
+    pool = Pool("no_such_module:build", tmp_path, workers=1, time_limit_s=5.0)
+    ends = list(pool.run([Task(key=f"k{k}", payload={}) for k in range(2)]))
+    assert [d.status for d in ends] == ["crash", "crash"]
+    assert all("could not start" in d.message for d in ends)
+
+
+def test_nothing_to_do_starts_no_process(tmp_path) -> None:
+    assert list(Pool("no_such_module:build", tmp_path, workers=2, time_limit_s=1.0).run([])) == []
