@@ -77,7 +77,7 @@ def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
         if block.get("kind") != "verdicts":
             continue
         for item in block.get("items", ()):
-            name = str(item.get("id", ""))
+            name = one_line(str(item.get("id", "")), 200)
             if name in seen:
                 continue
             seen.add(name)

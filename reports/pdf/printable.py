@@ -18,6 +18,7 @@ MAX_TITLE = 240
 LINE_PT = 481.0
 SCALE = 0.78
 _LONG_WORD = re.compile(r"\S{24,}")
+_BREAKS = re.compile(r"[\t\n\r\f\v\x1c-\x1f\x85\u2028\u2029]+")
 _SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
 _WORDS = {True: "met", False: "not met", None: "not judged"}
 _STATES = {True: "pass", False: "fail", None: "info"}
@@ -51,7 +52,7 @@ def clean(value: object, limit: int = MAX_CELL) -> str:
     >>> clean("a\\u202eb"), clean(None), clean("abcdef", 4)
     ('a⟨U+202E⟩b', '', 'abc…')
     """
-    text = visible("" if value is None else str(value))
+    text = _BREAKS.sub(" ", visible("" if value is None else str(value)))
     if len(text) > limit:
         text = text[: limit - 1] + "…"
     return _LONG_WORD.sub(lambda m: "\u200b".join(re.findall(r".{1,12}", m.group())), text)

@@ -1,0 +1,236 @@
+"""Names and texts of other people stay text: in pages, SVG, PDF, CSV, JUnit, Markdown and paths."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from html import unescape
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from nightly_fakes import CODE, INLINE, Calendar, fake_document, job, study
+from site_checks import Page, check_whole
+
+from actuator_lti.errors import InputError
+from reports.nightly.charts import Chart, line_chart
+from reports.nightly.night import approve, run_night
+from reports.nightly.source import read_study
+from reports.nightly.text import one_line, visible
+
+HOSTILE = (
+    "<script>window.hacked=1</script>",
+    '"><img src=x onerror=alert(1)>',
+    "</style><svg/onload=alert(1)>",
+    "</title></script><b>",
+    "{{ 7*7 }}{% raw %}",
+    "../../../../etc/passwd",
+    "/absolute\\windows\\name",
+    "line one\nline two\r\n\ttab",
+    "\u202egnihtemos \u2066isolated\u2069 \u200f",
+    "nul\x00bell\x07esc\x1b[31m",
+    '=HYPERLINK("http://evil.example","x")',
+    "@SUM(1+1)*cmd|' /C calc'!A0",
+    "#set page(fill: red); $x$ `raw` [link](http://evil.example) <lbl>",
+    "]]> & <![CDATA[",
+    "x" * 10_000,
+    "مرحبا 日本語 🚀",
+)
+
+
+@pytest.fixture(scope="module")
+def hostile_site(tmp_path_factory):
+    """Two nights of a study whose every text is hostile."""
+    site = tmp_path_factory.mktemp("hostile") / "site"
+    clock = Calendar()
+    for margin in (10.0, 9.0):
+        jobs = [
+            job(name, margin, title=name, label=name, requirement=name, loop=name, revision=name)
+            for name in HOSTILE
+        ]
+        half = "half a sign \ud800"
+        jobs.append(
+            job("surrogate", margin, title=half, label=half, requirement=half, loop=half, revision=half)
+        )
+        jobs.append(job("raises", mode="raise", words=" ".join(HOSTILE[:15])))
+        made = study(*jobs, title="".join(HOSTILE[:5]))
+        run_night(made, site, INLINE, code=CODE, clock=clock.next())
+    approve(made, site, by=HOSTILE[0], reason=HOSTILE[1], settings=INLINE, clock=clock)
+    return site
+
+
+def pages(site: Path) -> list[Path]:
+    return [site / "index.html", *site.glob("nights/*/*.html")]
+
+
+def test_every_page_is_whole_and_asks_nobody(hostile_site) -> None:
+    page = check_whole(hostile_site)
+    assert "<script>window.hacked=1</script>" in page.text
+
+
+def test_no_markup_of_a_name_becomes_markup(hostile_site) -> None:
+    for path in pages(hostile_site):
+        page = Page(path.read_text(encoding="utf-8"))
+        assert page.handlers == [], path
+        assert page.tags.count("script") == 1, path
+        assert page.tags.count("style") == 1, path
+        assert not {"img", "b", "iframe", "object", "embed"} & set(page.tags), path
+        assert "default-src 'none'" in unescape(path.read_text(encoding="utf-8"))
+
+
+def test_templates_are_not_run(hostile_site) -> None:
+    text = "".join(p.read_text(encoding="utf-8") for p in pages(hostile_site))
+    assert "{{ 7*7 }}" in text
+
+
+def test_nothing_is_written_outside_of_the_site(hostile_site) -> None:
+    top = hostile_site.parent
+    assert sorted(p.name for p in top.iterdir()) == ["site", "site.state"]
+    for path in hostile_site.rglob("*"):
+        assert path.name.isascii()
+        assert len(path.name) < 100
+
+
+def test_direction_marks_and_control_signs_are_shown_not_obeyed(hostile_site) -> None:
+    for path in [*pages(hostile_site), hostile_site / "junit.xml", hostile_site / "summary.md"]:
+        text = path.read_text(encoding="utf-8")
+        assert not set(text) & set(
+            "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f\x00\x07\x1b"
+        )
+
+
+def test_junit_is_xml_and_names_every_design(hostile_site) -> None:
+    root = ElementTree.parse(hostile_site / "junit.xml").getroot()
+    suites = [s.get("name") for s in root]
+    assert len(suites) == len(HOSTILE) + 2
+    assert HOSTILE[0] in suites
+    assert "x" * 10_000 in suites
+
+
+def test_summary_is_json_with_the_names_as_they_are(hostile_site) -> None:
+    names = {d["name"] for d in json.loads((hostile_site / "summary.json").read_text())["designs"]}
+    assert set(HOSTILE) <= names
+
+
+def test_no_cell_of_a_table_for_spreadsheets_is_a_formula(hostile_site) -> None:
+    tables = list(hostile_site.glob("nights/*/*.csv"))
+    assert tables
+    for path in tables:
+        for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")):
+            assert len(row) == 4
+            assert not row[0].lstrip().startswith(("=", "+", "-", "@", "|")), row[0][:60]
+
+
+def test_markdown_has_no_links_and_no_html_of_a_name(hostile_site) -> None:
+    text = (hostile_site / "summary.md").read_text(encoding="utf-8")
+    assert "<script" not in text
+    assert "<img" not in text
+    assert "](http" not in text
+    assert all(line.count("|") in (0, 6) or "\\|" in line for line in text.splitlines())
+
+
+@given(name=st.text(max_size=60), loop=st.text(max_size=30))
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_text_at_all_makes_a_whole_site(tmp_path_factory, name: str, loop: str) -> None:
+    site = tmp_path_factory.mktemp("any") / "site"
+    name = name if one_line(name) else "-"
+    run_night(study(job(name, loop=loop, label=name, title=loop), title=name), site, INLINE, code=CODE)
+    check_whole(site)
+    for path in pages(site):
+        assert Page(path.read_text(encoding="utf-8")).tags.count("script") == 1
+    ElementTree.parse(site / "junit.xml")
+
+
+@given(title=st.text(max_size=40))
+@settings(max_examples=30, deadline=None)
+def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
+    import numpy as np
+
+    chart = Chart(
+        title=visible(title),
+        unit=visible(title),
+        times=np.arange(5.0),
+        values=np.array([1.0, 2.0, np.nan, 2.0, 3.0]),
+        points=(),
+        limit=1.5,
+        first_label=visible(title),
+        last_label=visible(title),
+    )
+    root = ElementTree.fromstring(line_chart(chart))
+    assert {e.tag for e in root.iter()} <= {"svg", "path", "circle", "text"}
+
+
+STUDY_PARTS = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=12), inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@given(
+    tree=st.dictionaries(
+        st.sampled_from(["study", "variant", "sweep", "grid", "monte_carlo", "nightly", "requirement", "x"]),
+        STUDY_PARTS
+        | st.lists(
+            st.dictionaries(st.sampled_from(["name", "override", "parameter", "values"]), STUDY_PARTS)
+        ),
+        max_size=4,
+    )
+)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_any_study_file_is_read_or_refused_in_one_line(tmp_path_factory, tree) -> None:
+    import tomli_w
+
+    path = tmp_path_factory.mktemp("fuzz") / "study.toml"
+    tree.setdefault("study", {"base": "ilr33-amber"})
+    try:
+        path.write_bytes(tomli_w.dumps(without_none(tree)).encode("utf-8", "surrogatepass"))
+    except (TypeError, ValueError):
+        return
+    words = refusal(path)
+    assert "\n" not in words
+    assert len(words) < 2000
+
+
+def refusal(path: Path) -> str:
+    """The words with which a study file is refused, empty where it is read."""
+    try:
+        read_study(str(path))
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("name", ["", " \n", "\ud800"])
+def test_a_name_without_a_sign_or_with_half_of_one_is_refused(tmp_path, name: str) -> None:
+    with pytest.raises(InputError, match="a name needs at least one sign"):
+        run_night(study(job(name)), tmp_path / "site", INLINE, code=CODE)
+
+
+def without_none(value):
+    """TOML has no null: leave it out."""
+    if isinstance(value, dict):
+        return {k: without_none(v) for k, v in value.items() if v is not None}
+    if isinstance(value, list):
+        return [without_none(v) for v in value if v is not None]
+    return value
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\xff\xfe", b"[study", b"\x00" * 100, b"[study]\nbase='x'\n" * 2, b"#" * 2_000_000]
+)
+def test_what_is_no_study_is_refused_in_one_line(tmp_path, data: bytes) -> None:
+    path = tmp_path / "study.toml"
+    path.write_bytes(data)
+    with pytest.raises(InputError) as caught:
+        read_study(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_documents_of_the_fakes_are_documents() -> None:
+    from reports.document import check
+
+    check(fake_document({"name": "a", "margin": 1.0}))

@@ -1,0 +1,126 @@
+"""Reports as PDF: what must stand in it stands in it, as text, with fonts embedded and page numbers."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nightly_fakes import fake_document
+from test_nightly_hostile import HOSTILE
+
+from actuator_lti.errors import InputError
+from reports.document import details, document, fact, facts, figure, section, text
+from reports.pdf import pdf_bytes, write_pdf
+from reports.pdf.printable import clean
+
+pypdf = pytest.importorskip("pypdf")
+
+CURVE = {
+    "series": [{"label": "L", "x": [1.0, 2.0, 3.0], "y": [1.0, 4.0, 9.0]}],
+    "x_label": "x", "y_label": "y",
+}  # fmt: skip
+
+ORIGIN = {
+    "version": "1.2.3",
+    "commit": "c" * 40,
+    "time": "2026-01-02T03:04:05+00:00",
+    "design_hash": "d" * 64,
+}
+
+
+def rich_document(words: str = "plain words") -> dict:
+    """A document with every kind of block."""
+    made = fake_document({"name": words, "margin": 5.0, "label": words, "requirement": words, "loop": words})
+    blocks = [
+        text(words + "\n\nsecond paragraph"),
+        facts([fact(words, 1.5, "V")]),
+        details(words, [text("folded")]),
+        *([figure("curves", CURVE, caption=words, alt=words)] if words == "plain words" else []),
+    ]
+    return document(
+        title=words,
+        subtitle=words,
+        design={"name": words, "revision": "B"},
+        provenance=ORIGIN,
+        sections=[*made["sections"], section("more", words, blocks, intro=words)],
+    )
+
+
+def read(data: bytes):
+    return pypdf.PdfReader(io.BytesIO(data))
+
+
+def words_of(page) -> str:
+    return " ".join(page.extract_text().replace("\u200b", "").split())
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return read(pdf_bytes(rich_document()))
+
+
+def test_the_cover_names_design_revision_verdicts_and_who_signs(plain) -> None:
+    cover = words_of(plain.pages[0])
+    for piece in ("plain words", "Revision B", "1 of 1 requirements not met", "not met", "Prepared", "Checked",
+                  "Approved", "Signature", "Date", "Name", "d" * 64, "2026-01-02T03:04:05"):  # fmt: skip
+        assert piece in cover, piece
+
+
+def test_every_page_is_numbered(plain) -> None:
+    count = len(plain.pages)
+    assert count >= 2
+    for number, page in enumerate(plain.pages, start=1):
+        assert f"Page {number} of {count}" in words_of(page)
+
+
+def test_all_fonts_are_embedded(plain) -> None:
+    seen = 0
+    for page in plain.pages:
+        for font in page["/Resources"].get("/Font", {}).values():
+            for descendant in font.get_object().get("/DescendantFonts", []):
+                descriptor = descendant.get_object()["/FontDescriptor"].get_object()
+                assert any(key in descriptor for key in ("/FontFile", "/FontFile2", "/FontFile3"))
+                seen += 1
+    assert seen > 2
+
+
+def test_figures_are_vectors_and_their_lettering_is_text(plain) -> None:
+    for page in plain.pages:
+        assert not list(page.images)
+    assert "second paragraph" in "".join(words_of(p) for p in plain.pages)
+
+
+def test_the_tables_and_all_blocks_are_there(plain) -> None:
+    everything = " ".join(words_of(p) for p in plain.pages)
+    for piece in ("phase margin", "45.0", "velocity", "300.0", "folded", "1.5 V", "Contents"):
+        assert piece in everything, piece
+
+
+def test_the_same_document_is_typeset_the_same() -> None:
+    assert pdf_bytes(rich_document("once")) == pdf_bytes(rich_document("once"))
+
+
+@pytest.mark.parametrize("words", HOSTILE, ids=range(len(HOSTILE)))
+def test_hostile_words_are_typeset_as_they_are(words: str) -> None:
+    made = read(pdf_bytes(rich_document(words)))
+    cover = words_of(made.pages[0])
+    expected = " ".join(clean(words, 240).replace("\u200b", "").split())
+    if expected.isascii() and len(expected) < 200:
+        assert expected.replace(" ", "") in cover.replace(" ", "")
+    assert not any("/URI" in str(a.get_object()) for p in made.pages for a in p.get("/Annots", []) or [])
+    assert len(made.pages) < 30
+
+
+@given(st.text(max_size=40))
+@settings(max_examples=8, deadline=None)
+def test_any_text_can_be_typeset(words: str) -> None:
+    assert len(read(pdf_bytes(rich_document(words or "-"))).pages) >= 2
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path) -> None:
+    assert write_pdf(rich_document("once"), tmp_path / "a" / "r.pdf").read_bytes().startswith(b"%PDF")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError):
+        write_pdf(rich_document("once"), tmp_path / "file" / "r.pdf")
