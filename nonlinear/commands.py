@@ -236,11 +236,11 @@ def recorded(
     path: str | PathLike[str], *, time_column: str | int = 0, angle_column: str | int = 1, unit: str = "deg",
     delimiter: str = ",",
 ) -> Command:  # fmt: skip
-    """Recorded command from a CSV file with a header line: times in s, angles in ``unit`` (deg or rad)."""
+    """Recorded command from a CSV file with a header line: times in s, angles in deg, rad, mm or m."""
     from nonlinear.records import read_columns
 
-    scale = {"deg": pi / 180.0, "rad": 1.0, "m": 1.0}.get(unit)
+    scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0}.get(unit)
     if scale is None:
-        raise InputError(f"unit = {unit!r}: must be deg, rad or m", where=str(path))
+        raise InputError(f"unit = {unit!r}: must be deg, rad, mm or m", where=str(path))
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
     return sampled(times, angles * scale, where=str(path))

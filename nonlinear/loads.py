@@ -40,9 +40,9 @@ def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
     return LoadMoment(constant_Nm=float(offset_Nm), slope_Nm_rad=float(slope_Nm_rad))
 
 
-def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike) -> LoadMoment:
+def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadMoment:
     """Recorded or given moments at times (from 0), linear between them, the last held; holes are refused."""
-    return LoadMoment(series=sampled(time_s, moment_Nm, where="load series"))
+    return LoadMoment(series=sampled(time_s, moment_Nm, where=where))
 
 
 def as_load(load: float | LoadMoment) -> LoadMoment:

@@ -28,6 +28,7 @@ MODULES: dict[str, str] = {
     "correlation_signal": "reports.figures.correlation_signal",
     "distribution": "reports.figures.distribution",
     "tornado": "reports.figures.tornado",
+    "trajectory": "reports.figures.trajectory",
     "overlay": "reports.figures.overlay",
     "trade_off": "reports.figures.trade_off",
 }

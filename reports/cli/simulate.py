@@ -1,0 +1,232 @@
+"""`actuator-lti simulate`: one motion of the nonlinear drive, with records and a plot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption, QuietOption
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from nonlinear.commands import Command
+    from nonlinear.trajectory import Trajectory
+
+KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
+
+CommandOption = Annotated[str, typer.Option("--command", metavar="KIND", help=f"One of {KINDS}.")]
+AmplitudeOption = Annotated[
+    float,
+    typer.Option("--amplitude", help="Peak at the output, deg (mm on a linear axis); a ramp: per second."),
+]
+FrequencyOption = Annotated[
+    float, typer.Option("--frequency", metavar="HZ", help="Frequency; the first of a chirp or a set.")
+]
+ToOption = Annotated[
+    float | None, typer.Option("--to", metavar="HZ", help="Last frequency of a chirp or set.")
+]
+CountOption = Annotated[int, typer.Option("--count", help="Number of frequencies of a stepped or multisine.")]
+CyclesOption = Annotated[int, typer.Option("--cycles", help="Periods of each frequency of a stepped sine.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of the phases of a multisine.")]
+StartOption = Annotated[float, typer.Option("--start", metavar="S", help="Time at which the command begins.")]
+DurationOption = Annotated[float, typer.Option("--duration", metavar="S", help="Duration of the run.")]
+BiasOption = Annotated[
+    float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
+]
+SlopeOption = Annotated[
+    float, typer.Option("--load-slope", metavar="N_m/rad", help="Hinge moment per rad of output angle.")
+]
+LoadFileOption = Annotated[
+    Path | None, typer.Option("--load-file", metavar="CSV", help="Hinge moment over time: s, N m.")
+]
+RecordOption = Annotated[
+    Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
+]
+CsvOption = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write every row as CSV.")]
+ParquetOption = Annotated[Path | None, typer.Option("--parquet", metavar="FILE", help="Write Parquet.")]
+PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="SVG", help="Write a plot as SVG.")]
+EveryOption = Annotated[int, typer.Option("--every", metavar="N", help="Keep every N-th tick.")]
+FrictionOption = Annotated[bool, typer.Option("--no-friction", help="Leave the dry friction out.")]
+LimitsOption = Annotated[bool, typer.Option("--no-limits", help="Leave all limits out.")]
+EnergyOption = Annotated[bool, typer.Option("--energy", help="Say where the electrical energy went.")]
+
+
+def simulate(
+    design: DesignArgument = DEFAULT_DESIGN,
+    command: CommandOption = "step",
+    amplitude: AmplitudeOption = 1.0,
+    frequency: FrequencyOption = 1.0,
+    to: ToOption = None,
+    count: CountOption = 10,
+    cycles: CyclesOption = 5,
+    seed: SeedOption = 0,
+    start: StartOption = 0.0,
+    duration: DurationOption = 1.0,
+    bias_rate: BiasOption = 0.0,
+    load: LoadOption = 0.0,
+    load_slope: SlopeOption = 0.0,
+    load_file: LoadFileOption = None,
+    record: RecordOption = None,
+    csv: CsvOption = None,
+    parquet: ParquetOption = None,
+    plot: PlotOption = None,
+    every: EveryOption = 1,
+    no_friction: FrictionOption = False,
+    no_limits: LimitsOption = False,
+    energy: EnergyOption = False,
+    as_json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks."""
+    from actuator_lti.design import load_design
+    from nonlinear import commands
+    from nonlinear import simulate as run_simulation
+    from reports.cli.progress import progress
+
+    drive = load_design(design)
+    wanted = build_command(
+        drive,
+        command,
+        duration,
+        start,
+        seed,
+        record,
+        amplitude=amplitude,
+        frequency=frequency,
+        to=to,
+        count=count,
+        cycles=cycles,
+    )
+    scale = unit_scale(drive)
+    with progress("simulating", quiet=quiet) as report:
+        run = run_simulation(
+            drive,
+            wanted,
+            duration,
+            build_load(load, load_slope, load_file),
+            bias=commands.ramp(bias_rate * scale) if bias_rate else None,
+            friction_on=not no_friction,
+            limits_on=not no_limits,
+            energy=energy,
+            record_every=every,
+            progress=report,
+        )
+    files = write_files(run, csv, parquet, plot)
+    show(run, files, as_json)
+
+
+def unit_scale(drive: Design) -> float:
+    """Factor from the unit of the command line (deg, mm) to SI."""
+    from math import pi
+
+    return 1e-3 if drive.axis == "linear" else pi / 180.0
+
+
+def build_command(
+    drive: Design,
+    kind: str,
+    duration: float,
+    start: float,
+    seed: int,
+    record: Path | None,
+    *,
+    amplitude: float,
+    frequency: float,
+    to: float | None,
+    count: int,
+    cycles: int,
+) -> Command:
+    """The command asked for on the command line.
+
+    Raises
+    ------
+    InputError
+        For an unknown kind, or a recorded command without its file.
+    """
+    import numpy as np
+
+    from actuator_lti.errors import InputError
+    from nonlinear import commands
+
+    peak = amplitude * unit_scale(drive)
+    period = drive.controller.period_s
+    last = to if to is not None else 10.0 * frequency
+    if kind == "recorded" or record is not None:
+        if record is None:
+            raise InputError("--command recorded: needs --record CSV")
+        return commands.recorded(record, unit="mm" if drive.axis == "linear" else "deg")
+    if kind in ("stepped-sine", "multisine"):
+        if count < 1 or frequency <= 0.0 or last <= 0.0:
+            raise InputError(f"--count {count}, --frequency {frequency:g}, --to {last:g}: must be positive")
+        grid = np.geomspace(frequency, last, count)
+        if kind == "stepped-sine":
+            return commands.stepped_sine(peak, grid.tolist(), cycles, period)
+        return commands.multisine(peak, grid.tolist(), duration, period, seed=seed)
+    simple = {
+        "hold": lambda: commands.hold(peak),
+        "step": lambda: commands.step(peak, start),
+        "ramp": lambda: commands.ramp(peak, start),
+        "sine": lambda: commands.sine(peak, frequency, start_s=start),
+        "triangle": lambda: commands.triangle(peak, frequency, start),
+        "chirp": lambda: commands.chirp(peak, frequency, last, duration - start, start_s=start),
+    }
+    if kind not in simple:
+        raise InputError(f"--command {kind}: must be one of {KINDS}")
+    return simple[kind]()
+
+
+def build_load(load: float, slope: float, file: Path | None) -> Any:
+    """The hinge moment asked for."""
+    from dataclasses import replace
+
+    from nonlinear import loads
+    from nonlinear.records import read_columns
+
+    moment = loads.proportional(slope, load)
+    if file is None:
+        return moment
+    times, values = read_columns(file, (0, 1))
+    return replace(moment, series=loads.series(times, values, where=str(file)).series)
+
+
+def write_files(run: Trajectory, csv: Path | None, parquet: Path | None, plot: Path | None) -> list[str]:
+    """Write what was asked for; names of the files."""
+    if csv is not None:
+        run.to_csv(csv)
+    if parquet is not None:
+        run.to_parquet(parquet)
+    if plot is not None:
+        from reports.atomic import write_text
+        from reports.figures.registry import draw_svg
+        from reports.sections.trajectory import figure_data
+
+        write_text(plot, draw_svg("trajectory", figure_data(run), page=False))
+    return [str(path) for path in (csv, parquet, plot) if path is not None]
+
+
+def show(run: Trajectory, files: list[str], as_json: bool) -> None:
+    """Print the summary."""
+    from reports.cli.output import print_json, print_line
+    from reports.sections.trajectory import summary
+
+    facts = {**summary(run), "files": files}
+    if as_json:
+        print_json(facts)
+        return
+    print_line(f"{run.design_name}: {run.time_s.size} rows, status {run.status}")
+    for name, value in facts.items():
+        if isinstance(value, float):
+            print_line(f"  {name:26} {value:.6g}")
+    for name, use in run.limits.items():
+        words = "never" if use.first_time_s is None else f"{100 * use.fraction:.3g} % of the time, "
+        words += "" if use.first_time_s is None else f"first at {use.first_time_s:.6g} s"
+        print_line(f"  {name + ' limit':26} {use.limit:.6g} {use.unit}: {words}")
+    print_line(f"  {'stick-slip events':26} {run.events} (at most {run.events_per_tick} in one tick)")
+    if run.energy is not None:
+        for name, value in vars(run.energy).items():
+            print_line(f"  {name:26} {value:.6g}")
+        print_line(f"  {'balance, relative':26} {run.energy.relative_error:.2g}")
+    for name in files:
+        print_line(f"wrote {name}")
