@@ -39,6 +39,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from actuator_lti.errors import InputError
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -169,20 +170,19 @@ def _instruments(table: Table) -> Instruments:
 def _spec(table: Table) -> RecordSpec:
     """A recorder's description, ``[drive]`` or ``[sensor]``."""
     try:
-        spec = RecordSpec(
-            format=_format(table),
-            time=_time(table.table("time")),
-            signals=_signals(table.table("signals")),
-            bad_rows=table.text("bad_rows", "error", ("error", "drop")),  # type: ignore[arg-type]
-            missing=table.text("missing", "drop", ("error", "drop")),  # type: ignore[arg-type]
-            disorder=table.text("disorder", "error", ("error", "drop")),  # type: ignore[arg-type]
-        )
+        parts: dict[str, Any] = {
+            "format": _format(table),
+            "time": _time(table.table("time")),
+            "signals": _signals(table.table("signals")),
+        }
+        for name, default in (("bad_rows", "error"), ("missing", "drop"), ("disorder", "error")):
+            parts[name] = table.text(name, default, ("error", "drop"))
+        table.done()
+        return RecordSpec(**parts)
     except InputError as error:
         if error.where is not None:
             raise
-        raise InputError(f"{table.path}.{error.message}", where=table.origin) from None
-    table.done()
-    return spec
+        raise InputError(table.key(error.message), where=table.origin) from None
 
 
 def record_spec(data: object, origin: str, path: str = "record") -> RecordSpec:

@@ -1,0 +1,153 @@
+"""Records from CSV: layouts, units, accounts of rows, and refusals that name line, column and reason."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.errors import InputError
+from analyses.records import CsvFormat, RecordSpec, SignalColumn, TimeColumn, read_csv_record, stream_csv
+from analyses.records import csv_stream as module
+
+SPEED = SignalColumn(name="speed", column="n", unit="rpm")
+
+
+def _spec(**changes: object) -> RecordSpec:
+    base = {"time": TimeColumn(column="t"), "signals": (SPEED,)}
+    return RecordSpec(**{**base, **changes})  # type: ignore[arg-type]
+
+
+def _write(folder: Path, text: str | bytes) -> Path:
+    path = folder / "log.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def test_units_become_si(tmp_path: Path) -> None:
+    record = read_csv_record(_write(tmp_path, "t,n\n0,0\n0.5,9000\n"), _spec())
+    assert record["speed"][1] == pytest.approx(9000 * np.pi / 30, rel=1e-12)
+    assert record.units["speed"] == "rad/s"
+
+
+@pytest.mark.parametrize(
+    ("text", "layout"),
+    [
+        ("t;n\n0;1,5\n1;2,5\n", CsvFormat(separator=";", decimal=",")),
+        ("t\tn\r\n0\t1.5\r\n1\t2.5\r\n", CsvFormat(separator="\t")),
+        ("  t   n\n 0   1.5\n 1\t2.5\n", CsvFormat(separator="whitespace")),
+        (
+            "% made by hand\n0,1.5;\n% between\n1,2.5;\n",
+            CsvFormat(comment="%", row_end=";", names=("t", "n")),
+        ),
+        ("junk\nmore junk\nt,n\n0,1.5\n\n1,2.5", CsvFormat(skip_lines=2)),
+        ("\ufefft,n\n0,1.5\n1,2.5\n", CsvFormat()),
+        ('"t","n"\n"0","1.5"\n"1","2.5"\n', CsvFormat()),
+    ],
+)
+def test_layouts(tmp_path: Path, text: str, layout: CsvFormat) -> None:
+    record = read_csv_record(_write(tmp_path, text), _spec(format=layout))
+    assert record.time_s.tolist() == [0.0, 1.0]
+    assert record["speed"].tolist() == pytest.approx([1.5 * np.pi / 30, 2.5 * np.pi / 30])
+    assert record.counts.rows_in == record.counts.rows_out == 2
+
+
+def test_every_line_is_accounted_for(tmp_path: Path) -> None:
+    text = "# log\nt,n\n0,1\n\n1,nan\n# pause\n2,3\n3,4\n"
+    counts = read_csv_record(_write(tmp_path, text), _spec()).counts
+    assert (counts.lines, counts.comments, counts.blanks, counts.header) == (8, 2, 1, 1)
+    assert (counts.rows_in, counts.rows_out) == (4, 3)
+    assert counts.dropped == {"with a missing value": 1}
+    assert counts.first_dropped == {"with a missing value": "line 5"}
+
+
+def test_ticks_that_wrap_around(tmp_path: Path) -> None:
+    rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
+    time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
+    record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
+    assert np.diff(record.time_s) == pytest.approx(3.0)
+
+
+def test_a_bad_cell_is_named_by_line_and_column(tmp_path: Path) -> None:
+    path = _write(tmp_path, "t,n\n0,1\n1,abc\n2,3\n")
+    with pytest.raises(InputError, match=r'log.csv:3: column "n" = "abc": not a number'):
+        read_csv_record(path, _spec())
+
+
+def test_bad_rows_are_dropped_only_on_demand_and_counted(tmp_path: Path) -> None:
+    path = _write(tmp_path, "t,n\n0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n")
+    counts = read_csv_record(path, _spec(bad_rows="drop")).counts
+    assert (counts.rows_in, counts.rows_out, counts.dropped) == (6, 3, {"not a row of numbers": 3})
+
+
+def test_time_that_goes_back_is_refused_or_counted(tmp_path: Path) -> None:
+    path = _write(tmp_path, "t,n\n0,1\n2,1\n1,1\n3,1\n")
+    with pytest.raises(InputError, match=r"log.csv:4: time 1 s does not come after 2 s"):
+        read_csv_record(path, _spec())
+    counts = read_csv_record(path, _spec(disorder="drop")).counts
+    assert (counts.rows_out, counts.dropped) == (3, {"whose time does not increase": 1})
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("x,n\n0,1\n1,2\n", 'no column "t"'),
+        ("t,n\n0,1\n", "fewer than two usable rows"),
+        (b"t,n\n0,1\n\x00\x00", "NUL"),
+        ("t,n\n".encode("utf-16"), "UTF-16"),
+        ("", "fewer than two usable rows"),
+        ("t,n,n\n0,1,2\n1,2,3\n", "2 times"),
+    ],
+)
+def test_files_that_are_no_records(tmp_path: Path, content: str | bytes, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        read_csv_record(_write(tmp_path, content), _spec())
+
+
+def test_a_missing_file_is_one_line() -> None:
+    with pytest.raises(InputError, match=r"nowhere.csv: cannot be read"):
+        read_csv_record("nowhere.csv", _spec())
+
+
+def test_a_unit_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
+    wrong = SignalColumn(name="speed", column="n", unit="kg")
+    with pytest.raises(InputError, match=r"signals.speed.unit = \"kg\": must be a unit like rad/s"):
+        read_csv_record(_write(tmp_path, "t,n\n0,1\n1,2\n"), _spec(signals=(wrong,)))
+
+
+def test_a_long_file_streams_in_blocks_and_is_averaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "BLOCK_BYTES", 1 << 12)
+    n = 10_007
+    text = "t,n\n" + "".join(f"{k},{k % 7}\n" for k in range(n))
+    path = _write(tmp_path, text)
+    blocks = list(stream_csv(path, _spec()))
+    assert len(blocks) > 10
+    assert sum(len(block) for block in blocks) == n
+    record = read_csv_record(path, _spec(), max_rows=1000)
+    assert record.averaged == 16
+    assert record.counts.rows_out == n
+    assert len(record) <= 1001
+    assert record.time_s[0] == pytest.approx(7.5)
+    assert "averaged over 16 rows" in record.notes[0]
+
+
+def test_careful_and_fast_reading_agree(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal(500)
+    plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))
+    with_comment = plain + "# the end\n"
+    fast = read_csv_record(_write(tmp_path, plain), _spec())
+    careful = read_csv_record(_write(tmp_path, with_comment), _spec())
+    assert np.array_equal(fast["speed"], careful["speed"])
+
+
+def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:
+    from analyses.correlation.voltage_motor import read_odrive
+
+    record = read_odrive(odrive_files["step1"])
+    assert record.counts.rows_in == 1309
+    assert record.counts.dropped == {"with a missing value": 8, "time below 1": 11}
+    assert record.counts.rows_out == len(record) == 1290

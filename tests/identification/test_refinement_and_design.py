@@ -1,0 +1,184 @@
+"""Output error, the next runs of a campaign, dynamic results as designs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, parameter_value, read_design_text, with_values, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.campaign_design import predicted_covariance, suggest_runs
+from analyses.identification.dynamic import Recipe, identify_dynamics
+from analyses.identification.from_record import identify_record, refine_record
+from analyses.identification.output_error import refine_by_output_error
+from analyses.identification.points import SteadyPoint
+from analyses.identification.steady import SteadyWindow
+from analyses.identification.surface import SurfaceFit, fit_surface
+from analyses.identification.to_design import design_with_estimate, dynamic_estimate
+from analyses.records import open_record
+from analyses.records.campaign_file import Instruments
+
+TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
+BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
+WINDOW = SteadyWindow(
+    start=0, stop=100, start_s=0.0, stop_s=1.0, limit_rad_s2=1.0, largest_acceleration_rad_s2=0.1
+)
+
+
+def _points(seed: int, noise: float = 2e-6) -> list[SteadyPoint]:
+    rng = np.random.default_rng(seed)
+    points = []
+    for k, (speed, load) in enumerate(
+        (w, m) for m in (0.0, 2.0, 5.0, 8.9) for w in np.linspace(105.0, 942.0, 6)
+    ):
+        torque = float(TABLE_1 @ np.array([1.0, speed, load])) + noise * rng.standard_normal()
+        point = SteadyPoint(
+            run=f"{k:02d}",
+            direction=1,
+            torque_Nm=torque,
+            speed_rad_s=float(speed),
+            load_Nm=load,
+            covariance=np.diag([noise**2, 1e-6, 1e-10]),
+            window=WINDOW,
+            samples=100,
+            correlation_samples=(1.0, 1.0, 1.0),
+            load_is_zero=load == 0.0,
+        )
+        points.append(point)
+    return points
+
+
+@pytest.fixture(scope="module")
+def fit() -> SurfaceFit:
+    return fit_surface(_points(0), BOUNDS, 5.9e-3)
+
+
+def test_random_errors_alone_have_the_least_squares_covariance() -> None:
+    points = _points(1)
+    found = fit_surface(points, Instruments(), 5.9e-3)
+    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
+    own = np.array([4e-12 + found.values[1] ** 2 * 1e-6 + found.values[2] ** 2 * 1e-10] * len(points))
+    own = own + found.run_scatter_Nm**2
+    expected = np.linalg.inv(x.T @ (x / own[:, None]))
+    assert found.covariance == pytest.approx(expected, rel=1e-6)
+
+
+def test_too_few_runs_or_no_variety_are_refused() -> None:
+    from actuator_lti.errors import NumericalError
+
+    points = _points(2)
+    with pytest.raises(InputError, match="at least 5"):
+        fit_surface(points[:4], Instruments(), 5.9e-3)
+    with pytest.raises(NumericalError, match="vary speed and load"):
+        fit_surface([replace(p, speed_rad_s=500.0) for p in points], Instruments(), 5.9e-3)
+
+
+def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceFit) -> None:
+    design = load_design("ilr33-amber")
+    found = suggest_runs(design, fit, BOUNDS, count=3)
+    left = [run.remaining for run in found.runs]
+    assert left == sorted(left, reverse=True)
+    assert left[0] < 1.0
+    slopes = np.array([m.slopes / m.std for m in found.margins])
+    weight = slopes.T @ slopes
+    worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in found.runs]
+    good = predicted_covariance(fit, found.runs, BOUNDS, 5.9e-3)
+    bad = predicted_covariance(fit, worse, BOUNDS, 5.9e-3)
+    before = float(np.sum(weight * fit.covariance))
+    assert float(np.sum(weight * good)) < float(np.sum(weight * bad)) < before
+
+
+def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:
+    """The phase margin of the velocity loop falls as the viscous friction falls: first order holds."""
+    from actuator_lti import assemble_loops, stability_margins
+
+    design = load_design("ilr33-amber")
+    found = suggest_runs(design, fit, BOUNDS, count=1)
+    spread = next(m for m in found.margins if m.label == "position phase margin, 0 N m")
+    base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
+    base["friction.load_coefficient"] = float(fit.values[2])
+
+    def margin(scale: float) -> float:
+        changed = with_values(design, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
+        loops = assemble_loops(
+            changed, operating_point="describing-function", load_Nm=0.0, speed_amplitude_rad_s=0.02 * 942.5
+        )
+        assert loops.position is not None
+        value = stability_margins(loops.position.open_loop).phase_margin_deg
+        assert value is not None
+        return value
+
+    slope = (margin(1.05) - margin(0.95)) / (0.1 * base["friction.dry_torque"])
+    assert spread.slopes[0] == pytest.approx(slope, rel=0.05)
+
+
+def test_the_determinant_is_served_by_extreme_points(fit: SurfaceFit) -> None:
+    found = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=4, criterion="D")
+    assert {run.load_Nm for run in found.runs} <= {0.0, 8.9}
+    assert {round(run.speed_rad_s) for run in found.runs} <= {105, 942}
+    with pytest.raises(InputError, match="criterion"):
+        suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, criterion="E")
+
+
+def test_what_no_run_reduces_is_named(fit: SurfaceFit) -> None:
+    found = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=1)
+    assert 0.5 < found.shared_part <= 1.0
+    assert found.largest_shared in fit.shared_shifts
+
+
+def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
+    from nonlinear import commands, simulate
+
+    design = load_design("emps")
+    paths = ("motor.rotor_inertia", "friction.viscous", "friction.dry_torque")
+    command = commands.sine(0.1, 0.3)
+
+    def force(tried: Design) -> np.ndarray:
+        return np.asarray(35.15065 * simulate(tried, command, 3.0).voltage_V)
+
+    start = with_values(
+        design, {"motor.rotor_inertia": 99.0, "friction.viscous": 190.0, "friction.dry_torque": 22.0}
+    )
+    found = refine_by_output_error(start, paths, force, force(design))
+    for path in paths:
+        assert found.values[path] == pytest.approx(parameter_value(design, path), rel=2e-3)
+    assert found.error_after < 0.05 * found.error_before
+
+
+def test_refinement_on_emps_lowers_the_force_error(emps_file: Path) -> None:
+    design, record = load_design("emps"), open_record(emps_file)
+    model, _ = identify_record(design, record)
+    found = refine_record(design, record, model)
+    assert found.error_after < found.error_before < 0.05848
+    assert found.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
+
+
+def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
+    design, record = load_design("emps"), open_record(emps_file)
+    for form in ("symmetric", "per-direction"):
+        model, _ = identify_record(design, record, form=form)  # type: ignore[arg-type]
+        identified = design_with_estimate(design, dynamic_estimate(model, "EMPS"))
+        back = read_design_text(write_design(identified))
+        assert back.motor.rotor_inertia_kgm2 == pytest.approx(model["inertia"], rel=1e-6)
+        if form == "per-direction":
+            assert back.friction.viscous_reverse_Nms_rad == pytest.approx(model["viscous_reverse"], rel=1e-6)
+            assert back.friction.offset_torque_Nm == 0.0
+        else:
+            assert back.friction.offset_torque_Nm == pytest.approx(model["offset"], rel=1e-6)
+
+
+def test_a_rotary_drive_is_identified_from_its_own_simulation() -> None:
+    """Inverse model of a simulated ilr33-amber: inertia and friction at the motor come back."""
+    from nonlinear import commands, simulate
+
+    design = load_design("ilr33-amber")
+    run = simulate(design, commands.multisine(0.005, [0.7, 1.9, 4.3], 6.0, 1e-4, seed=2), 6.0)
+    drive = 5.9e-3 * run.current_A
+    model = identify_dynamics(run.motor_angle_rad, drive, 1e-4, recipe=Recipe(cutoff_hz=1000.0))
+    assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=0.01)
+    assert model["dry"] == pytest.approx(2.25e-3, rel=0.01)
+    assert model["viscous"] == pytest.approx(5.25e-6, rel=0.02)

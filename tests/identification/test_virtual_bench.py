@@ -1,0 +1,166 @@
+"""The virtual bench: the value of Table 1 lies in the 95 % intervals of 90 to 99 of 100 campaigns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, read_design_text, write_design
+from actuator_lti.design.model import Design
+from analyses.identification.campaign import CampaignResult, identify_campaign
+from analyses.identification.contributions import contributions
+from analyses.identification.surface import PATHS, fit_surface
+from analyses.identification.to_design import design_with_estimate, surface_estimate
+from analyses.records import import_campaign, load_campaign
+from analyses.records.campaign_import import ImportedCampaign, assemble_run
+from analyses.virtual_bench import BenchPlan, TrueRun, simulate_bench
+from analyses.virtual_bench_files import bench_campaign, write_bench
+from analyses.virtual_bench_instruments import BenchInstruments, measure_bench
+
+TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
+INSTRUMENTS = BenchInstruments()
+
+
+@pytest.fixture(scope="module")
+def design() -> Design:
+    return load_design("ilr33-amber")
+
+
+@pytest.fixture(scope="module")
+def runs(design: Design) -> tuple[TrueRun, ...]:
+    """The 54 runs of the paper, made short: noise and shared errors are drawn on top for each seed."""
+    return simulate_bench(design, BenchPlan(duration_s=2.5))
+
+
+def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:
+    """A campaign in memory, with the sensor's clock known: the joining has tests of its own."""
+    logs, _ = measure_bench(runs, seed, INSTRUMENTS)
+    campaign = replace(bench_campaign(logs, "ilr33-amber", INSTRUMENTS.bounds), join_method="given")
+    joined = [
+        assemble_run(campaign, replace(entry, offset_s=log.sensor_offset_s), log.drive, log.sensor)
+        for entry, log in zip(campaign.runs, logs, strict=True)
+    ]
+    return ImportedCampaign(campaign=campaign, runs=tuple(joined), set_aside=())
+
+
+@pytest.fixture(scope="module")
+def from_files(
+    design: Design, runs: tuple[TrueRun, ...], tmp_path_factory: pytest.TempPathFactory
+) -> CampaignResult:
+    """All the way: files written, read by the importers, joined by correlation, one file broken."""
+    "broken."
+    folder = tmp_path_factory.mktemp("bench")
+    logs, _ = measure_bench(runs, 11, INSTRUMENTS)
+    path = write_bench(folder, logs, design="ilr33-amber", seed=11)
+    broken = folder / "run17_drive.csv"
+    lines = broken.read_text().splitlines()
+    lines[100] = "99;oops;1,0;2"
+    broken.write_text("\n".join(lines))
+    return identify_campaign(import_campaign(load_campaign(path)), design)
+
+
+def test_the_plan_is_the_paper_s(runs: tuple[TrueRun, ...]) -> None:
+    speeds = sorted({run.speed_setting_rad_s for run in runs})
+    loads = sorted({run.load_setting_Nm for run in runs})
+    assert len(runs) == 54
+    assert (round(speeds[0], 1), round(speeds[-1], 1)) == (104.7, 942.5)
+    assert (loads[0], loads[1], loads[-1]) == (0.0, 2.0, 8.9)
+
+
+def test_what_happens_on_the_bench_is_the_surface(runs: tuple[TrueRun, ...]) -> None:
+    """In steady motion the simulated current carries exactly C0 + Cv w + CM |M_ext|."""
+    part = slice(1200, 1700)
+    for run in runs[::5]:
+        torque = 5.9e-3 * run.current_A[part].mean()
+        point = np.array([1.0, run.speed_rad_s[part].mean(), run.torque_Nm[part].mean()])
+        assert torque == pytest.approx(float(TABLE_1 @ point), rel=2e-3)
+
+
+def test_the_intervals_cover_the_true_values(design: Design, runs: tuple[TrueRun, ...]) -> None:
+    covered = np.zeros(3, dtype=int)
+    for seed in range(100):
+        fit = identify_campaign(_imported(runs, seed), design, richer=False).fit
+        covered += np.abs(fit.values - TABLE_1) <= fit.half_widths
+    assert np.all((covered >= 90) & (covered <= 99)), covered
+
+
+def test_files_give_the_true_values_and_name_the_broken_run(from_files: CampaignResult) -> None:
+    assert np.all(np.abs(from_files.fit.values / TABLE_1 - 1.0) < 0.012)
+    assert [run.id for run in from_files.set_aside] == ["17"]
+    assert 'run17_drive.csv:101: column "Current" = "oops"' in from_files.set_aside[0].reason
+    assert len(from_files.fit.points) == 53
+    assert from_files.imported.rows_in == from_files.imported.rows_out > 53 * 2000
+
+
+def test_clocks_are_found_from_the_files(from_files: CampaignResult, runs: tuple[TrueRun, ...]) -> None:
+    logs, _ = measure_bench(runs, 11, INSTRUMENTS)
+    true = {log.id: log.sensor_offset_s for log in logs}
+    joined = [run for run in from_files.imported.runs if run.join is not None]
+    assert len(joined) == 44
+    for run in joined:
+        assert run.join is not None
+        assert run.join.offset_s == pytest.approx(true[run.id], abs=0.012)
+
+
+def test_the_contributions_are_those_of_the_paper(from_files: CampaignResult) -> None:
+    exact = [round(100.0 * term.share, 1) for term in contributions(TABLE_1)]
+    assert exact == [12.6, 27.6, 59.8]
+    found = contributions(from_files.fit.values, from_files.fit.covariance)
+    for term, share in zip(found, exact, strict=True):
+        assert 100.0 * term.share == pytest.approx(share, abs=3.0 * 100.0 * term.share_std + 0.05)
+
+
+def test_no_richer_law_is_warranted_on_a_plain_bench(from_files: CampaignResult) -> None:
+    assert from_files.laws is not None
+    assert from_files.laws.best == "plain"
+    impossible = [score.name for score in from_files.laws.scores if not score.possible]
+    assert impossible == ["per direction"]
+
+
+def test_a_quadratic_term_is_found_by_cross_validation(design: Design, runs: tuple[TrueRun, ...]) -> None:
+    bent = tuple(replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs)
+    result = identify_campaign(_imported(bent, 3), design)
+    assert result.laws is not None
+    assert result.laws.best == "quadratic"
+
+
+def test_an_outlier_is_named_and_set_aside_on_demand(design: Design, runs: tuple[TrueRun, ...]) -> None:
+    strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
+    imported = _imported(strange, 5)
+    kept = identify_campaign(imported, design, richer=False).fit
+    assert [outlier.run for outlier in kept.outliers] == ["30"]
+    aside = fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside")
+    assert len(aside.points) == 53
+    assert aside.outliers[0].set_aside
+
+
+def test_the_shared_errors_are_in_the_interval(from_files: CampaignResult) -> None:
+    """Without them the intervals would be far too narrow."""
+    fit = from_files.fit
+    random = np.sqrt(np.diag(fit.random_covariance))
+    assert np.all(fit.standard_errors > 3.0 * random)
+    blind = fit_surface(fit.points, replace(INSTRUMENTS.bounds, current_gain=0.0), 5.9e-3)
+    assert np.all(blind.half_widths[1:] < fit.half_widths[1:])
+
+
+def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
+    identified = design_with_estimate(design, surface_estimate(from_files.fit, "a bench"))
+    back = read_design_text(write_design(identified))
+    for k, path in enumerate(PATHS):
+        tolerance = back.parameters[path].tolerance
+        assert tolerance is not None
+        assert tolerance.std == pytest.approx(from_files.fit.standard_errors[k], rel=1e-5)
+        assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
+    found = {(c.first, c.second): c.coefficient for c in back.correlations}
+    assert found[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
+
+
+def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path: Path) -> None:
+    few = runs[:2]
+    for name in ("a", "b"):
+        write_bench(tmp_path / name, measure_bench(few, 4)[0], design="ilr33-amber", seed=4)
+    for file in sorted((tmp_path / "a").iterdir()):
+        assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
