@@ -54,6 +54,25 @@ def significant(value: float, digits: int = 3) -> str:
     return _minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
 
 
+def seconds(value: float) -> str:
+    """Write a duration with the unit that suits it.
+
+    Examples
+    --------
+    >>> seconds(0.01234), seconds(3.2e-4)
+    ('12.3 ms', '320 µs')
+    """
+    scale, unit = time_unit(value)
+    return f"{value * scale:.3g} {unit}"
+
+
+def time_unit(span_s: float) -> tuple[float, str]:
+    """Choose s, ms or µs for a span, with the factor from seconds."""
+    if span_s >= 1.0:
+        return 1.0, "s"
+    return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
+
+
 def _minus(text: str) -> str:
     """Use the minus sign of typography."""
     return text.replace("-", "−")

@@ -23,7 +23,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=(1.15, 1.0))
     curves(data, top, bottom)
     top.axhline(0.0, color=style.INK, linewidth=0.9)
-    style.bound(top, [y for s in data["series"] for y in s["magnitude_db"]], span=170.0, top_room=0.06)
+    style.bound(top, [y for s in data["series"] for y in s["magnitude_db"]], span=100.0, top_room=0.06)
     _gain_margins(data, top)
     _phase_margins(data, top, bottom)
     if len(data["series"]) > 1:
@@ -59,7 +59,7 @@ def _gain_margins(data: dict[str, Any], top: Axes) -> None:
         seen = min(max(-db, low), high)
         top.plot([f, f], [0.0, seen], color=style.RED, linewidth=2.2, solid_capstyle="butt")
         top.plot([f], [seen], marker="s", markersize=4.5, color=style.RED, linestyle="none")
-        if k < LABELLED:
+        if k < LABELLED and low < -db < high:
             style.tag(top, f"GM {_signed(db)} dB\n{style.hertz(f)}", (f, seen), data, below=db > 0)
 
 

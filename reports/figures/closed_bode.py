@@ -27,19 +27,22 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     if level is not None:
         top.axhline(level, color=style.MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     if corner is not None and level is not None:
-        _mark(top, corner, level, f"−3 dB\n{style.hertz(corner)}", style.GREEN, "o", data)
+        _mark(top, (corner, level), f"−3 dB\n{style.hertz(corner)}", (style.GREEN, "o"), data, below=True)
     bottom.axhline(-90.0, color=style.MUTED, linewidth=0.9, linestyle=(0, (4, 2)))
     if lag is not None:
-        _mark(bottom, lag, -90.0, f"−90°\n{style.hertz(lag)}", style.PURPLE, "D", data)
+        _mark(bottom, (lag, -90.0), f"−90°\n{style.hertz(lag)}", (style.PURPLE, "D"), data, below=True)
     if band["resonance_db"] is not None and band["resonance_hz"] and band["resonance_db"] > 0.05:
         height = band["resonance_db"] + (band.get("dc_db") or 0.0)
         words = f"peak {band['resonance_db']:.2f} dB\n{style.hertz(band['resonance_hz'])}"
-        _mark(top, band["resonance_hz"], height, words, style.RED, "^", data)
+        _mark(top, (band["resonance_hz"], height), words, (style.RED, "^"), data, below=False)
     if len(data["series"]) > 1:
         top.legend(loc="lower left")
 
 
-def _mark(ax: Axes, x: float, y: float, words: str, colour: str, marker: str, data: dict[str, Any]) -> None:
+def _mark(
+    ax: Axes, at: tuple[float, float], words: str, look: tuple[str, str], data: dict[str, Any], below: bool
+) -> None:
     """Put a marked point with its label."""
-    ax.plot([x], [y], marker=marker, markersize=5.5, color=colour, linestyle="none")
-    style.tag(ax, words, (x, y), data, below=False)
+    colour, marker = look
+    ax.plot([at[0]], [at[1]], marker=marker, markersize=5.5, color=colour, linestyle="none")
+    style.tag(ax, words, at, data, below=below, left=True if below else None)

@@ -11,6 +11,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from reports.figures import style
+from reports.numbers import time_unit
 
 SIZE = (8.4, 4.6)
 
@@ -51,7 +52,7 @@ def _step(data: dict[str, Any], fig: Figure) -> None:
     """Draw the step responses."""
     ax = fig.add_subplot()
     longest = max(series["time_s"][-1] for series in data["series"])
-    scale, unit = style.time_unit(longest)
+    scale, unit = time_unit(longest)
     for k, series in enumerate(data["series"]):
         ax.plot([t * scale for t in series["time_s"]], series["response"], label=series["label"], **_look(k))
     ax.set_xlabel(f"time, {unit}")

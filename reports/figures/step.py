@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.figures import style
+from reports.numbers import seconds, time_unit
 
 SIZE = (5.2, 2.75)
 
@@ -19,7 +20,7 @@ SIZE = (5.2, 2.75)
 def draw(data: dict[str, Any], fig: Figure) -> None:
     """Draw the responses and the figures read from the first."""
     ax = fig.add_subplot()
-    scale, unit = style.time_unit(data["time_s"][-1])
+    scale, unit = time_unit(data["time_s"][-1])
     for k, series in enumerate(data["series"]):
         time = [t * scale for t in series.get("time_s") or data["time_s"]]
         look = {"color": style.SERIES[k % 7], "linestyle": style.DASHES[k % 7], "label": series["label"]}
@@ -46,13 +47,13 @@ def _band(data: dict[str, Any], ax: Axes, scale: float) -> None:
         for t, level in ((t10, 0.1 * final), (t90, 0.9 * final)):
             if t <= ax.get_xlim()[1]:
                 ax.plot([t], [level], marker="o", markersize=4.5, color=style.GREEN, linestyle="none")
-        words.append(f"rise 10–90 %: {style.seconds(data['rise'][1] - data['rise'][0])}")
+        words.append(f"rise 10–90 %: {seconds(data['rise'][1] - data['rise'][0])}")
     if data.get("overshoot_percent") is not None:
         words.append(f"overshoot: {data['overshoot_percent']:.1f} %")
     if data.get("settling_s") is not None and data["settling_s"] <= data["time_s"][-1]:
         ax.axvline(data["settling_s"] * scale, color=style.PURPLE, linewidth=1.2, linestyle=(0, (5, 2)))
     if data.get("settling_s") is not None:
-        words.append(f"settled to 2 %: {style.seconds(data['settling_s'])}")
+        words.append(f"settled to 2 %: {seconds(data['settling_s'])}")
     if words:
         place: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "center", "linespacing": 1.5}
         ax.text(0.985, 0.42, "\n".join(words), bbox=style.label_box(), **place)

@@ -174,10 +174,19 @@ def multiples(step: float) -> MultipleLocator:
     return MultipleLocator(step)
 
 
-def tag(ax: Axes, words: str, at: tuple[float, float], data: dict[str, Any], *, below: bool | None) -> None:
-    """Label a point, on the side where the frame has room."""
+def tag(
+    ax: Axes,
+    words: str,
+    at: tuple[float, float],
+    data: dict[str, Any],
+    *,
+    below: bool | None,
+    left: bool | None = None,
+) -> None:
+    """Label a point above or below it (None: beside), on the side said or where the frame has room."""
     first, last = data["frequency_hz"][0], data["frequency_hz"][-1]
-    left = math.log(at[0] / first) > 0.72 * math.log(last / first)
+    if left is None:
+        left = math.log(at[0] / first) > 0.72 * math.log(last / first)
     dy, va = {None: (0, "center"), True: (-3, "top"), False: (4, "bottom")}[below]
     place: dict[str, Any] = {"ha": "right" if left else "left", "va": va, "linespacing": 1.25}
     ax.annotate(
@@ -201,25 +210,6 @@ def hertz(value: float) -> str:
     ('88.5 Hz', '1.91 kHz')
     """
     return f"{value / 1e3:.3g} kHz" if value >= 1e3 else f"{value:.3g} Hz"
-
-
-def seconds(value: float) -> str:
-    """Write a duration with the unit that suits it.
-
-    Examples
-    --------
-    >>> seconds(0.01234), seconds(3.2e-4)
-    ('12.3 ms', '320 µs')
-    """
-    scale, unit = time_unit(value)
-    return f"{value * scale:.3g} {unit}"
-
-
-def time_unit(span_s: float) -> tuple[float, str]:
-    """Choose s, ms or µs for a span, with the factor from seconds."""
-    if span_s >= 1.0:
-        return 1.0, "s"
-    return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
 
 
 def label_box() -> dict[str, Any]:

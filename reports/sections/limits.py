@@ -51,7 +51,7 @@ def section(design: Design, border: Onset) -> dict[str, Any]:
 def _table(design: Design, border: Onset, scale: float, unit: str) -> dict[str, Any]:
     """List the highest frequency at which each command amplitude still passes unlimited."""
     columns = [
-        doc.column("amplitude", "Command amplitude", unit, format="sig:3"),
+        doc.column("amplitude", "Command amplitude", unit, format="short:3"),
         doc.column("fraction", "of full deflection", "%", format="fix:0"),
         doc.column("hz", "linear up to", "Hz", format="sig:3"),
         doc.column("limiter", "then limited by"),

@@ -13,7 +13,7 @@ from analyses.loop_figures import LoopFigures
 from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at
 from reports import document as doc
 from reports.document import rounded
-from reports.numbers import fixed
+from reports.numbers import fixed, seconds
 from reports.sections.margins import finite, margin_row, response_row
 from reports.sections.names import LOOPS, hertz
 
@@ -28,7 +28,7 @@ def section(
     grid = frequency_grid(found)
     title = LOOPS[name]
     blocks = [_facts(found), open_bode(title, found, grid)]
-    if found.bandwidth is not None:
+    if found.stable:
         blocks.append(closed_bode(title, found, grid, locked))
     blocks.append(nyquist(title, found, grid))
     if found.peaks is not None:
@@ -41,7 +41,7 @@ def section(
 
 def _intro(name: str, found: LoopFigures) -> str:
     period = found.loop.period_s
-    rate = "" if period is None else f", every {period * 1e6:g} µs"
+    rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
     words = f"Cut at its error ({found.loop.unit_in}){rate}, with {inner}."
     return f"{words} Stability found twice: {found.margins.agreement}."
@@ -96,27 +96,26 @@ def closed_bode(
     title: str, found: LoopFigures, grid: np.ndarray, locked: LoopFigures | None
 ) -> dict[str, Any]:
     """Make the closed-loop Bode figure with the bandwidths."""
-    band = found.bandwidth
-    assert band is not None
     series = [("rotor free" if locked else "closed loop", curve(found.response, grid))]
     if locked is not None and locked.stable:
         series.append(("rotor locked", curve(locked.response, grid)))
-    dc_db = 20.0 * math.log10(abs(band.dc_gain)) if band.dc_gain else None
-    data = {
-        **bode_data(series),
-        "nyquist_hz": nyquist_hz(found),
-        "bandwidth": {
-            "minus3db_hz": finite(band.minus3db_hz),
-            "minus90deg_hz": finite(band.minus90deg_hz),
-            "resonance_hz": finite(band.resonance_hz),
-            "resonance_db": finite(band.resonance_peak_db),
-            "level_db": None if dc_db is None else dc_db - 20.0 * math.log10(math.sqrt(2.0)),
-            "dc_db": dc_db,
-        },
-    }
-    lag = _hz(band.minus90deg_hz)
-    words = f"{title}, closed loop: −3 dB at {_hz(band.minus3db_hz)}, −90° at {lag}."
+    band = _bandwidths(found)
+    data = {**bode_data(series), "nyquist_hz": nyquist_hz(found), "bandwidth": band}
+    corner, lag = _hz(band["minus3db_hz"]), _hz(band["minus90deg_hz"])
+    words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
     return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
+
+
+def _bandwidths(found: LoopFigures) -> dict[str, float | None]:
+    """Give what is marked on the closed-loop figure; null where it is not known."""
+    band = found.bandwidth
+    names = ("minus3db_hz", "minus90deg_hz", "resonance_hz", "resonance_db", "level_db", "dc_db")
+    if band is None:
+        return dict.fromkeys(names)
+    dc_db = 20.0 * math.log10(abs(band.dc_gain))
+    values = (band.minus3db_hz, band.minus90deg_hz, band.resonance_hz, band.resonance_peak_db)
+    level = dc_db - 20.0 * math.log10(math.sqrt(2.0))
+    return dict(zip(names, (*map(finite, values), level, dc_db), strict=True))
 
 
 def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:

@@ -15,7 +15,7 @@ def section(points: Sequence[OperatingPointFigures], unit: str = "N m") -> dict[
     names = list(points[0].figures)
     columns = [
         doc.column("point", "Operating point"),
-        doc.column("load", "Load", unit, format="sig:3"),
+        doc.column("load", "Load", unit, format="short:3"),
         doc.column("slope", "Friction slope", "mN m s/rad", format="sig:3"),
     ]
     for name in names:

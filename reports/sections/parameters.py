@@ -16,7 +16,7 @@ COLUMNS = [
     doc.column("path", "Key"),
     doc.column("symbol", "Symbol"),
     doc.column("text", "As written"),
-    doc.column("value", "In SI", format="sig:4"),
+    doc.column("value", "In SI", format="short:6"),
     doc.column("unit", "Unit"),
     doc.column("grade", "Grade"),
     doc.column("tolerance", "Tolerance"),

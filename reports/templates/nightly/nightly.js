@@ -18,7 +18,7 @@
     const words = fold(search.value).split(/\s+/).filter(Boolean);
     let count = 0;
     for (const row of rows) {
-      const text = fold([row.dataset.name, ...[0, 1, 2].map((k) => row.cells[k].textContent)].join(" "));
+      const text = fold([row.dataset.name, ...[0, 1].map((k) => row.cells[k].textContent)].join(" "));
       const fits = (!state || row.dataset.state === state) && words.every((word) => text.includes(word));
       row.hidden = !fits;
       count += fits;
