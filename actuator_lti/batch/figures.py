@@ -41,7 +41,7 @@ UNITS = {
     "settling_time": "s",
 }
 _TIME = ("rise_time", "overshoot", "settling_time")
-_CHUNK = 256
+_CHUNK = 64
 _MOST_ORDER = 80
 
 

@@ -1,0 +1,150 @@
+"""The tuning problem: gains as variables, requirements at every corner as constraints."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.batch import DRIVE_QUANTITIES, Population, linear_figures
+from actuator_lti.batch._figures import RADIUS
+from actuator_lti.batch.figures import LOOP_NAMES, QUANTITIES
+from actuator_lti.errors import InputError
+from analyses.monte_carlo.judging import judge
+from analyses.sampling import Factor
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, Requirement
+
+GAINS = (
+    "control.current.gain",
+    "control.current.integral_time",
+    "control.velocity.gain",
+    "control.velocity.integral_time",
+    "control.position.gain",
+)
+MOST_CORNERS = 4096
+_SIZE = {"dB": 6.0, "deg": 45.0, "%": 10.0, "1": 0.5}  # what a limit of zero is measured against
+_TIMED = ("rise_time", "overshoot", "settling_time")
+
+
+@dataclass
+class Problem:
+    """Requirements on the loops of a design, over the corners of its tolerances.
+
+    Attributes
+    ----------
+    design : Design
+    requirements : tuple of Requirement
+        Those on loops.
+    paths : tuple of str
+        Gains that are varied.
+    start : ndarray
+        Their start values, SI.
+    lower, upper : ndarray
+        Allowed values, SI.
+    evaluations : int
+        Designs looked at so far.
+    """
+
+    design: Design
+    requirements: tuple[Requirement, ...]
+    paths: tuple[str, ...]
+    start: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    evaluations: int = field(default=0)
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """Toleranced parameters that are no gain."""
+        from actuator_lti.batch import variable_paths
+        from actuator_lti.design import tolerances
+
+        known = set(variable_paths(self.design)) - set(self.paths)
+        return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
+
+    @cached_property
+    def all_corners(self) -> np.ndarray:
+        """Nominal point, then the corners of the tolerance box, shape (corners, factors)."""
+        nominal = np.array([[f.nominal for f in self.factors]])
+        if not self.factors:
+            return np.zeros((1, 0))
+        if 2 ** len(self.factors) > MOST_CORNERS:
+            raise InputError(
+                f"{len(self.factors)} toleranced parameters: tuning looks at every corner; at most 12"
+            )
+        lower, upper = np.array([f.box for f in self.factors]).T
+        size = len(self.factors)
+        bits = (np.arange(2**size)[:, None] >> np.arange(size)) & 1
+        return np.vstack([nominal, np.where(bits, upper, lower)])
+
+    def distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """Distance of every requirement over its size, shape (candidates, corners, requirements).
+
+        Unstable designs get a number below -3 that falls with the distance of the poles from the circle.
+        """
+        count, many = len(gains), len(corners)
+        values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
+        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(self.factors)}
+        population = Population(self.design, values, count * many)
+        self.evaluations += population.count
+        timed = any(r.quantity in _TIMED for r in self.requirements)
+        linear = linear_figures(population, time_figures=timed, threads=os.cpu_count() or 1)
+        columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in QUANTITIES}
+        columns |= {f"{loop}.stable": linear.stable(loop).astype(float) for loop in linear.loops}
+        out = np.empty((population.count, len(self.requirements)))
+        radius = np.nanmax(linear.raw[:, [LOOP_NAMES.index(n) for n in linear.loops], RADIUS], axis=1)
+        for k, requirement in enumerate(self.requirements):
+            found = judge(requirement, self.design, columns).distance / size_of(requirement)
+            out[:, k] = np.where(np.isneginf(found), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), found)
+        return np.minimum(out, 10.0).reshape(count, many, len(self.requirements))
+
+    def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """One figure of one loop, shape (candidates, corners)."""
+        count, many = len(gains), len(corners)
+        values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
+        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(self.factors)}
+        population = Population(self.design, values, count * many)
+        self.evaluations += population.count
+        linear = linear_figures(population, time_figures=quantity in _TIMED, threads=os.cpu_count() or 1)
+        return linear.quantity(quantity, loop).reshape(count, many)
+
+
+def size_of(requirement: Requirement) -> float:
+    """What a distance is measured against: the limit itself, or the usual size of such a figure."""
+    limit = limit_of(requirement)
+    return abs(limit) if limit else _SIZE.get(requirement.unit, 1.0)
+
+
+def limit_of(requirement: Requirement) -> float:
+    """The limit that a requirement states (the lower one where it has both)."""
+    limit = requirement.minimum if requirement.minimum is not None else requirement.maximum
+    assert limit is not None
+    return limit
+
+
+def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
+    """Requirements on loops: those of the design, replaced by extra ones on the same figure."""
+    replaced = {(r.quantity, r.loop) for r in extra}
+    kept = [r for r in design.requirements if (r.quantity, r.loop) not in replaced]
+    chosen = tuple(r for r in (*kept, *extra) if r.quantity not in DRIVE_QUANTITIES)
+    if not chosen:
+        raise InputError("no requirement on a loop: nothing to tune for; state margins and bandwidths")
+    return chosen
+
+
+def problem_of(design: Design, requirements: tuple[Requirement, ...], start: dict[str, float]) -> Problem:
+    """Set the problem up: which gains the design has, where they may lie."""
+    from analyses.tuning.objects import allowed_range
+
+    paths = tuple(path for path in GAINS if path in start)
+    values = np.array([start[path] for path in paths])
+    ranges = [allowed_range(design, path) for path in paths]
+    lower = np.maximum(values / 50.0, [low for low, _ in ranges])
+    upper = np.minimum(values * 50.0, [high for _, high in ranges])
+    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
+    return Problem(design, requirements, paths, np.clip(values, lower, upper), lower, upper)

@@ -1,0 +1,198 @@
+"""Closed-form gains that drive engineers start from, from the inner loop out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import cos, pi, radians, sin, tan
+from typing import TYPE_CHECKING
+
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
+SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
+
+
+def magnitude_optimum(gain: float, time_constant_s: float, small_time_s: float) -> tuple[float, float]:
+    """PI (gain, integral time) for ``gain/(1 + s T1)`` behind small delays of T_sigma in sum.
+
+    The zero cancels T1 and the loop becomes ``1/(2 T_sigma s (1 + s T_sigma))``: damping 0.707, overshoot
+    4.3 %. Kessler 1958 (Betragsoptimum).
+
+    Examples
+    --------
+    A winding of 0.055 ohm, 6 uH; one and a half ticks of 100 us:
+
+    >>> kp, tn = magnitude_optimum(1 / 0.055, 6e-6 / 0.055, 1.5e-4)
+    >>> round(1e3 * kp, 6), round(1e6 * tn, 2)
+    (20.0, 109.09)
+    """
+    return time_constant_s / (2.0 * gain * small_time_s), time_constant_s
+
+
+def symmetric_optimum(integrator_gain: float, small_time_s: float, a: float = 2.0) -> tuple[float, float]:
+    """PI (gain, integral time) for ``k/s`` behind a small time constant T_sigma.
+
+    Crossover at 1/(a T_sigma) where the phase is highest, Tn = a^2 T_sigma; a = 2 is the usual choice.
+    Phase margin ``arctan(a) - arctan(1/a)``: 36.9 deg for a = 2, 60 deg for 2 + sqrt(3). Kessler 1958.
+
+    Examples
+    --------
+    >>> symmetric_optimum(10.0, 0.001)
+    (50.0, 0.004)
+    """
+    return 1.0 / (a * integrator_gain * small_time_s), a * a * small_time_s
+
+
+def integrator_gain(phase_margin_deg: float, delay_s: float, period_s: float = 0.0) -> float:
+    """Largest K of ``K exp(-s L)/s`` with a phase margin, exact: PM = 90 deg - K L 180/pi.
+
+    With a period T the loop is sampled, ``K T z^-q/(z - 1)`` with L = q T: crossover at
+    ``sin(w T/2) = K T/2``, PM = 90 deg - w (q + 1/2) T.
+
+    Examples
+    --------
+    >>> round(integrator_gain(60.0, 0.01), 4)
+    52.3599
+    """
+    turn = radians(90.0 - phase_margin_deg)
+    if not turn > 0.0:
+        raise InputError(f"phase margin {phase_margin_deg} deg: below 90 for an integrator with delay")
+    if period_s == 0.0:
+        return turn / delay_s
+    omega = turn / (delay_s + 0.5 * period_s)
+    return 2.0 * sin(0.5 * omega * period_s) / period_s
+
+
+def pi_for_crossover(response: complex, omega_rad_s: float, phase_margin_deg: float) -> tuple[float, float]:
+    """PI (gain, integral time) that puts the gain crossover at a frequency with a phase margin.
+
+    Parameters
+    ----------
+    response : complex
+        Of the plant at that frequency.
+
+    Raises
+    ------
+    InputError
+        If the plant's phase leaves no room: a PI lags by 0 to 90 deg.
+
+    Examples
+    --------
+    The inner loop of the MathWorks example "Designing Cascade Control System with PI Controllers":
+
+    >>> kp, ti = pi_for_crossover(3 / (2j + 2), 2.0, 60.0)
+    >>> round(kp, 3), round(ti, 3)
+    (0.244, 0.134)
+    """
+    from cmath import phase
+
+    lag = radians(180.0 - phase_margin_deg) + phase(response)
+    lag -= 2 * pi * round(lag / (2 * pi))
+    if not 0.0 < lag < 0.5 * pi:
+        raise InputError(
+            f"no PI gives a phase margin of {phase_margin_deg:g} deg at {omega_rad_s:g} rad/s: "
+            f"it would have to lag by {lag * 180 / pi:.1f} deg, allowed 0 to 90"
+        )
+    return cos(lag) / abs(response), 1.0 / (omega_rad_s * tan(lag))
+
+
+@dataclass(frozen=True)
+class RuleGains:
+    """Gains by rules, and how they were found.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        SI by dotted key.
+    steps : tuple of str
+        One line a loop.
+    """
+
+    values: Mapping[str, float]
+    steps: tuple[str, ...]
+
+
+def rule_gains(design: Design, separation: float = SEPARATION) -> RuleGains:
+    """Start gains of every loop that a design has.
+
+    Current: magnitude optimum with T_sigma = d + T/2. Velocity: symmetric optimum for 60 deg, with the
+    current loop as a lag 2 T_sigma, its own hold, and what the speed measurement costs. Position: the
+    velocity loop's crossover over ``separation``. Where a stage is missing, the next one takes its place.
+    """
+    values: dict[str, float] = {}
+    steps: list[str] = []
+    small = design.controller.computing_delay_s + 0.5 * design.controller.period_s
+    torque = _torque_gain(design)
+    if design.controller.current is not None:
+        small = _current(design, small, values, steps)
+        assert design.motor.torque_constant_Nm_A is not None
+        torque = design.motor.torque_constant_Nm_A
+    crossover = 1.0 / (2.0 * small)
+    if design.controller.velocity is not None:
+        crossover = _velocity(design, small, torque, values, steps)
+        values["control.position.gain"] = crossover / separation
+        steps.append(f"position: velocity crossover {crossover:.4g} rad/s over {separation:g}")
+    else:
+        values["control.position.gain"] = _direct(design, small, torque)
+        steps.append("position: no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below")
+    return RuleGains(values, tuple(steps))
+
+
+def _torque_gain(design: Design) -> float:
+    """Torque per volt (standing) where there is no current loop."""
+    motor = design.motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    return motor.torque_constant_Nm_A / motor.resistance_ohm
+
+
+def _current(design: Design, small: float, values: dict[str, float], steps: list[str]) -> float:
+    """Magnitude optimum; returns the lag that the closed loop is to the next one."""
+    motor, loop = design.motor, design.controller.current
+    assert loop is not None
+    assert motor.resistance_ohm is not None
+    assert motor.inductance_H is not None
+    gain, time = magnitude_optimum(
+        1.0 / motor.resistance_ohm, motor.inductance_H / motor.resistance_ohm, small
+    )
+    values["control.current.gain"] = gain
+    if loop.integral_time_s is not None:
+        values["control.current.integral_time"] = time
+    steps.append(f"current: magnitude optimum, T_sigma {small * 1e6:.4g} us")
+    return 2.0 * small
+
+
+def _velocity(design: Design, lag: float, torque: float, values: dict[str, float], steps: list[str]) -> float:
+    """Symmetric optimum; returns the crossover."""
+    loop, encoder = design.controller.velocity, design.encoder
+    assert loop is not None
+    period = loop.every * design.controller.period_s
+    inner = design.controller.period_s if design.controller.current is not None else 0.0
+    small = lag + max(0.5 * (period - inner), 0.0) + encoder.filter_time_s
+    if encoder.speed == "difference":
+        small += 0.5 * encoder.difference_samples * period
+    gain, time = symmetric_optimum(torque / design.inertia_kgm2, small, WIDE)
+    values["control.velocity.gain"] = gain
+    if loop.integral_time_s is not None:
+        values["control.velocity.integral_time"] = time
+    steps.append(f"velocity: symmetric optimum for 60 deg, T_sigma {small * 1e6:.4g} us")
+    return 1.0 / (WIDE * small)
+
+
+def _direct(design: Design, small: float, torque: float) -> float:
+    """Position gain where nothing lies between: |drive| = 1 at a tenth of 1/T_sigma or at its corner."""
+    motor = design.motor
+    drag = design.friction.viscous_Nms_rad
+    if motor.has_electrical_dynamics and design.controller.current is None:
+        assert motor.back_emf_constant_Vs_rad is not None
+        drag += torque * motor.back_emf_constant_Vs_rad
+    corner = drag / design.inertia_kgm2
+    omega = min(0.1 / small, corner) if corner > 0.0 else 0.1 / small
+    response = torque / (design.inertia_kgm2 * abs(complex(corner, omega)) * omega)
+    return 1.0 / response

@@ -1,0 +1,83 @@
+"""The curve between bandwidth and phase margin of the position loop, every other requirement kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyses.tuning.problem import Problem
+from analyses.tuning.result import TradeOffPoint
+from analyses.tuning.solve import maximise
+
+POINTS = 7
+_SPAN = (0.6, 1.6)
+_MET = -1e-3
+
+
+def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple[TradeOffPoint, ...]:
+    """Best worst-corner phase margin of the position loop for bandwidths around the tuned one.
+
+    Parameters
+    ----------
+    gains : ndarray
+        Where to start from, SI.
+    working : ndarray
+        Corners that are looked at; the result holds for them.
+    """
+    others = [
+        k for k, r in enumerate(problem.requirements)
+        if not (r.quantity in ("phase_margin", "bandwidth") and r.loop in ("position", None))
+    ]  # fmt: skip
+    centre = float(np.min(problem.figure("bandwidth", "position", gains[None, :], working)))
+    if not np.isfinite(centre):
+        return ()
+    targets = [float(hz) for hz in centre * np.geomspace(*_SPAN, POINTS)]
+    found: list[np.ndarray] = []
+    for wanted in targets:
+        starts = [gains, *found[-1:]]
+        tried = [_best(problem, start, working, wanted, others) for start in starts]
+        found.append(_better(problem, [*starts, *tried], working, wanted, others))
+    for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
+        found[k] = _better(problem, found[k : k + 2], working, targets[k], others)
+    points = [_point(problem, one, working, others) for one in found]
+    return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
+
+
+def _better(
+    problem: Problem, candidates: list[np.ndarray], working: np.ndarray, wanted_hz: float, others: list[int]
+) -> np.ndarray:
+    """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
+    rows = np.array(candidates)
+    width = problem.figure("bandwidth", "position", rows, working)
+    margin = problem.figure("phase_margin", "position", rows, working).min(axis=1)
+    short = np.minimum(np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0).min(axis=1) - _MET, 0.0)
+    if others:
+        kept = problem.distances(rows, working)[:, :, others].min(axis=(1, 2))
+        short = short + np.minimum(kept - _MET, 0.0)
+    return rows[int(np.lexsort((-margin, -short))[0])]
+
+
+def _best(
+    problem: Problem, start: np.ndarray, working: np.ndarray, wanted_hz: float, others: list[int]
+) -> np.ndarray:
+    """Largest phase margin at a bandwidth or above, other requirements kept."""
+
+    def goal(x: np.ndarray) -> np.ndarray:
+        margin = problem.figure("phase_margin", "position", np.exp(x), working)
+        return np.clip(np.where(np.isfinite(margin), margin, 180.0), -180.0, 180.0) / 45.0
+
+    def limits(x: np.ndarray) -> np.ndarray:
+        width = problem.figure("bandwidth", "position", np.exp(x), working)
+        kept = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
+        if others:
+            kept.append(problem.distances(np.exp(x), working)[:, :, others].reshape(len(x), -1))
+        return np.concatenate(kept, axis=1)
+
+    return maximise(problem, start, limits, goal)
+
+
+def _point(problem: Problem, gains: np.ndarray, working: np.ndarray, others: list[int]) -> TradeOffPoint:
+    row = gains[None, :]
+    width = float(np.min(problem.figure("bandwidth", "position", row, working)))
+    margin = float(np.min(problem.figure("phase_margin", "position", row, working)))
+    kept = problem.distances(row, working)[0][:, others]
+    return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))
