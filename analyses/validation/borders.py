@@ -32,7 +32,8 @@ CLOSE = 3e-3  # relative width at which the bracket is interpolated
 CYCLES = 20  # periods in a window
 FAINT = 1e-3  # kick, relative to the room of the signal
 NOTHING = 1e-6  # of the kick: what is left counts as nothing
-OFF_FREQUENCY = 3e-3  # relative: so far off, the windows are fitted anew
+NEAR = 0.05  # relative width of the bracket from which on the frequency seen is that at the border
+OFF_FREQUENCY = 1e-2  # relative: so far off, the windows are fitted anew
 GAIN_RANGE = 1e3
 LONGEST_DELAY_SAMPLES = 2000.0
 SHORTEST_DELAY_SAMPLES = 0.02
@@ -55,6 +56,12 @@ class Search:
         Before the two windows.
     reach : float
         Largest factor of gain (up or down).
+    cycles : int
+        Periods in a window.
+    close : float
+        Relative width of the bracket at which the search ends.
+    smooth : bool
+        Whether the growth rate is smooth at the border, so that it is interpolated.
     """
 
     setup: Rig
@@ -62,6 +69,9 @@ class Search:
     frequency_hz: float
     settle_ticks: int
     reach: float = GAIN_RANGE
+    cycles: int = CYCLES
+    close: float = CLOSE
+    smooth: bool = True
 
     def rows(self, values: Floats) -> Floats:
         """One run a value."""
@@ -111,7 +121,8 @@ class Search:
 
     def frequency(self, result: BatchResult) -> Floats:
         """Frequency of the oscillation, Hz, from the turn of the fundamental between the windows."""
-        turn = np.angle(result.phasor(self.setup.before, 1, 0) / result.phasor(self.setup.before, 1, 1))
+        last, earlier = (result.phasor(self.setup.before, 1, k) for k in (0, 1))
+        turn = np.angle(last * earlier.conj())
         seconds = result.rows[:, at.WINDOW] * result.rows[:, at.PERIOD]
         return (result.rows[:, at.CYCLES] + turn / (2.0 * np.pi)) / seconds
 
@@ -170,9 +181,9 @@ class _Hunt:
         if k < growth.size:
             self.high, self.growths = float(self.values[k]), (self.growths[0], float(growth[k]))
         self.values = np.geomspace(self.low, self.high, VALUES + 2)[1:-1]
-        if self.frequency_hz is not None:
+        if self.frequency_hz is not None and abs(log(self.high / self.low)) < NEAR:
             off = abs(self.frequency_hz / self.search.frequency_hz - 1.0)
-            if OFF_FREQUENCY < off < 0.5 / CYCLES:
+            if self.search.smooth and OFF_FREQUENCY < off < 0.5 / self.search.cycles:
                 self.search = replace(self.search, frequency_hz=self.frequency_hz)
 
     def _nominal(self) -> float:
@@ -182,8 +193,8 @@ class _Hunt:
     def done(self) -> bool:
         if self.found is None:
             return False
-        narrow = abs(log(self.high / self.low)) < CLOSE and all(np.isfinite(self.growths))
-        return not self.found or narrow
+        narrow = abs(log(self.high / self.low)) < self.search.close
+        return not self.found or (narrow and (not self.search.smooth or all(np.isfinite(self.growths))))
 
     def border(self) -> Border:
         """Interpolate the growth between the ends."""
@@ -192,6 +203,7 @@ class _Hunt:
             return Border(None, bracket, None, self.runs)
         a, b = self.growths
         part = -a / (b - a) if np.isfinite(a) and np.isfinite(b) and b > a else 0.5
+        part = part if self.search.smooth else 0.5
         value = exp(log(self.low) + part * log(self.high / self.low))
         return Border(value, bracket, self.frequency_hz, self.runs)
 

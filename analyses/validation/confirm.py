@@ -195,7 +195,9 @@ def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_
     reach = 1e3 if far < 300.0 else inf
     if reach == inf:
         return Question(Search(setup, kind, hertz, settle_ticks, reach=100.0), kind, None, None)
-    return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks), reach), kind, ratio, hertz)
+    return Question(
+        Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks), reach), kind, ratio, hertz
+    )
 
 
 def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:
