@@ -1,11 +1,8 @@
-"""MATLAB files (level 4 and 5, not the HDF5 of 7.3) as records."""
+"""MATLAB files (level 5, not the HDF5 of 7.3) as records."""
 
 from __future__ import annotations
 
 import hashlib
-import struct
-import warnings
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,16 +11,11 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.csv_rows import Account, Block
+from analyses.records.mat5 import MAX_BYTES, read_mat5
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
 from analyses.records.time_axis import TimeAxis
 from analyses.records.units import converter
-
-_UNREADABLE = (
-    ValueError, TypeError, KeyError, IndexError, AttributeError, OSError, EOFError, OverflowError,
-    MemoryError, NotImplementedError, AssertionError, ArithmeticError, zlib.error, struct.error,
-)  # fmt: skip
-MAX_BYTES = 2 << 30
 
 
 def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = None) -> Record:
@@ -66,37 +58,21 @@ def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = No
 
 
 def _load(path: Path) -> tuple[Mapping[str, FloatArray], str]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
             raise InputError(
                 f"{size} bytes: a .mat file of at most {MAX_BYTES} bytes is read", where=str(path)
             )
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            content = loadmat(path)
-    except InputError:
-        raise
-    except NotImplementedError:
-        raise InputError("is a MATLAB 7.3 (HDF5) file; save it with -v7", where=str(path)) from None
-    except (MatReadError, *_UNREADABLE) as error:
-        raise InputError(
-            f"is no readable MATLAB file: {type(error).__name__}: {error}", where=str(path)
-        ) from None
-    numeric = {}
-    for key, value in content.items():
-        if (
-            not key.startswith("__")
-            and isinstance(value, np.ndarray)
-            and value.dtype.kind in "fiub"
-            and value.size
-        ):
-            numeric[key] = np.asarray(value, dtype=np.float64)
-    return numeric, digest
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+    try:
+        content = read_mat5(data)
+    except InputError as error:
+        raise InputError(error.message, where=str(path)) from None
+    arrays = {key: value for key, value in content.arrays.items() if value.size}
+    return arrays, hashlib.sha256(data).hexdigest()
 
 
 def _vector(vectors: Mapping[str, FloatArray], column: str, path: Path) -> FloatArray:

@@ -78,7 +78,7 @@ def test_any_bytes_as_csv(content: bytes, head: bytes) -> None:
     _read(head + content, _spec(CsvFormat(), "drop"))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(content=st.binary(max_size=400), place=st.integers(0, 600), head=st.booleans())
 def test_any_bytes_as_mat(content: bytes, place: int, head: bool) -> None:
     spec = RecordSpec(time=TimeColumn(column="t"), signals=(SignalColumn(name="x", column="x"),))
@@ -104,6 +104,27 @@ def test_any_text_as_campaign(text: str) -> None:
             load_campaign(path)
         except InputError as error:
             _check_one_line(error)
+
+
+def test_a_compressed_and_a_plain_file_read_alike() -> None:
+    import io
+
+    import numpy as np
+    from scipy.io import savemat
+
+    from analyses.records.mat5 import read_mat5
+
+    values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
+    found = []
+    for packed in (False, True):
+        stream = io.BytesIO()
+        savemat(stream, values, do_compression=packed)
+        found.append(read_mat5(stream.getvalue()))
+    for content in found:
+        assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
+        assert content.arrays["k"].item() == 3.5
+        assert content.passed_over == ["text"]
 
 
 def _check_one_line(error: InputError) -> None:

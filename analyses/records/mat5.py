@@ -1,0 +1,139 @@
+"""Real numeric arrays out of a MATLAB level 5 file, by a small reader that trusts nothing in it.
+
+A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
+MathWorks, "MAT-File Format" (R2019b), chapter 1. Cells, structures, texts, sparse and complex arrays are passed
+over and named.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+HEADER = 128
+MATRIX, COMPRESSED = 14, 15
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+NUMERIC_CLASSES = range(6, 16)
+COMPLEX_FLAG = 0x08
+MAX_BYTES = 1 << 31
+MAX_DIMENSIONS = 32
+
+
+@dataclass
+class MatContent:
+    """The arrays by name, and the names (or kinds) of what was passed over."""
+
+    arrays: dict[str, FloatArray] = field(default_factory=dict)
+    passed_over: list[str] = field(default_factory=list)
+
+
+def read_mat5(data: bytes) -> MatContent:
+    """Read the numeric arrays of a level 5 file.
+
+    Raises
+    ------
+    InputError
+        Without the file's name: what is wrong, and at which byte.
+
+    Examples
+    --------
+    >>> read_mat5(b"MATLAB")
+    Traceback (most recent call last):
+    ...
+    actuator_lti.errors.InputError: 6 bytes: too short for a MATLAB file
+    """
+    if len(data) < HEADER:
+        raise InputError(f"{len(data)} bytes: too short for a MATLAB file")
+    mark, version = data[126:128], data[124:126]
+    order = {b"IM": "<", b"MI": ">"}.get(mark)
+    if order is None:
+        raise InputError("no MATLAB level 5 file (level 4 and other formats are not read; save it with -v7)")
+    if struct.unpack(f"{order}H", version)[0] == 0x0200 or data[HEADER : HEADER + 4] == b"\x89HDF":
+        raise InputError("is a MATLAB 7.3 (HDF5) file; save it with -v7")
+    content = MatContent()
+    for kind, body, place in _elements(data, HEADER, len(data), order):
+        if kind == COMPRESSED:
+            inflated = _inflated(body, place)
+            for inner, inner_body, inner_place in _elements(inflated, 0, len(inflated), order):
+                _take(inner, inner_body, inner_place, order, content)
+        else:
+            _take(kind, body, place, order, content)
+    return content
+
+
+def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -> None:
+    """Add one top-level element to the content."""
+    if kind != MATRIX:
+        content.passed_over.append(f"element of type {kind} at byte {place}")
+        return
+    parts = list(_elements(body, 0, len(body), order))
+    if len(parts) < 3 or len(parts[0][1]) < 8:
+        content.passed_over.append(f"incomplete array at byte {place}")
+        return
+    flags = struct.unpack(f"{order}I", parts[0][1][:4])[0]
+    name = parts[2][1].decode("latin-1")
+    if (flags & 0xFF) not in NUMERIC_CLASSES or (flags >> 8) & COMPLEX_FLAG or len(parts) < 4:
+        content.passed_over.append(name)
+        return
+    shape = _numbers(parts[1][0], parts[1][1], order)
+    values = _numbers(parts[3][0], parts[3][1], order)
+    if shape is None or values is None or not 0 < len(shape) <= MAX_DIMENSIONS:
+        raise InputError(f'array "{name}" at byte {place}: no numbers in it')
+    dimensions = [int(n) for n in shape]
+    count = 1
+    for n in dimensions:
+        count *= n
+    if min(dimensions) < 0 or count != len(values):
+        raise InputError(f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}')
+    content.arrays[name] = values.reshape(dimensions, order="F")
+
+
+def _elements(data: bytes, start: int, stop: int, order: str) -> Iterator[tuple[int, bytes, int]]:
+    """Data elements (type, content, place) between two places, each within them."""
+    place = start
+    while place + 8 <= stop:
+        first, size = struct.unpack_from(f"{order}II", data, place)
+        if first >> 16:
+            kind, size, begin, following = first & 0xFFFF, first >> 16, place + 4, place + 8
+            if size > 4:
+                raise InputError(f"damaged at byte {place}: a small element of {size} bytes")
+        else:
+            kind, begin = first, place + 8
+            padded = size if kind == COMPRESSED else -(-size // 8) * 8
+            following = begin + padded
+        if begin + size > stop:
+            raise InputError(f"damaged at byte {place}: {size} bytes announced, {stop - begin} there")
+        yield kind, data[begin : begin + size], place
+        place = following
+
+
+def _inflated(body: bytes, place: int) -> bytes:
+    """A compressed element, unpacked within bounds."""
+    unpack = zlib.decompressobj()
+    try:
+        inflated = unpack.decompress(body, MAX_BYTES)
+    except zlib.error as error:
+        raise InputError(f"damaged at byte {place}: {error}") from None
+    if unpack.unconsumed_tail or not unpack.eof:
+        raise InputError(f"damaged at byte {place}: compressed data do not end")
+    return inflated
+
+
+def _numbers(kind: int, body: bytes, order: str) -> FloatArray | None:
+    """Numbers of one element as floats; None for a type that is no number."""
+    code = NUMBERS.get(kind)
+    if code is None:
+        return None
+    dtype = np.dtype(f"{order}{code}")
+    if len(body) % dtype.itemsize:
+        return None
+    return np.frombuffer(body, dtype=dtype).astype(np.float64)
