@@ -59,8 +59,10 @@ def _gain_margins(data: dict[str, Any], top: Axes) -> None:
         seen = min(max(-db, low), high)
         top.plot([f, f], [0.0, seen], color=style.RED, linewidth=2.2, solid_capstyle="butt")
         top.plot([f], [seen], marker="s", markersize=4.5, color=style.RED, linestyle="none")
-        if k < LABELLED and low < -db < high:
-            style.tag(top, f"GM {_signed(db)} dB\n{style.hertz(f)}", (f, seen), data, below=db > 0)
+        if k < LABELLED:
+            beyond = "" if low < -db < high else " (beyond)"
+            words = f"GM {_signed(db)} dB{beyond}\n{style.hertz(f)}"
+            style.tag(top, words, (f, seen), data, below=db > 0 if not beyond else db < 0)
 
 
 def _phase_margins(data: dict[str, Any], top: Axes, bottom: Axes) -> None:
