@@ -3,52 +3,107 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
 from reports.nightly.figures import digest
 
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
 
 def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Compute the report of a design and write it out.
+    """Compute a report and write it out.
 
     Parameters
     ----------
     payload : mapping
-        ``name``, ``design`` (the text of a design file) and ``settings`` (``pdf``, ``validation``).
+        ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``, the text of
+        a design file, or ``study``, all designs of a study as texts, which makes their comparison;
+        ``refused`` in place of them says why there is no design.
 
     Returns
     -------
     meta : dict
-        Figures and verdicts (see `reports.nightly.figures.digest`).
+        Figures and verdicts (see `reports.nightly.figures.digest`); of a comparison none, as they are those
+        of its designs.
     files : dict
         ``report.html``, ``report.json`` and, where asked for, ``report.pdf``.
 
     Raises
     ------
     InputError, NumericalError
-        From reading the design and from the computations.
+        From reading the designs and from the computations.
     """
     from reports import document as doc
     from reports.html import page
 
-    made = design_document(payload)
-    content = doc.dumps(made)
-    plain = doc.loads(content)
-    files = {"report.html": page(plain).encode(), "report.json": content.encode()}
+    if "refused" in payload:
+        raise InputError(str(payload["refused"]))
+    comparison = "study" in payload
+    plain = doc.loads(doc.dumps(comparison_document(payload) if comparison else design_document(payload)))
+    files = {"report.html": page(plain).encode(), "report.json": doc.dumps(plain).encode()}
     if payload.get("settings", {}).get("pdf"):
         from reports.pdf import pdf_bytes
 
         files["report.pdf"] = pdf_bytes(plain)
-    return digest(plain), files
+    return digest({**plain, "sections": []} if comparison else plain), files
 
 
 def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
-    """Compute the document of a design, with its validation where the settings ask for it."""
-    from actuator_lti.design.loader import read_design_text
+    """Compute the report of a design, with validation and Monte Carlo where the settings ask for them."""
     from reports.build import design_report
 
-    if "refused" in payload:
-        raise InputError(str(payload["refused"]))
-    design = read_design_text(str(payload["design"]), str(payload["name"]))
-    return design_report(design)
+    design = _design(payload)
+    settings: Mapping[str, Any] = payload.get("settings", {})
+    sections: list[dict[str, Any]] = []
+    if settings.get("monte_carlo"):
+        sections += _tolerances(design, settings["monte_carlo"])
+    return design_report(design, validation=sections)
+
+
+def _tolerances(design: Design, plan: Mapping[str, int]) -> list[dict[str, Any]]:
+    """Sample the tolerances of a design; nothing where none of its values has one."""
+    from analyses.engine import Engine
+    from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+    from reports.sections.monte_carlo import section
+
+    if not any(p.tolerance is not None for p in design.parameters.values()):
+        return []
+    with TemporaryDirectory(prefix="nightly-") as folder:
+        settings = MonteCarloSettings(samples=plan["samples"], seed=plan["seed"])
+        return [section(monte_carlo(design, Path(folder), settings, engine=Engine(threads=1)))]
+
+
+def comparison_document(payload: Mapping[str, Any]) -> dict[str, Any]:
+    """Compare all designs of a study on one page."""
+    from analyses.slugs import slug
+    from analyses.study import Study, Variant
+    from analyses.variants import compare
+    from reports.sections.compare import sections
+    from reports.study_pages import study_document
+
+    designs = [
+        Variant(
+            str(one["name"]),
+            slug(str(one["name"])),
+            _design(one) if "design" in one else None,
+            dict(one.get("overrides", {})),
+            str(one.get("refused", "")),
+        )
+        for one in payload["study"]["designs"]
+    ]
+    base = designs[0].design
+    assert base is not None
+    title = str(payload["study"]["title"])
+    plan = Study(str(payload["name"]), title, "", title, designs[0], tuple(designs[1:]))
+    subtitle = f"{designs[0].name} and {len(designs) - 1} variants"
+    return study_document(base, sections(compare(plan)), title=title, subtitle=subtitle, kind="compare")
+
+
+def _design(payload: Mapping[str, Any]) -> Design:
+    from actuator_lti.design.loader import read_design_text
+
+    return read_design_text(str(payload["design"]), str(payload["name"]))

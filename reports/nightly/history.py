@@ -99,6 +99,8 @@ class History:
     def __init__(self, connection: sqlite3.Connection, notice: str | None) -> None:
         self.connection = connection
         self.notice = notice
+        self._figure_ids: dict[str, int] = {}
+        self._table: dict[int, Figure] = {}
 
     # ---- writing -----------------------------------------------------------------------------------
 
@@ -118,6 +120,7 @@ class History:
         """Write a whole night in one transaction."""
         with self.connection as c:
             c.execute("BEGIN IMMEDIATE")
+            self._figure_ids = {figure.name: number for number, figure in self.figure_table().items()}
             for result in results:
                 self._insert(run, result)
             c.execute("UPDATE runs SET state = 'done', finished = ? WHERE id = ?", (finished, run))
@@ -151,10 +154,10 @@ class History:
         return int(cursor.lastrowid or 0)
 
     def _figure(self, figure: Figure) -> int:
-        return self._id(
-            "figures", "name",
-            {"name": figure.name, "unit": figure.unit, "better": figure.better, "kind": figure.kind},
-        )  # fmt: skip
+        if figure.name not in self._figure_ids:
+            row = {"name": figure.name, "unit": figure.unit, "better": figure.better, "kind": figure.kind}
+            self._figure_ids[figure.name] = self._id("figures", "name", row)
+        return self._figure_ids[figure.name]
 
     def _id(self, table: str, unique: str, row: Mapping[str, Any]) -> int:
         query = f"SELECT id FROM {table} WHERE {unique} = ?"
@@ -280,8 +283,13 @@ class History:
 
     def figure_table(self) -> dict[int, Figure]:
         """Return name, unit and direction of every figure by its number (without values)."""
-        rows = self.connection.execute("SELECT id, name, unit, better, kind FROM figures")
-        return {r[0]: Figure(name=r[1], value=None, unit=r[2], better=r[3], kind=r[4]) for r in rows}
+        count = self.connection.execute("SELECT count(*) FROM figures").fetchone()[0]
+        if len(self._table) != count:
+            rows = self.connection.execute("SELECT id, name, unit, better, kind FROM figures")
+            self._table = {
+                r[0]: Figure(name=r[1], value=None, unit=r[2], better=r[3], kind=r[4]) for r in rows
+            }
+        return self._table
 
     def _layout(self, layout: int) -> list[int]:
         row = self.connection.execute("SELECT figures FROM layouts WHERE id = ?", (layout,)).fetchone()

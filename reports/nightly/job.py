@@ -15,7 +15,7 @@ BROKEN: tuple[Status, ...] = ("error", "timeout", "crash")
 
 MAX_JOBS = 10_000
 MAX_NAME = 20_000
-MAX_PAYLOAD_BYTES = 4_000_000
+MAX_PAYLOAD_BYTES = 32_000_000
 
 
 @dataclass(frozen=True, kw_only=True)

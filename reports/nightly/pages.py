@@ -13,10 +13,9 @@ from reports.nightly.course import Course, course_of
 from reports.nightly.history import History, Result, Run
 from reports.nightly.machines import STATE_WORDS, cause_lines
 from reports.nightly.text import csv_text, one_line, visible
-from reports.nightly.view import DesignView, Overview, report_folder
+from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, report_folder
 
 MAX_NIGHTS = 400
-MAX_CHANGES = 100
 STATES = {
     "broken": ("⚠", STATE_WORDS["broken"]),
     "fail": ("✗", STATE_WORDS["fail"]),
@@ -61,7 +60,7 @@ def design_page(night: Overview, design: DesignView, history: History, available
         marks=course.marks,
         nights=_nights(night, design, past, course, available),
         more_nights=max(0, len(past) - MAX_NIGHTS),
-        max_changes=MAX_CHANGES,
+        max_changes=SHOWN_CHANGES,
     )
 
 

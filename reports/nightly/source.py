@@ -9,7 +9,7 @@ A study file may hold a table for the nightly beside what `analyses.study` reads
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,13 +51,16 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
         from actuator_lti.design import load_design
 
         design = load_design(path)
-        file, table = study_of(design), {}
+        file = study_of(design)
+        table: dict[str, Any] = {}
         check = True if validation is None else validation
     else:
         file, table = _read_file(Path(path))
         check = file.validation if validation is None else validation
     tolerances = _tolerances(table, path)
-    settings = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
+    settings: dict[str, Any] = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
+    if file.monte_carlo is not None:
+        settings["monte_carlo"] = {"samples": file.monte_carlo.samples, "seed": file.monte_carlo.seed}
     return Study(
         name=file.name,
         title=file.title or file.name,
@@ -97,12 +100,32 @@ def _flag(table: Mapping[str, Any], key: str, where: str) -> bool:
 
 
 def _jobs(study: StudyFile, settings: Mapping[str, Any]) -> Iterator[Job]:
-    for variant in study.all:
-        yield (
-            refused_job(variant)
-            if variant.design is None
-            else design_job(variant.design, settings, variant.name)
-        )
+    """Give the comparison first, as it takes longest, then every design."""
+    jobs = [
+        refused_job(variant) if variant.design is None else design_job(variant.design, settings, variant.name)
+        for variant in study.all
+    ]
+    if study.variants:
+        yield comparison_job(study, jobs, settings)
+    yield from jobs
+
+
+def comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:
+    """Make the job that compares all designs of a study on one page."""
+    names = {job.name for job in jobs}
+    name = "Comparison of all variants"
+    while name in names:
+        name += " (study)"
+    kept = ("name", "design", "refused")
+    designs = [{k: job.payload[k] for k in kept if k in job.payload} for job in jobs]
+    for one, variant in zip(designs, study.all, strict=True):
+        one["overrides"] = {key: str(value) for key, value in variant.overrides.items()}
+    payload = {
+        "name": name,
+        "study": {"title": study.title or study.name, "designs": designs},
+        "settings": {"pdf": settings["pdf"]},
+    }
+    return Job(name=name, kind="compare", payload=payload, title=study.title or study.name)
 
 
 def refused_job(variant: Variant) -> Job:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from reports.nightly.night import Study
 
 STRIP = 30
+SHOWN_CHANGES = 100
 _RANK = {"timeout": 0, "crash": 0, "error": 0, "fail": 1, "pass": 3}
 
 
@@ -177,7 +178,7 @@ class _Reader:
             result=result,
             meta=self._meta(result),
             last_night=self._last_night(result, past),
-            baseline=self._baseline(result, past, approval),
+            baseline=self._baseline(result, approval),
             approval=approval,
             strip=self._strip(past),
             status_flaps=_toggles([r.status for r in past[-WINDOW:]]) >= 3,
@@ -215,21 +216,22 @@ class _Reader:
             if skipped
             else ""
         )
-        return self._compare(good[-1], result, past, note)
+        found = self._compare(good[-1], result, note)
+        return replace(found, changes=self._flapping(found.changes, past))
 
-    def _baseline(self, result: Result, past: list[Result], approval: Baseline | None) -> Comparison:
+    def _baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         if approval is not None:
             base = self.history.results(run=approval.run, name=result.name, good=True)[0]
-            return self._compare(base, result, past, "")
+            return self._compare(base, result, "")
         first = self.history.results(name=result.name, good=True, last=-1)
         if not first:
             return Comparison(note="no baseline: no night has a result")
         if first[0].run == result.run:
             return Comparison(run=self.last, note="this is the first night: nothing to compare with")
         note = "nobody has approved a baseline yet: compared with the first night"
-        return self._compare(first[0], result, past, note)
+        return self._compare(first[0], result, note)
 
-    def _compare(self, old: Result, new: Result, past: list[Result], note: str) -> Comparison:
+    def _compare(self, old: Result, new: Result, note: str) -> Comparison:
         run = self.runs[old.run]
         if new.snapshot is None:
             return Comparison(run=run, note=note or "no result tonight")
@@ -239,20 +241,16 @@ class _Reader:
         changes = compare_figures(before, after, self.study.tolerances)
         inputs = (self.history.inputs(old.snapshot or 0), self.history.inputs(new.snapshot))
         cause = cause_of(run, self.runs[new.run], inputs, self._commits_between(run, self.runs[new.run]))
-        return Comparison(run=run, changes=self._flapping(changes, past), cause=cause, note=note)
+        return Comparison(run=run, changes=changes, cause=cause, note=note)
 
     def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
-        if not changes or len(past) < 4:
+        """Mark those of the changes that a page shows that go to and fro."""
+        shown = [c for c in changes[:SHOWN_CHANGES] if c.figure in self._number]
+        if not shown or len(past) < 4:
             return changes
-        numbers = [self._number[c.figure] for c in changes if c.figure in self._number]
-        values = self.history.matrix(past[-WINDOW:], numbers)
-        place = {number: j for j, number in enumerate(numbers)}
-        return tuple(
-            replace(c, flapping=flaps(values[:, place[self._number[c.figure]]], c.tolerance))
-            if c.figure in self._number
-            else c
-            for c in changes
-        )
+        values = self.history.matrix(past[-WINDOW:], [self._number[c.figure] for c in shown])
+        to_and_fro = {c.figure for j, c in enumerate(shown) if flaps(values[:, j], c.tolerance)}
+        return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)
 
     def _commits_between(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
         key = (old.id, new.id)

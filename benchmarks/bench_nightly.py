@@ -1,0 +1,113 @@
+"""Nightly: years of history on disk and on a page; a study of 100 variants built once, and again."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.row import Row
+from reports.nightly.cache import Cache
+from reports.nightly.figures import Figure
+from reports.nightly.history import History, NewResult, open_history
+from reports.nightly.night import Settings, Study, run_night
+from reports.nightly.pages import design_page, index
+from reports.nightly.source import read_study
+from reports.nightly.view import overview
+
+GROUP = "nightly"
+DESIGNS, FIGURES, NIGHTS = 100, 200, 1000
+STUDY = """
+[study]
+name = "bench"
+base = "ilr33-amber"
+validation = true
+
+[[grid]]
+axes = [
+  { parameter = "gear.worm.ratio", from = 25, to = 50, points = %d },
+  { parameter = "control.velocity.gain", from = "0.08 A*s/rad", to = "0.2 A*s/rad", points = %d },
+]
+"""
+
+
+def rows(quick: bool = False) -> Iterable[Row]:
+    """Measure; the first run of 100 variants takes minutes, ``quick`` measures nine of them."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield from history_rows(Path(folder), 100 if quick else NIGHTS)
+    with tempfile.TemporaryDirectory() as folder:
+        yield from study_rows(Path(folder), (3, 3) if quick else (11, 9))
+
+
+def history_rows(folder: Path, nights: int) -> Iterator[Row]:
+    """Every figure of every design moves every night: the worst that a history can be asked to keep."""
+    path = folder / "history.sqlite"
+    with open_history(path) as history:
+        fill(history, nights)
+    size = sum(p.stat().st_size for p in folder.glob("history.sqlite*")) / 1e6
+    what = f"{DESIGNS} designs, {FIGURES} figures, {nights} nights, all moving"
+    yield Row(
+        group=GROUP, name=f"history on disk: {what}", measured=size, unit="MB", target=300 * nights / NIGHTS
+    )
+    study = Study(name="bench", jobs=())
+    with open_history(path) as history:
+        start = time.perf_counter()
+        night = overview(history, Cache(folder / "cache"), study)
+        text = index(night, "nights/x")
+        yield Row(
+            group=GROUP, name="index page from it", measured=time.perf_counter() - start, unit="s", target=1.0
+        )
+        start = time.perf_counter()
+        text += design_page(night, night.designs[0], history, set())
+        taken = time.perf_counter() - start
+        yield Row(
+            group=GROUP, name="page of a design from it", measured=taken, unit="s", target=1.0,
+            note=f"{len(text) / 1e3:.0f} kB",
+        )  # fmt: skip
+
+
+def fill(history: History, nights: int) -> None:
+    """Write such a history."""
+    rng = np.random.default_rng(0)
+    names = [f"section / table / row {k // 4} / margin {k % 4}" for k in range(FIGURES)]
+    day = datetime(2026, 1, 1)
+    for night in range(nights):
+        started = (day + timedelta(days=night)).strftime("%Y-%m-%dT02:00:00Z")
+        run = history.start_run(
+            {"started": started, "code": f"{night}", "code_commit": f"{night:040x}", "study_commit": "",
+             "libraries": {"numpy": "2"}, "host": "bench"}
+        )  # fmt: skip
+        history.finish_run(run, started, [result(k, night, names, rng) for k in range(DESIGNS)])
+
+
+def result(design: int, night: int, names: list[str], rng: np.random.Generator) -> NewResult:
+    """One design in one night."""
+    values = (10.0 + rng.standard_normal(len(names))).tolist()
+    figures = [Figure(name=n, value=v, unit="dB", better=1) for n, v in zip(names, values, strict=True)]
+    return NewResult(
+        name=f"design {design}", kind="design", status="pass", key=f"{design}-{night}", figures=figures,
+        inputs={"parameters": {"control.position.gain": f"{night} 1/s"}}, total=12, worst=0.1, worst_id="GM",
+    )  # fmt: skip
+
+
+def study_rows(folder: Path, points: tuple[int, int]) -> Iterator[Row]:
+    """Build a study with reports and validations, then build it again unchanged."""
+    count = points[0] * points[1] + 1
+    path = folder / "study.toml"
+    path.write_text(STUDY % points)
+    times = []
+    for _ in range(2):
+        start = time.perf_counter()
+        night = run_night(read_study(str(path)), folder / "site", Settings(workers=2))
+        times.append(time.perf_counter() - start)
+    broken = night.count("broken")
+    note = f"{broken} without result" if broken else "reports, validations and their comparison"
+    name = f"{count} variants on 2 workers"
+    yield Row(
+        group=GROUP, name=f"{name}, first run", measured=times[0], unit="s", target=6.0 * count, note=note
+    )
+    yield Row(group=GROUP, name=f"{name}, second run, unchanged", measured=times[1], unit="s", target=5.0)
