@@ -115,6 +115,14 @@ def full_range(design: Design) -> dict[str, float]:
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
 
 
+def full_torque_Nm(design: Design) -> float:
+    """Torque that the motor reaches at its limits, at standstill."""
+    motor = design.motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * design.limits.voltage_V
+    return (motor.torque_constant_Nm_A or 0.0) * full_range(design)["current"]
+
+
 def _scale(setup: Rig) -> float:
     """What the signal in front of the instrument can reach."""
     sizes = full_range(setup.design)
@@ -174,12 +182,8 @@ def _travel_s(design: Design, stage: str, part: float) -> float:
     """About how long the drive takes to come back, at its limits."""
     if stage == "current":
         return 0.0
-    sizes, motor = full_range(design), design.motor
-    if motor.source_gain_Nm_V is not None:
-        torque = motor.source_gain_Nm_V * design.limits.voltage_V
-    else:
-        torque = (motor.torque_constant_Nm_A or 0.0) * sizes["current"]
-    speeding = design.inertia_kgm2 * sizes["velocity"] / torque
+    sizes = full_range(design)
+    speeding = design.inertia_kgm2 * sizes["velocity"] / full_torque_Nm(design)
     if stage == "velocity":
         return part * speeding
     return part * sizes["position"] * design.total_ratio / sizes["velocity"] + 2.0 * speeding

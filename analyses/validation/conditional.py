@@ -1,0 +1,292 @@
+"""Conditional stability that a limit brings out: healthy margins, and yet a large command diverges.
+
+A loop with a lower gain margin goes unstable when gain is taken away, and a limit takes gain away.  The
+describing function of saturation says at which amplitude in front of the limit so much is gone that an
+oscillation keeps itself up (an unstable limit cycle: below it the oscillation dies out, above it grows).
+Whether the drive gets there is found in time, by steps of growing size.
+
+The describing function knows nothing of anti-windup: where the controller in front of the limit stops its
+integral while the limit acts (model.md section 2), the drive is safer than predicted.  A voltage limit behind
+a current loop is taken as the current limit U/R that it amounts to: the velocity controller does not know of
+it and goes on integrating.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isfinite, pi, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from analyses.validation.confirm import oscillation_hz
+from analyses.validation.release import full_range, full_torque_Nm
+from analyses.validation.rig import points_of
+from nonlinear._kernels import layout as at
+from nonlinear.batch import put_step, repeat_row, run_rows
+from nonlinear.parameters import design_row
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import ExactMargins, Loops
+
+Floats = npt.NDArray[np.float64]
+SMALLEST_PART, LARGEST_PART = 0.01, 1.0  # of full deflection
+STEPS = 16
+CLOSE = 1e-3
+CONVERGED = 0.05  # error left, relative to the step
+LASTING = 0.9  # error of the last window over that of the one before
+WINDOWS = 20.0  # time constants of the loop that are waited for, beside the travel
+SETTLED = 14.0  # time constants in the settling ticks
+LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What the describing function of a limit says of a loop with a lower gain margin.
+
+    Attributes
+    ----------
+    point : str
+        Break point in front of the limit (all other loops closed).
+    limit : float
+        In the unit of the point.
+    limiter : str
+        What limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current, U/R"``.
+    gain_lower : float
+        Lower gain margin, factor (below 1).
+    amplitude : float
+        In front of the limit, peak, in the unit of the point: the border between dying out and growing.
+    frequency_hz : float
+    output_rad : float
+        Amplitude of the output angle that goes with it.
+    antiwindup : bool
+        Whether the controller in front stops its integral while the limit acts.
+    """
+
+    point: str
+    limit: float
+    limiter: str
+    gain_lower: float
+    amplitude: float
+    frequency_hz: float
+    output_rad: float
+    antiwindup: bool
+
+
+@dataclass(frozen=True)
+class Conditional:
+    """Whether a large command makes the drive diverge.
+
+    Attributes
+    ----------
+    margins : mapping of str to ExactMargins
+        At every break point.
+    predictions : tuple of Prediction
+    threshold_rad : float or None
+        Largest step of the output that still settles; ``None`` where all steps up to full deflection do.
+    next_rad : float or None
+        Smallest step tried that does not.
+    full_deflection_rad : float
+    oscillation_hz, oscillation_rad : float or None
+        Frequency, and amplitude of the output error, while the step at the threshold hovers there.
+    limiter : str
+        The limit that acted longest at that step.
+    """
+
+    margins: dict[str, ExactMargins]
+    predictions: tuple[Prediction, ...]
+    threshold_rad: float | None
+    next_rad: float | None
+    full_deflection_rad: float
+    oscillation_hz: float | None
+    oscillation_rad: float | None
+    limiter: str
+
+    @property
+    def found(self) -> bool:
+        """Whether a command within full deflection does not settle."""
+        return self.threshold_rad is not None
+
+    @property
+    def hidden(self) -> bool:
+        """Whether the linear margins call this drive stable all the same."""
+        return self.found and all(m.stable for m in self.margins.values())
+
+
+def saturation_gain(ratio: float) -> float:
+    """Describing function of saturation, of amplitude over limit; 1 up to the limit.
+
+    Examples
+    --------
+    >>> saturation_gain(1.0), round(saturation_gain(2.0), 4)
+    (1.0, 0.609)
+    """
+    if ratio <= 1.0:
+        return 1.0
+    return 2.0 / pi * (np.arcsin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
+
+
+def saturation_ratio(gain: float) -> float:
+    """Amplitude over limit at which saturation has so much gain left (0 < gain <= 1)."""
+    from scipy.optimize import brentq
+
+    return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
+
+
+def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Conditional:
+    """Look for conditional stability: by margins, by describing functions, and by steps in time.
+
+    Parameters
+    ----------
+    design : Design
+    loops : Loops
+        Sampled, sliding.
+    settle_ticks : int
+        In which the linear drive settles.
+    """
+    from actuator_lti.loops import exact_margins
+
+    margins = {point: exact_margins(loops, point) for point in points_of(design) if point != "output"}
+    predictions = tuple(
+        _prediction(loops, point, margins[point].gain_lower, limit, limiter)
+        for point, limit, limiter in _limits(design)
+        if margins[point].stable and margins[point].gain_lower > LOW_GAIN
+    )
+    threshold, following = step_threshold(design, settle_ticks)
+    hertz = amplitude = None
+    limiter = ""
+    if threshold is not None and threshold > 0.0:
+        hertz, amplitude, limiter = _hovering(design, threshold, settle_ticks)
+    return Conditional(
+        margins=margins,
+        predictions=predictions,
+        threshold_rad=threshold,
+        next_rad=following,
+        full_deflection_rad=design.validation.full_deflection_rad,
+        oscillation_hz=hertz,
+        oscillation_rad=amplitude,
+        limiter=limiter,
+    )
+
+
+def _limits(design: Design) -> list[tuple[str, float, str]]:
+    """Every limit behind a controller whose loop may have a lower gain margin: point, limit, name."""
+    limits, points = design.limits, points_of(design)
+    found = [("u", limits.voltage_V, "voltage limit")]
+    if "i_ref" in points:
+        short = limits.voltage_V / (design.motor.resistance_ohm or 1.0)
+        name = "current limit" if limits.peak_current_A <= short else "voltage limit as a current, U/R"
+        found = [("i_ref", min(limits.peak_current_A, short), name)]
+    if "w_ref" in points:
+        found.append(("w_ref", limits.speed_rad_s, "speed limit"))
+    return [item for item in found if isfinite(item[1])]
+
+
+def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction:
+    """The limit cycle at the lower gain margin."""
+    ratio = saturation_ratio(gain)
+    hertz = oscillation_hz(loops.break_points[point], gain=gain)
+    design, omega = loops.design, 2.0 * pi * hertz
+    behind = gain * ratio * limit  # fundamental behind the limit
+    output = behind * _to_output(design, point, omega)
+    integral = {"i_ref": design.controller.velocity, "u": design.controller.current}.get(point)
+    stops = integral is not None and integral.integral_time_s is not None and "U/R" not in limiter
+    return Prediction(point, limit, limiter, gain, ratio * limit, hertz, output, stops)
+
+
+def _to_output(design: Design, point: str, omega: float) -> float:
+    """Output angle per unit behind the limit at a frequency, inner loops taken as ideal."""
+    motor, J, friction = design.motor, design.inertia_kgm2, design.friction
+    inertia = abs(J * (1j * omega) ** 2 + friction.viscous() * 1j * omega)
+    if point == "w_ref":
+        return 1.0 / (omega * design.total_ratio)
+    if point == "i_ref":
+        return (motor.torque_constant_Nm_A or 0.0) / (inertia * design.total_ratio)
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V / (inertia * design.total_ratio)
+    assert motor.resistance_ohm is not None
+    assert motor.inductance_H is not None
+    kM, kE = motor.torque_constant_Nm_A or 0.0, motor.back_emf_constant_Vs_rad or 0.0
+    s = 1j * omega
+    whole = (J * s + friction.viscous()) * (motor.inductance_H * s + motor.resistance_ohm) + kM * kE
+    return abs(kM / (s * whole)) / design.total_ratio
+
+
+def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
+    """Largest step (rad, output) that settles and smallest tried that does not, up to full deflection."""
+    full = design.validation.full_deflection_rad
+    sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS)
+    low, high = 0.0, None
+    while True:
+        bad = np.flatnonzero(~settles(design, sizes, settle_ticks))
+        if not bad.size:
+            if high is None:
+                return None, None
+            low = float(sizes[-1])
+        else:
+            k = int(bad[0])
+            low, high = (float(sizes[k - 1]) if k else low), float(sizes[k])
+        if high - low < CLOSE * high or low == 0.0:
+            return low, high
+        sizes = np.geomspace(low, high, STEPS + 2)[1:-1]
+
+
+def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:
+    """Which steps from rest settle: the error left is small, or at least still falls."""
+    rows = step_rows(design, sizes_rad, settle_ticks)
+    result = run_rows(rows)
+    errors = []
+    for last in (0, 1):
+        low, high = result.span("output_angle_rad", last)
+        errors.append(np.maximum(np.abs(high - sizes_rad), np.abs(low - sizes_rad)))
+    near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design))
+    return result.ok & (near | (errors[0] < LASTING * errors[1]))
+
+
+def _standing(design: Design) -> float:
+    """Error (output, rad) that dry friction can hold up against a controller without integral."""
+    control, friction, motor = design.controller, design.friction, design.motor
+    gain = control.position.gain * (control.velocity.gain if control.velocity else 1.0)
+    if control.velocity is not None and control.velocity.integral_time_s is not None:
+        gain *= 10.0  # the integral brings it on in time
+    per_unit = motor.source_gain_Nm_V or motor.torque_constant_Nm_A or 1.0
+    if motor.resistance_ohm is not None and control.current is None:
+        per_unit /= motor.resistance_ohm
+    dry = friction.dry_Nm(0.0) * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
+    return 2.0 * dry / (per_unit * gain) / design.total_ratio
+
+
+def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Floats:
+    """Runs of steps from rest, long enough to travel and to settle."""
+    rows = repeat_row(design_row(design), sizes_rad.size)
+    way, tick_s = sizes_rad * design.total_ratio, design.controller.period_s
+    travel = way / (full_range(design)["velocity"] * tick_s)
+    swing = 4.0 * np.sqrt(2.0 * way * design.inertia_kgm2 / full_torque_Nm(design)) / tick_s
+    window = np.ceil(np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
+    rows[:, at.TICKS] = np.ceil(2.0 * travel) + 4 * window
+    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window, 1, 0
+    put_step(rows, at.COMMAND, sizes_rad)
+    return rows
+
+
+def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None, str]:
+    """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
+    from nonlinear import commands, simulate
+
+    ticks = step_rows(design, np.array([size_rad]), settle_ticks)[0, at.TICKS]
+    run = simulate(
+        design, commands.step(size_rad), ticks * design.controller.period_s, raise_on_failure=False
+    )
+    error = run.output_angle_rad - size_rad
+    error = error[np.isfinite(error)]
+    crossings = np.flatnonzero(np.diff(np.signbit(error)))
+    limiter = max(run.limits, key=lambda name: run.limits[name].fraction)
+    if crossings.size < 4:
+        return None, None, limiter
+    peaks = np.array([np.abs(error[a + 1 : b + 1]).max() for a, b in pairwise(crossings)])
+    k = int(np.argmin(np.abs(np.log(peaks[1:] / peaks[:-1])))) + 1
+    half = float(crossings[k + 1] - crossings[k]) * run.period_s
+    return 0.5 / half, float(peaks[k]), limiter
