@@ -1,8 +1,8 @@
 """Real numeric arrays out of a MATLAB level 5 file, by a small reader that trusts nothing in it.
 
 A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
-MathWorks, "MAT-File Format" (R2019b), chapter 1. Cells, structures, texts, sparse and complex arrays are passed
-over and named.
+MathWorks, "MAT-File Format" (R2019b), chapter 1. Cells, structures, texts, sparse and complex arrays are
+passed over and named.
 """
 
 from __future__ import annotations

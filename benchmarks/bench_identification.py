@@ -1,0 +1,113 @@
+"""How long identification takes, and how much memory a long record needs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+from benchmarks.row import Row
+
+GROUP = "identification"
+EMPS = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+PEAK = """
+import resource, sys
+from analyses.records import RecordSpec, SignalColumn, TimeColumn, read_csv_record
+time = TimeColumn(column="tick", tick_s=1e-3, wrap=65536.0)
+units = {"current": "A", "speed": "rpm", "angle": "deg"}
+signals = tuple(SignalColumn(name=n, column=n, unit=u) for n, u in units.items())
+record = read_csv_record(sys.argv[1], RecordSpec(time=time, signals=signals), max_rows=500_000)
+counts = record.counts
+assert counts.rows_in == counts.rows_out
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, counts.rows_out)
+"""
+
+
+def rows(quick: bool = False) -> Iterable[Row]:
+    """The rows of this group."""
+    yield from _campaign(quick)
+    if EMPS.exists():
+        yield _emps()
+    yield from _streaming(quick)
+
+
+def _campaign(quick: bool) -> Iterable[Row]:
+    """A campaign of the paper's size, from its files and once they are read."""
+    from actuator_lti import load_design
+    from analyses.identification.campaign import identify_campaign
+    from analyses.records import import_campaign, load_campaign
+    from analyses.virtual_bench import BenchPlan, simulate_bench
+    from analyses.virtual_bench_files import write_bench
+    from analyses.virtual_bench_instruments import measure_bench
+
+    design = load_design("ilr33-amber")
+    plan = BenchPlan(duration_s=4.0 if quick else 20.0)
+    runs = simulate_bench(design, plan)
+    with tempfile.TemporaryDirectory() as folder:
+        path = write_bench(folder, measure_bench(runs, 1)[0], design=design.name, seed=1)
+        start = time.perf_counter()
+        imported = import_campaign(load_campaign(path))
+        read = time.perf_counter()
+        result = identify_campaign(imported, design)
+        done = time.perf_counter()
+    what = f"{len(result.fit.points)} runs of {plan.duration_s:g} s at 1 kHz"
+    yield Row(group=GROUP, name=f"{what}, from files", measured=done - start, unit="s", target=5.0)
+    yield Row(group=GROUP, name=f"{what}, once read", measured=done - read, unit="s", target=5.0)
+
+
+def _emps() -> Row:
+    """The EMPS identification, both friction forms, after import."""
+    from analyses.identification.dynamic import identify_dynamics
+    from analyses.identification.emps import load_emps
+
+    emps = load_emps(EMPS)
+    identify_dynamics(emps.position_m, emps.force_N, emps.period_s)  # the libraries are loaded
+    start = time.perf_counter()
+    for form in ("symmetric", "per-direction"):
+        identify_dynamics(emps.position_m, emps.force_N, emps.period_s, form=form)  # type: ignore[arg-type]
+    seconds = time.perf_counter() - start
+    return Row(
+        group=GROUP, name="EMPS, both friction forms, after import", measured=seconds, unit="s", target=1.0
+    )
+
+
+def _streaming(quick: bool) -> Iterable[Row]:
+    """Peak memory of a process that reads a long file, beside that for a tenth of it."""
+    size = 100_000_000 if quick else 1_000_000_000
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.csv"
+        _write_long(path, size // 10)
+        small, _ = _peak_MB(path)
+        _write_long(path, size)
+        start = time.perf_counter()
+        large, count = _peak_MB(path)
+        seconds = time.perf_counter() - start
+    name = f"CSV of {size / 1e9:g} GB"
+    yield Row(
+        group=GROUP, name=f"{name}: peak memory of the process", measured=large, unit="MB", target=600.0,
+        note=f"{count:.0f} rows, none lost",
+    )  # fmt: skip
+    yield Row(
+        group=GROUP, name=f"{name}: peak memory over that for a tenth of it", measured=large / small, unit="",
+        target=1.5,
+    )  # fmt: skip
+    yield Row(group=GROUP, name=f"{name}: time to read", measured=seconds, unit="s")
+
+
+def _write_long(path: Path, size: int) -> None:
+    """A file of at least ``size`` bytes: one block of 65536 rows over and over, its tick wrapping."""
+    lines = (f"{k},{1.5 + k % 13 / 100:.4f},{900 + k % 7},{k * 17 % 99991}\n" for k in range(65536))
+    block = "".join(lines).encode()
+    with path.open("wb") as stream:
+        stream.write(b"tick,current,speed,angle\n")
+        for _ in range(-(-size // len(block))):
+            stream.write(block)
+
+
+def _peak_MB(path: Path) -> tuple[float, float]:
+    done = subprocess.run([sys.executable, "-c", PEAK, str(path)], capture_output=True, text=True, check=True)
+    peak, count = done.stdout.split()
+    return float(peak), float(count)
