@@ -68,7 +68,7 @@ class GainSetting:
 
 @dataclass(frozen=True)
 class TradeOffPoint:
-    """Best worst-corner phase margin at a bandwidth."""
+    """Largest phase margin that every loop keeps at its worst corner, at a position bandwidth."""
 
     bandwidth_hz: float
     phase_margin_deg: float

@@ -77,7 +77,7 @@ def tune(
     tell(3, 5)
     found = problem.distances(gains[None, :], problem.all_corners)[0]
     tuned = _tuned(problem, gains)
-    curve = trade_off(problem, solution.gains, solution.working[:5]) if settings.curve else ()
+    curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(4, 5)
     requirements = _binding(problem, gains, found)
     checks = nonlinear_checks(tuned, problem, gains, found) if settings.check else ()
@@ -93,7 +93,7 @@ def tune(
         checks,
         curve,
         problem.evaluations,
-        _notes(problem, found),
+        _notes(problem, gains, found),
     )
 
 
@@ -172,7 +172,7 @@ def _settings(
     return tuple(made)
 
 
-def _notes(problem: Problem, found: np.ndarray) -> tuple[str, ...]:
+def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str, ...]:
     notes = [
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
         "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
@@ -180,9 +180,8 @@ def _notes(problem: Problem, found: np.ndarray) -> tuple[str, ...]:
     if found.min() < 0.0:
         missed = [r.id for k, r in enumerate(problem.requirements) if found[:, k].min() < 0.0]
         notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")
-    low = problem.start <= problem.lower * (1 + 1e-9)
-    high = problem.start >= problem.upper * (1 - 1e-9)
-    ends = [path for path, at in zip(problem.paths, low | high, strict=True) if at]
+    at_end = (gains <= problem.lower * (1 + 1e-9)) | (gains >= problem.upper * (1 - 1e-9))
+    ends = [path for path, at in zip(problem.paths, at_end, strict=True) if at]
     if ends:
-        notes.append(f"The rules ask for more than the controller's objects hold: {', '.join(ends)}.")
+        notes.append(f"At the end of what may be set, and so binding too: {', '.join(ends)}.")
     return tuple(notes)

@@ -112,6 +112,7 @@ def maximise(
     start: np.ndarray,
     limits: Callable[[np.ndarray], np.ndarray],
     free: Callable[[np.ndarray], np.ndarray] | None = None,
+    iterations: int = 80,
 ) -> np.ndarray:
     """Maximise the smallest of some functions subject to others being positive.
 
@@ -170,6 +171,6 @@ def maximise(
         cost, np.append(x0, first), jac=cost_slope, method="SLSQP",
         bounds=[*zip(low, high, strict=True), (None, RESERVE if free is None else None)],
         constraints={"type": "ineq", "fun": constraint, "jac": constraint_slope},
-        options={"maxiter": 80, "ftol": 1e-9},
+        options={"maxiter": iterations, "ftol": 1e-9},
     )  # fmt: skip
     return np.exp(np.clip(done.x[:size], low, high))

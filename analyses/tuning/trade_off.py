@@ -1,20 +1,21 @@
-"""The curve between bandwidth and phase margin of the position loop, every other requirement kept."""
+"""Position bandwidth against the smallest phase margin of all loops, other requirements kept."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from analyses.monte_carlo.judging import loops_of
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import TradeOffPoint
 from analyses.tuning.solve import maximise
 
-POINTS = 7
+POINTS = 6
 _SPAN = (0.6, 1.6)
 _MET = -1e-3
 
 
 def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple[TradeOffPoint, ...]:
-    """Best worst-corner phase margin of the position loop for bandwidths around the tuned one.
+    """Largest smallest phase margin (all loops, worst corner) for position bandwidths around the tuned one.
 
     Parameters
     ----------
@@ -25,7 +26,7 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
     """
     others = [
         k for k, r in enumerate(problem.requirements)
-        if not (r.quantity in ("phase_margin", "bandwidth") and r.loop in ("position", None))
+        if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in ("position", None))
     ]  # fmt: skip
     centre = float(np.min(problem.figure("bandwidth", "position", gains[None, :], working)))
     if not np.isfinite(centre):
@@ -42,13 +43,19 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
     return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
 
 
+def _margins(problem: Problem, rows: np.ndarray, working: np.ndarray) -> np.ndarray:
+    """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
+    found = [problem.figure("phase_margin", loop, rows, working) for loop in loops_of(problem.design)]
+    return np.clip(np.concatenate(found, axis=1), -180.0, 180.0)
+
+
 def _better(
     problem: Problem, candidates: list[np.ndarray], working: np.ndarray, wanted_hz: float, others: list[int]
 ) -> np.ndarray:
     """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
     rows = np.array(candidates)
     width = problem.figure("bandwidth", "position", rows, working)
-    margin = problem.figure("phase_margin", "position", rows, working).min(axis=1)
+    margin = _margins(problem, rows, working).min(axis=1)
     short = np.minimum(np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0).min(axis=1) - _MET, 0.0)
     if others:
         kept = problem.distances(rows, working)[:, :, others].min(axis=(1, 2))
@@ -62,8 +69,7 @@ def _best(
     """Largest phase margin at a bandwidth or above, other requirements kept."""
 
     def goal(x: np.ndarray) -> np.ndarray:
-        margin = problem.figure("phase_margin", "position", np.exp(x), working)
-        return np.clip(np.where(np.isfinite(margin), margin, 180.0), -180.0, 180.0) / 45.0
+        return _margins(problem, np.exp(x), working) / 45.0
 
     def limits(x: np.ndarray) -> np.ndarray:
         width = problem.figure("bandwidth", "position", np.exp(x), working)
@@ -72,12 +78,12 @@ def _best(
             kept.append(problem.distances(np.exp(x), working)[:, :, others].reshape(len(x), -1))
         return np.concatenate(kept, axis=1)
 
-    return maximise(problem, start, limits, goal)
+    return maximise(problem, start, limits, goal, iterations=30)
 
 
 def _point(problem: Problem, gains: np.ndarray, working: np.ndarray, others: list[int]) -> TradeOffPoint:
     row = gains[None, :]
     width = float(np.min(problem.figure("bandwidth", "position", row, working)))
-    margin = float(np.min(problem.figure("phase_margin", "position", row, working)))
+    margin = float(_margins(problem, row, working).min())
     kept = problem.distances(row, working)[0][:, others]
     return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))

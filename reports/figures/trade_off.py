@@ -21,7 +21,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     points = data["points"]
     x = [p["bandwidth_hz"] for p in points]
     y = [p["phase_margin_deg"] for p in points]
-    ax.plot(x, y, color=style.BLUE, label="best phase margin at this bandwidth, worst corner")
+    ax.plot(x, y, color=style.BLUE, label="best smallest phase margin, worst corner")
     for ok, marker, colour, label in (
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
@@ -38,7 +38,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
         at = data["chosen"]
         ax.plot([at["bandwidth_hz"]], [at["phase_margin_deg"]], marker="D", markersize=8, color=style.ORANGE,
                 linestyle="none", label="tuned")  # fmt: skip
-    ax.set_xlabel("bandwidth, Hz")
-    ax.set_ylabel("phase margin, deg")
+    ax.set_xlabel("bandwidth of the position loop, Hz")
+    ax.set_ylabel("smallest phase margin of all loops, deg")
     ax.set_title(data["title"])
     ax.legend()

@@ -99,7 +99,7 @@ minimum = "10 dB"
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistence' = '1 ohm' }\n", "resistence"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistance' = '1 V' }\n", "motor.resistance"),
     (HEAD + "[[sweep]]\nparameter = 'motor.resistance'\nvalues = []\n", "values"),
-    (HEAD + "[[grid]]\naxes = [{ parameter = 'limits.voltage', from='1 V', to='9 V', points=0 }]\n", "points"),
+    (HEAD + "[[grid]]\naxes = [{ parameter = 'limits.voltage', from='1 V', to='9 V', points=0}]\n", "points"),
     (HEAD + "[monte_carlo]\nsamples = 0\n", "samples"),
 ])  # fmt: skip
 def test_bad_studies_are_refused_in_one_line(tmp_path, text, message):

@@ -1,0 +1,153 @@
+"""A tuned design: gains in SI and in the controller's objects, what binds, trade-off, nonlinear check."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+
+if TYPE_CHECKING:
+    from analyses.tuning import BindingRequirement, TuningResult
+
+GAIN_COLUMNS = [
+    doc.column("path", "Gain"),
+    doc.column("unit", "Unit"),
+    doc.column("before", "Before", format="sig:4"),
+    doc.column("rule", "By rule", format="sig:4"),
+    doc.column("tuned", "Optimised", format="sig:5"),
+    doc.column("rounded", "Tuned", format="sig:5"),
+    doc.column("object", "Object"),
+    doc.column("steps", "Written", align="right"),
+    doc.column("object_unit", "in"),
+]
+REQUIREMENT_COLUMNS = [
+    doc.column("label", "Requirement"),
+    doc.column("value", "Worst corner", format="sig:4"),
+    doc.column("limit", "Limit", format="sig:4"),
+    doc.column("distance", "Distance", format="sig:3"),
+    doc.column("unit", "Unit"),
+    doc.column("binds", "Binds", format="yesno"),
+    doc.column("corner", "At"),
+]
+CHECK_COLUMNS = [
+    doc.column("corner", "Design"),
+    doc.column("amplitude", "Step", "deg", format="sig:3"),
+    doc.column("rise", "Rise", "ms", format="sig:3"),
+    doc.column("overshoot", "Overshoot", "%", format="fix:1"),
+    doc.column("settling", "Settling 2 %", "ms", format="sig:3"),
+    doc.column("error", "Final error", "%", format="fix:2"),
+    doc.column("limited", "Limiters that acted"),
+]
+
+
+def section(result: TuningResult) -> dict[str, Any]:
+    """Make the section."""
+    blocks = [doc.verdicts(_verdict(r) for r in result.requirements), gains(result), requirements(result)]
+    if result.trade_off:
+        blocks.append(_curve(result))
+    if result.checks:
+        blocks.append(checks(result))
+    blocks += [doc.text(note) for note in result.notes]
+    blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
+    title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
+    return doc.section(
+        "tuning", title, blocks, intro=summary(result), status="pass" if result.feasible else "fail"
+    )
+
+
+def summary(result: TuningResult) -> str:
+    """What came out, in two sentences."""
+    over = f"the nominal design and {result.corners - 1} corners of the tolerance box"
+    binding = [r for r in result.requirements if r.binds]
+    if not result.feasible:
+        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in result.requirements if r.relative < 0.0)
+        return f"No gains meet every requirement over {over}. The best compromise misses {worst}."
+    if not binding:
+        return f"Every requirement is met over {over}, each with a reserve of 30 % or more; none binds."
+    names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
+    return f"Every requirement is met over {over}. Nothing better is possible because of {names}."
+
+
+def _amount(r: BindingRequirement) -> str:
+    if r.distance is None:
+        return "an unstable loop" if r.relative < 0 else "plenty"
+    return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
+
+
+def _verdict(r: BindingRequirement) -> dict[str, Any]:
+    return doc.verdict(
+        f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
+        distance=r.distance, passed=r.relative >= 0.0,
+        reason="" if r.distance is not None else _amount(r),
+    )  # fmt: skip
+
+
+def gains(result: TuningResult) -> dict[str, Any]:
+    """Gains in SI and in the motion controller's objects."""
+    rows = [
+        {
+            "path": g.path, "unit": g.unit, "before": g.before, "rule": g.by_rule, "tuned": g.tuned,
+            "rounded": g.rounded, "object": g.object or None, "steps": g.steps, "object_unit": g.object_unit,
+        }
+        for g in result.gains
+    ]  # fmt: skip
+    note = "Tuned: rounded to the steps of the motion controller's objects, where the design has them."
+    return doc.table("Gains", GAIN_COLUMNS, rows, note)
+
+
+def requirements(result: TuningResult) -> dict[str, Any]:
+    """Every requirement at its worst corner."""
+    rows = [
+        {
+            "label": r.label, "value": r.value, "limit": r.limit, "distance": r.distance,
+            "unit": "" if r.unit == "1" else r.unit, "binds": r.binds, "corner": _corner(r),
+            "_status": "pass" if r.relative >= 0.0 else "fail",
+        }
+        for r in result.requirements
+    ]  # fmt: skip
+    return doc.table("Requirements at their worst corner", REQUIREMENT_COLUMNS, rows)
+
+
+def _corner(r: BindingRequirement) -> str:
+    return "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
+
+
+def _curve(result: TuningResult) -> dict[str, Any]:
+    limits = {(r.id, r.unit): r.limit for r in result.requirements}
+    wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
+    width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
+    margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
+    data = {
+        "title": "What the position loop can trade",
+        "points": [
+            {"bandwidth_hz": p.bandwidth_hz, "phase_margin_deg": p.phase_margin_deg, "feasible": p.feasible}
+            for p in result.trade_off
+        ],
+        "bandwidth_min_hz": next(iter(width), None),
+        "phase_margin_min_deg": max(margin, default=None),
+        "chosen": None,
+    }
+    return doc.figure(
+        "trade_off", data,
+        caption="Position bandwidth against the phase margin that every loop keeps at its worst corner.",
+        alt=f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth.",
+    )  # fmt: skip
+
+
+def checks(result: TuningResult) -> dict[str, Any]:
+    """The nonlinear check."""
+    linear = result.design.axis == "linear"
+    columns = [{**c, "unit": "mm"} if linear and c["key"] == "amplitude" else c for c in CHECK_COLUMNS]
+    rows = [
+        {
+            "corner": c.corner, "amplitude": c.amplitude_rad * (1e3 if linear else math.degrees(1.0)),
+            "rise": None if c.rise_time_s is None else 1e3 * c.rise_time_s, "overshoot": c.overshoot_percent,
+            "settling": None if c.settling_time_s is None else 1e3 * c.settling_time_s,
+            "error": c.final_error_percent, "limited": c.limited or "none",
+            "_status": "pass" if c.settling_time_s is not None else "warn",
+        }
+        for c in result.checks
+    ]  # fmt: skip
+    note = "Steps from rest in the nonlinear model, dry friction and every limit on. A dash: not reached."
+    return doc.table("Checked in the nonlinear model", columns, rows, note)

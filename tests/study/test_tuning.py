@@ -1,0 +1,214 @@
+"""Tuning against closed forms, refusals that say by how much, gains inside the controller's objects."""
+
+import cmath
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.design.model import (
+    Controller,
+    Design,
+    Friction,
+    Limits,
+    Motor,
+    PositionLoop,
+    Requirement,
+    Validation,
+)
+from actuator_lti.errors import InputError
+from analyses.tuning import (
+    TuningSettings,
+    integrator_gain,
+    magnitude_optimum,
+    pi_for_crossover,
+    rule_gains,
+    symmetric_optimum,
+    tune,
+)
+from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.solve import maximise
+from analyses.tuning.wishes import read_requirement
+
+PERIOD, DELAY = 1e-3, 3e-3
+QUICK = TuningSettings(curve=False, check=False)
+
+
+def need(quantity, minimum=None, maximum=None, loop="position", unit="deg"):
+    return Requirement(
+        id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, maximum=maximum, loop=loop
+    )
+
+
+def integrator(*requirements):
+    """K T z^-3/(z - 1): a drag so strong that the speed follows the drive at once, four samples in all."""
+    return Design(
+        name="integrator", title="", motor=Motor(rotor_inertia_kgm2=1e-9, source_gain_Nm_V=1.0),
+        friction=Friction(viscous_Nms_rad=1.0), limits=Limits(voltage_V=10.0),
+        controller=Controller(period_s=PERIOD, computing_delay_s=DELAY, position=PositionLoop(gain=5.0)),
+        validation=Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("margin", [30.0, 45.0, 60.0])
+def test_an_integrator_with_delay_gets_its_known_gain(margin):
+    """The largest bandwidth with a phase margin is at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
+    design = integrator(need("phase_margin", margin))
+    problem = problem_of(design, loop_requirements(design), {"control.position.gain": 20.0})
+    corners = problem.all_corners
+    gains = maximise(
+        problem, problem.start,
+        lambda x: problem.distances(np.exp(x), corners).reshape(len(x), -1),
+        lambda x: np.exp(x) / 100.0,
+    )  # fmt: skip
+    assert gains[0] == pytest.approx(integrator_gain(margin, DELAY, PERIOD), rel=1e-3)
+
+
+def test_the_closed_form_of_the_integrator_is_the_margin_engine_s():
+    gain = integrator_gain(60.0, DELAY, PERIOD)
+    design = integrator()
+    changed = replace(design, controller=replace(design.controller, position=PositionLoop(gain=gain)))
+    found = stability_margins(assemble_loops(changed).position.open_loop)
+    assert found.phase_margin_deg == pytest.approx(60.0, abs=1e-4)
+    assert integrator_gain(60.0, 0.01) * 0.01 == pytest.approx(math.pi / 6)
+
+
+def test_what_cannot_be_met_is_refused_with_its_distance():
+    """A phase margin of 60 deg and a bandwidth of 60 Hz exclude each other behind 3.5 ms of delay."""
+    reachable = tune(integrator(need("phase_margin", 60.0), need("bandwidth", 10.0, unit="Hz")), QUICK)
+    assert reachable.feasible
+    asked = tune(integrator(need("phase_margin", 60.0), need("bandwidth", 60.0, unit="Hz")), QUICK)
+    assert not asked.feasible
+    both = {r.id: r for r in asked.requirements}
+    assert all(r.binds for r in both.values())
+    assert both["position-phase_margin"].relative == pytest.approx(
+        both["position-bandwidth"].relative, abs=0.01
+    )
+    width = both["position-bandwidth"]
+    assert width.value == pytest.approx(60.0 + width.distance)
+    loops = assemble_loops(asked.design)
+    truth = stability_margins(loops.position.open_loop).phase_margin_deg
+    assert both["position-phase_margin"].value == pytest.approx(truth, abs=1e-3)
+    assert "Cannot be met together" in asked.notes[0]
+
+
+def test_the_cascade_of_mathworks():
+    """Designing Cascade Control System with PI Controllers: single PI, and the inner PI (cases.md, G4)."""
+    omega = 0.20007
+    plant = 3 / (1j * omega + 2) * 10 / (1j * omega + 1) ** 3
+    gain, time = pi_for_crossover(plant, omega, 59.99)
+    assert (gain, time) == (pytest.approx(0.0119, abs=5e-5), pytest.approx(0.849, abs=2e-3))
+    gain, time = pi_for_crossover(3 / (1.99966j + 2), 1.99966, 60.005)
+    assert (gain, time) == (pytest.approx(0.244, abs=5e-4), pytest.approx(0.134, abs=5e-4))
+    with pytest.raises(InputError, match="lag"):
+        pi_for_crossover(-1j * 0.1, 1.0, 120.0)
+
+
+def test_magnitude_optimum_has_a_damping_of_0_707():
+    gain, time = magnitude_optimum(2.0, 0.05, 0.01)
+    s = 1j * 3.0
+    loop = gain * (1 + 1 / (time * s)) * 2.0 / (1 + 0.05 * s) / (1 + 0.01 * s)
+    assert loop == pytest.approx(1 / (2 * 0.01 * s * (1 + 0.01 * s)))
+
+
+@pytest.mark.parametrize(("a", "margin"), [(2.0, 36.8699), (2 + math.sqrt(3), 60.0)])
+def test_symmetric_optimum_has_its_margin_at_its_crossover(a, margin):
+    gain, time = symmetric_optimum(4.0, 0.01, a)
+    s = 1j / (a * 0.01)
+    loop = gain * (1 + 1 / (time * s)) * 4.0 / s / (1 + 0.01 * s)
+    assert abs(loop) == pytest.approx(1.0)
+    assert 180 + math.degrees(cmath.phase(loop)) == pytest.approx(margin, abs=1e-4)
+
+
+def test_the_rules_of_the_baseline():
+    """R/(2 T_sigma) L/R = 20 mohm with T_sigma 150 us: the current gain that the baseline has."""
+    rules = rule_gains(load_design("ilr33-amber")).values
+    assert rules["control.current.gain"] == pytest.approx(0.02)
+    assert rules["control.current.integral_time"] == pytest.approx(6e-6 / 0.055)
+
+
+@pytest.fixture(scope="module")
+def tuned():
+    return tune(load_design("ilr33-amber"), TuningSettings(
+        (need("bandwidth", 60.0, unit="Hz"), need("phase_margin", 60.0, loop="every"))))  # fmt: skip
+
+
+def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
+    from actuator_lti.design import with_values
+
+    assert tuned.feasible
+    assert tuned.corners == 17
+    for r in tuned.requirements:
+        loops = assemble_loops(with_values(tuned.design, dict(r.corner)) if r.corner else tuned.design)
+        margins = {name: stability_margins(loop.open_loop) for name, loop in loops.present.items()}
+        if r.id == "every-phase_margin":
+            assert min(m.phase_margin_deg for m in margins.values()) == pytest.approx(r.value, rel=1e-6)
+        if r.id == "gain-margin":
+            assert min(m.gain_margin_db for m in margins.values()) == pytest.approx(r.value, rel=1e-6)
+
+
+def test_gains_are_whole_steps_of_the_controller_s_objects(tuned):
+    from actuator_lti.design.objects import export_objects
+
+    exported = export_objects(tuned.design)
+    gains = {g.object: g for g in tuned.gains}
+    written = {item.label: item.value for item in exported.objects.values}
+    for label, gain in gains.items():
+        assert written[label] == gain.steps
+    assert not {r.label for r in exported.rounded} & set(gains)
+    assert 1 <= gains["0x2348.01"].steps <= 250
+    assert gains["0x2342.02"].steps >= 150
+
+
+def test_bandwidth_is_paid_for_in_phase_margin(tuned):
+    curve = [p for p in tuned.trade_off if p.feasible]
+    assert len(curve) >= 4
+    width = [p.bandwidth_hz for p in curve]
+    margin = [p.phase_margin_deg for p in curve]
+    assert width == sorted(width)
+    assert margin == sorted(margin, reverse=True)
+
+
+def test_the_nonlinear_check_settles(tuned):
+    assert len(tuned.checks) == 4
+    assert all(c.settling_time_s is not None for c in tuned.checks)
+    assert any(c.limited for c in tuned.checks)
+
+
+def test_the_command_writes_a_design_that_is_what_it_says(tmp_path):
+    from reports.cli.app import build
+
+    words = [
+        "tune",
+        "--require",
+        "position.bandwidth>=2000 Hz",
+        "--no-curve",
+        "--out",
+        str(tmp_path),
+        "--quiet",
+    ]
+    done = CliRunner().invoke(build(), words)
+    assert done.exit_code == 1
+    assert "misses" in done.output
+    made = json.loads((tmp_path / "tune.json").read_text())
+    assert made["verdict"]["passed"] is False
+    gains = {row["path"]: row["rounded"] for row in made["sections"][0]["blocks"][1]["rows"]}
+    assert load_design(tmp_path / "tuned.toml").controller.position.gain == gains["control.position.gain"]
+
+
+@pytest.mark.parametrize(("words", "message"), [
+    ("bandwidth>30", "allowed"), ("tail.bandwidth>=3 Hz", "current, velocity, position"),
+    ("position.colour>=3 Hz", "bandwidth"), ("position.bandwidth>=3 kg", "kg"),
+])  # fmt: skip
+def test_wishes_that_make_no_sense_are_refused(words, message):
+    with pytest.raises(InputError, match=message):
+        read_requirement(words, load_design("ilr33-amber"))
+
+
+def test_a_design_without_requirements_on_loops_is_refused():
+    with pytest.raises(InputError, match="no requirement"):
+        tune(integrator())
