@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import gain_crossings
-from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form, from_rational
+from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, delay_form, from_rational
 from actuator_lti.margins.delayed import delayed_extreme, delayed_gain_crossings, low_frequency
 from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
-from actuator_lti.margins.loop import RationalLoop, rational_loop
+from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import reach, subdivided
@@ -178,7 +179,7 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
 
 
 def _db(inverse: float) -> float:
-    return -20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
+    return 0.0 - 20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
 
 
 def _dc(form: DelayForm) -> float:
@@ -210,33 +211,44 @@ def _rational_falls(loop: RationalLoop, level: float) -> list[float]:
 
 
 def _first_turn(form: DelayForm, dc: float) -> float | None:
-    """First x at which the phase, followed from zero frequency, falls below -90 deg."""
-    from scipy.optimize import brentq
+    """First x at which the phase, followed from zero frequency, falls below -90 deg.
 
+    The phase is followed as long as the gain is above 1e-6 of its value at zero frequency.
+    """
     low, _ = low_frequency(form)
     high = math.pi if form.sampled else low * 10.0
-    bare_slope = 1e4 * low
-    phase_start = 0.0
-    start_x, start_value = low, complex(border_values(form, np.array([low]))[0]) * np.sign(dc)
-    phase_start = float(np.angle(start_value))
-    for _ in range(1 if form.sampled else 14):
-        edges = np.geomspace(start_x, high, 12)
-        found = subdivided(form, edges, lambda c: reach(form, c) < 0.3 * np.abs(c.L))
-        values = np.concatenate(([start_value], found.L * np.sign(dc)))
-        x = np.concatenate(([start_x], found.x))
-        phase = phase_start + np.concatenate(([0.0], np.cumsum(np.angle(values[1:] * values[:-1].conj()))))
-        below = np.flatnonzero(phase < -0.5 * np.pi)
-        if below.size:
+    floor = 1e-6 * abs(dc)
+
+    def resolved(found: Cells) -> Mask:
+        size, R = np.abs(found.L), reach(form, found)
+        return (R < 0.3 * size) | (size + R < floor)
+
+    x0, L0 = low, complex(border_values(form, np.array([low]))[0]) * float(np.sign(dc))
+    phase0 = float(np.angle(L0))
+    for _ in range(1 if form.sampled else 20):
+        found = subdivided(form, np.geomspace(x0, high, 12), resolved)
+        L = np.concatenate(([L0], found.L * np.sign(dc)))
+        x = np.concatenate(([x0], found.x))
+        phase = phase0 + np.concatenate(([0.0], np.cumsum(np.angle(L[1:] * L[:-1].conj()))))
+        low_gain = np.abs(L) < floor
+        below = np.flatnonzero((phase < -0.5 * np.pi) & ~np.maximum.accumulate(low_gain))
+        if below.size and below[0] > 0:
             k = int(below[0])
-            base, reference = float(phase[k - 1]), complex(values[k - 1])
-
-            def excess(at: float, base: float = base, reference: complex = reference) -> float:
-                L = complex(border_values(form, np.array([at]))[0]) * np.sign(dc)
-                return base + float(np.angle(L * reference.conjugate())) + 0.5 * np.pi
-
-            return float(brentq(excess, x[k - 1], x[k], xtol=1e-300, rtol=1e-14))
-        if form.sampled or (abs(values[-1]) < 1e-9 * abs(dc) and high > bare_slope):
-            break
-        start_x, start_value, phase_start = float(x[-1]), complex(values[-1]), float(phase[-1])
+            return _turn_between(
+                form, (float(x[k - 1]), float(x[k])), complex(L[k - 1]), float(phase[k - 1]), dc
+            )
+        if low_gain.any():
+            return None
+        x0, L0, phase0 = float(x[-1]), complex(L[-1]), float(phase[-1])
         high *= 10.0
     return None
+
+
+def _turn_between(
+    form: DelayForm, bracket: tuple[float, float], L_before: complex, phase_before: float, dc: float
+) -> float:
+    def excess(x: float) -> float:
+        L = complex(border_values(form, np.array([x]))[0]) * float(np.sign(dc))
+        return phase_before + float(np.angle(L * L_before.conjugate())) + 0.5 * np.pi
+
+    return float(brentq(excess, *bracket, xtol=1e-300, rtol=1e-14))

@@ -57,7 +57,9 @@ class _Candidates:
         return self.x.size
 
 
-def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical_x: Real) -> Crossings:
+def find_crossings(
+    loop: RationalLoop, circles: Circles, border_x: Real, typical_x: Real, floor_x: float
+) -> Crossings:
     """Find every crossing of the unit circle and of the real axis with 0 < x < end.
 
     Parameters
@@ -68,6 +70,8 @@ def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical
         Poles on the border, 0 < x < end.
     typical_x : array
         Further frequencies at which to look at the signs.
+    floor_x : float
+        Below this, where a multiple pole at zero frequency is scattered, L only follows that pole.
 
     Raises
     ------
@@ -78,8 +82,8 @@ def find_crossings(loop: RationalLoop, circles: Circles, border_x: Real, typical
     if gain_zeros is None:
         raise NumericalError("the gain of the loop is one at every frequency: it has no phase margin")
     real_zeros = circles.real_axis()
-    gain = _candidates(gain_zeros, border_x, loop.in_z)
-    real = _candidates(_NONE if real_zeros is None else real_zeros, border_x, loop.in_z)
+    gain = _candidates(gain_zeros, border_x, loop.in_z, floor_x)
+    real = _candidates(_NONE if real_zeros is None else real_zeros, border_x, loop.in_z, floor_x)
     x = np.concatenate((gain.samples, real.samples, typical_x))
     x.sort()
     L = loop.response(x)
@@ -103,7 +107,7 @@ def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
     zeros = circles.circle(1.0, 0.0, -1.0)
     if zeros is None:
         return np.empty(0)
-    found = _candidates(zeros, np.empty(0), loop.in_z)
+    found = _candidates(zeros, np.empty(0), loop.in_z, 0.0)
     if not found.count:
         return np.empty(0)
     x = found.samples
@@ -127,8 +131,10 @@ def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
     return np.where((at > low) & (at < high) & ~found.is_pole[k], at, np.sqrt(low * high))
 
 
-def _candidates(zeros: Complex, border_x: Real, in_z: bool) -> _Candidates:
+def _candidates(zeros: Complex, border_x: Real, in_z: bool, floor_x: float) -> _Candidates:
     near = on_axis(zeros)
+    if floor_x:
+        near = near[near.imag > warped(floor_x, in_z)]
     w, touch = near.imag, np.abs(near.real) <= _POSSIBLE_TOUCH * near.imag
     if (
         w.size > 1 and (w[1:] - w[:-1] <= _SAME * w[1:]).any()

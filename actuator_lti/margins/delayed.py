@@ -11,9 +11,9 @@ from scipy.optimize import minimize_scalar
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.collocation import closed_loop_matrix, open_loop_matrix, points_for
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, values
-from actuator_lti.margins.extremes import COMPLEMENTARY, DISK, MODULUS, PEAK, Criterion
+from actuator_lti.margins.extremes import COMPLEMENTARY, DISK, FAR, MODULUS, PEAK, Criterion
 from actuator_lti.margins.loop import Complex, Mask, Real
-from actuator_lti.margins.nyquist import _arc, _turn
+from actuator_lti.margins.nyquist import _arc, _turn, slope_at_dc
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
 from actuator_lti.margins.rational import delay_margins, verdict_of
 from actuator_lti.margins.results import (
@@ -38,6 +38,7 @@ class _Setting:
     high: float  # x beyond which the gain stays below the floor, or pi
     order: int  # of the pole at zero frequency in L
     hidden: int
+    listed_to: float = 0.0  # x up to which crossings of the real axis are listed however small the gain
 
 
 def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
@@ -47,7 +48,7 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     setting = _setting(form, band_rad_s)
     found = _cells(setting)
     R = reach(form, found)
-    no_gain, no_phase = _excluded(found, R)
+    no_gain, no_phase = _excluded(found, R, setting.listed_to)
     gain_x, gain_touch = crossings(form, found, GAIN, no_gain)
     phase_x, phase_touch = crossings(form, found, PHASE, no_phase)
     count = _nyquist(setting, found)
@@ -57,34 +58,28 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
 
 
 def _setting(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> _Setting:
-    slow = open_loop_matrix(form, 24)
-    poles = sorted_poles(slow, form.sampled)
-    sizes = (
-        np.abs(np.log(np.where(poles.values == 0.0, 1e-300, poles.values)))
-        if form.sampled
-        else np.abs(poles.values)
-    )
-    at_dc = sum(pole.multiplicity for pole in poles.border if pole.x == 0.0)
-    sizes = np.sort(sizes[sizes > 0.0])
-    physical = sizes[at_dc:] if at_dc and sizes.size > at_dc else sizes
-    low = 1e-3 * float(physical.min()) if physical.size else 1e-3
+    poles = sorted_poles(open_loop_matrix(form, 24), form.sampled, gather=True)
+    at_dc = poles.at_dc
+    with np.errstate(divide="ignore"):
+        sizes = np.abs(np.log(poles.values)) if form.sampled else np.abs(poles.values)
+    sizes = sizes[(sizes > 0.0) & np.isfinite(sizes)]
+    low = 1e-3 * float(sizes.min()) if sizes.size else 1e-3
     longest = max([form.series, *form.delays.tolist()], default=0.0)
     if longest:
         low = min(low, 1e-2 / longest)
     order, hidden = 0, 0
     if at_dc:
-        low, order = _order_at_dc(form, low)
+        low, order = _order_at_dc(form.without_series(), low, at_dc)
         hidden = at_dc - order
         if hidden not in (0, 1):
             raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
     if form.sampled:
-        return _Setting(form, poles, low, math.pi, order, hidden)
+        return _Setting(form, poles, low, math.pi, order, hidden, math.pi)
     if not tail:
         return _Setting(form, poles, low, math.inf, order, hidden)
     high = _tail(form, max(float(sizes.max()) if sizes.size else 0.0, low * 10.0))
-    if band is not None:
-        high = max(high, float(band[1]))
-    return _Setting(form, poles, low, high, order, hidden)
+    listed_to = 0.0 if band is None else float(band[1])
+    return _Setting(form, poles, low, max(high, listed_to), order, hidden, listed_to)
 
 
 def low_frequency(form: DelayForm) -> tuple[float, int]:
@@ -93,13 +88,14 @@ def low_frequency(form: DelayForm) -> tuple[float, int]:
     return setting.low, setting.order
 
 
-def _order_at_dc(form: DelayForm, low: float) -> tuple[float, int]:
-    bare = form.without_series()
+def _order_at_dc(form: DelayForm, low: float, most: int) -> tuple[float, int]:
+    """A frequency at which L already follows its pole at zero, and the order of that pole."""
+    order, _ = slope_at_dc(lambda x: border_values(form, x), 10.0 * low, most)
     for _ in range(14):
-        L = border_values(bare, np.array([low, 0.1 * low]))
+        L = border_values(form, np.array([low, 0.1 * low]))
         slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
-        if abs(slope - round(slope)) < 1e-3 and (round(slope) <= 0 or abs(L[0]) > 1e3):
-            return low, max(round(slope), 0)
+        if abs(slope - order) < 2e-3 and (not order or abs(L[0]) > 1e3):
+            return low, order
         low *= 0.1
     raise InputError("the loop has a pole at zero frequency that is almost cancelled: cancel it first")
 
@@ -137,11 +133,11 @@ def _tail(form: DelayForm, start: float) -> float:
     )
 
 
-def _excluded(found: Cells, R: Real) -> tuple[Mask, Mask]:
+def _excluded(found: Cells, R: Real, listed_to: float) -> tuple[Mask, Mask]:
     size = np.abs(found.L)
     no_gain = (size - found.spread > 1.0) | (size + found.spread < 1.0)
     to_axis = np.where(found.L.real < 0.0, np.abs(found.L.imag), size)
-    return no_gain, (to_axis > R) | (size + R < FLOOR)
+    return no_gain, (to_axis > R) | ((size + R < FLOOR) & (found.x > listed_to))
 
 
 def _cells(setting: _Setting) -> Cells:
@@ -149,7 +145,7 @@ def _cells(setting: _Setting) -> Cells:
 
     def resolved(found: Cells) -> Mask:
         R = reach(form, found)
-        no_gain, no_phase = _excluded(found, R)
+        no_gain, no_phase = _excluded(found, R, setting.listed_to)
         turns = 0.7 * np.abs(1.0 + found.L) > R
         return turns & ((RESOLVED * np.abs(found.L) >= R) | (no_gain & no_phase))
 
@@ -175,7 +171,7 @@ def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
     """Frequencies at which the gain crosses ``level``, in order (x)."""
     scaled = replace(form, C1=form.C1 / level, D11=form.D11 / level, D12=form.D12 / level)
     found = _cells(_setting(scaled, None))
-    x, touch = crossings(scaled, found, GAIN, _excluded(found, reach(scaled, found))[0])
+    x, touch = crossings(scaled, found, GAIN, _excluded(found, reach(scaled, found), 0.0)[0])
     return x[~touch].tolist() if x.size else []
 
 
@@ -239,11 +235,8 @@ def _smallest(setting: _Setting, found: Cells, criterion: Criterion) -> tuple[fl
 
 
 def _end_values(setting: _Setting) -> tuple[list[float], Complex]:
-    x: list[float] = []
-    L: list[complex] = []
-    if setting.order == 0:
-        x.append(0.0)
-        L.append(_dc(setting))
+    x: list[float] = [0.0]
+    L: list[complex] = [FAR if setting.order else _dc(setting)]
     if setting.form.sampled:
         x.append(math.pi)
         L.append(complex(border_values(setting.form, np.array([math.pi]))[0]))
@@ -317,7 +310,7 @@ def _assembled(
         return StabilityMargins(
             None, verdict, (), (), (), None, None, None, agreement=agreement, notes=tuple(notes), **common
         )  # type: ignore[arg-type]
-    gain_margins = _gain_margins(setting, phases, (low, high))
+    gain_margins = _gain_margins(setting, phases, (low, high), band is not None or form.sampled)
     phase_margins = _phase_margins(form, gains, (low, high))
     return StabilityMargins(
         stable=stable,
@@ -335,7 +328,7 @@ def _assembled(
 
 
 def _gain_margins(
-    setting: _Setting, phases: tuple[Real, Mask], band: tuple[float, float]
+    setting: _Setting, phases: tuple[Real, Mask], band: tuple[float, float], listed_all: bool
 ) -> tuple[GainMargin, ...]:
     form = setting.form
     unit = 1.0 if form.period_s is None else 1.0 / form.period_s
@@ -344,7 +337,7 @@ def _gain_margins(
         out.append(GainMargin(-1.0 / _dc(setting), 0.0))
     x, touch = phases
     for at, L, flat in zip(x, border_values(form, x), touch, strict=True):
-        if band[0] <= at * unit <= band[1]:
+        if band[0] <= at * unit <= band[1] and (listed_all or abs(L) >= FLOOR):
             out.append(GainMargin(float(1.0 / abs(L)), float(at) * unit, bool(flat)))
     return tuple(out)
 

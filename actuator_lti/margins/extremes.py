@@ -13,6 +13,7 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 _BELOW = 1e-8  # relative: how much lower a second place may be without being found
 _ROUNDS = 30
+FAR = 1e300  # stands for L at a pole on the end of the axis: T = 1, disk distance 2
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.crossings import Crossings
-from actuator_lti.margins.loop import RationalLoop
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import BorderPole, SortedPoles
 
 _FAR = 1e3
 _SMALLEST = 1e-13
+
+
+def slope_at_dc(response: Callable[[Real], Complex], start: float, most: int) -> tuple[int, complex]:
+    """Order of the pole of L at zero frequency, from the steepest whole slope below ``start``, and L there.
+
+    Parameters
+    ----------
+    response : callable
+        L on the border of stability.
+    start : float
+        Below every other pole.
+    most : int
+        Poles that there are.
+
+    Raises
+    ------
+    InputError
+        No slope is a whole number: the pole is all but cancelled.
+    """
+    x = start * 10.0 ** (-0.5 * np.arange(20))
+    L = response(x)
+    slope = 2.0 * np.log10(np.abs(L[1:]) / np.abs(L[:-1]))
+    whole = np.flatnonzero((np.abs(slope - np.round(slope)) < 0.01) & (np.round(slope) <= most))
+    if not whole.size:
+        raise InputError(
+            "a pole at zero frequency is cancelled, all but completely: cancel it in the loop first"
+        )
+    order = int(np.round(slope[whole]).max())
+    k = int(whole[np.round(slope[whole]) == order][0])
+    return max(order, 0), complex(L[k + 1])
 
 
 def nyquist_count(
@@ -46,7 +78,7 @@ def nyquist_count(
     ]
     stops += [(pole.x, 0j, pole) for pole in inner]
     stops.sort(key=lambda stop: stop[0])
-    angle, last = _start(loop, stops[0], visible_at_dc, L_dc)
+    angle, last = _start(loop, stops[0], visible_at_dc, L_dc, poles.cloud)
     for k, (x, F, pole) in enumerate(stops):
         if pole is None:
             angle += _turn(last, F)
@@ -73,11 +105,15 @@ def _arc(start: complex, stop: complex, about: float) -> float:
 
 
 def _start(
-    loop: RationalLoop, first: tuple[float, complex, BorderPole | None], order: int, L_dc: complex
+    loop: RationalLoop,
+    first: tuple[float, complex, BorderPole | None],
+    order: int,
+    L_dc: complex,
+    cloud: float,
 ) -> tuple[float, complex]:
     if not order:
         return 0.0, 1.0 + L_dc.real
-    r = 1e-2 * first[0]
+    r = max(1e-2 * first[0], min(10.0 * cloud, 0.5 * first[0]))
     while r > _SMALLEST * first[0]:
         real_point = np.array([np.exp(r) if loop.in_z else r + 0j], dtype=complex)
         on_real, on_axis = complex(loop.at(real_point)[0]), complex(loop.response(np.array([r]))[0])

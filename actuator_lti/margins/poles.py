@@ -12,6 +12,8 @@ from actuator_lti.margins.loop import Complex, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
 _SUSPICIOUS = 1e-5
+_SCATTER = 1.0
+_MOST_INTEGRATORS = 6
 
 
 @dataclass(frozen=True)
@@ -36,12 +38,21 @@ class SortedPoles:
         Those on the border as far as double precision can tell, x >= 0 (conjugates left out).
     border_count : int
         How many these are, conjugates counted.
+    cloud : float
+        How far the eigenvalues of a multiple pole at zero frequency are scattered about it by rounding:
+        nearer than some times that, the response says nothing.
     """
 
     values: Complex
     unstable: int
     border: tuple[BorderPole, ...]
     border_count: int = 0
+    cloud: float = 0.0
+
+    @property
+    def at_dc(self) -> int:
+        """Multiplicity of the pole at zero frequency."""
+        return sum(pole.multiplicity for pole in self.border if pole.x == 0.0)
 
 
 def eigenvalues(A: Real) -> Complex:
@@ -54,11 +65,21 @@ def eigenvalues(A: Real) -> Complex:
     return re + 1j * im
 
 
-def sorted_poles(A: Real, in_z: bool) -> SortedPoles:
+def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     """Sort the eigenvalues of A (balanced) by the border of stability.
 
     An eigenvalue is on the border where its distance is below its own error bound,
     10 n eps (|v|* |A| |w|) / |v* w| with the left and right eigenvectors v and w, entry by entry.
+
+    Parameters
+    ----------
+    A : array (n, n)
+        State matrix.
+    in_z : bool
+        The border is the unit circle, not the imaginary axis.
+    gather : bool
+        Take eigenvalues as close to zero frequency as a multiple pole there is scattered by rounding for
+        that pole (for open loops, where nothing else hangs on it).
     """
     values = eigenvalues(A)
     if not values.size:
@@ -68,17 +89,39 @@ def sorted_poles(A: Real, in_z: bool) -> SortedPoles:
     suspicious = np.abs(distance) <= _SUSPICIOUS * scale
     if not suspicious.any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)), ())
-    exact = (values == 1.0) if in_z else (values == 0.0)
-    if (exact == suspicious).all():
-        on_border, radius = exact, np.zeros(values.size)
+    at_dc = (values == 1.0) if in_z else (values == 0.0)
+    radius, cloud = np.zeros(values.size), 0.0
+    if (at_dc == suspicious).all():
+        on_border = at_dc
     else:
         values, radius = _with_error_bounds(A)
+        if gather:
+            values, radius, cloud = _gathered(values, radius, float(np.abs(A).max()), in_z)
         distance = np.abs(values) - 1.0 if in_z else values.real
         on_border = np.abs(distance) <= radius
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
-    return SortedPoles(
-        values, unstable, _clusters(values, radius, on_border, in_z), int(np.count_nonzero(on_border))
-    )
+    border = _clusters(values, radius, on_border, in_z)
+    return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), cloud)
+
+
+def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[Complex, Real, float]:
+    """Put the eigenvalues of a multiple pole at zero frequency there; and how far they were scattered.
+
+    A defective eigenvalue of multiplicity m is scattered by about (eps norm)^(1/m) next^((m - 1)/m), with
+    the distance ``next`` to the next eigenvalue.
+    """
+    centre = 1.0 if in_z else 0.0
+    distance = np.abs(values - centre)
+    order = distance.argsort()
+    for m in range(min(_MOST_INTEGRATORS, values.size), 0, -1):
+        beyond = float(distance[order[m]]) if m < values.size else norm
+        reach = float(distance[order[m - 1]])
+        scatter = _SCATTER * (_EPS * norm) ** (1.0 / m) * beyond ** (1.0 - 1.0 / m)
+        if reach <= (scatter if m > 1 else radius[order[0]]) and reach <= 1e-4 * beyond:
+            values, radius = values.copy(), radius.copy()
+            values[order[:m]], radius[order[:m]] = centre, 0.0
+            return values, radius, reach
+    return values, radius, 0.0
 
 
 def _with_error_bounds(A: Real) -> tuple[Complex, Real]:

@@ -10,9 +10,9 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import Crossings, find_crossings
-from actuator_lti.margins.extremes import DISK, MODULUS, Criterion, smallest
+from actuator_lti.margins.extremes import DISK, FAR, MODULUS, Criterion, smallest
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
-from actuator_lti.margins.nyquist import nyquist_count
+from actuator_lti.margins.nyquist import nyquist_count, slope_at_dc
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
 from actuator_lti.margins.results import (
     Agreement,
@@ -29,6 +29,7 @@ _HIDDEN = (
 )
 
 _WIDE = 1e11
+_FLOOR = 30.0  # times the scatter of a multiple pole at zero frequency: below, no crossing is looked for
 _BELOW = np.array([0.01, 0.05, 0.2, 0.5])
 _ABOVE = np.array([2.0, 5.0, 20.0, 100.0])
 
@@ -60,7 +61,7 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     if not loop.order or not loop.b.any() or not loop.c.any():
         return _constant(loop)
-    poles = sorted_poles(loop.A, loop.in_z)
+    poles = sorted_poles(loop.A, loop.in_z, gather=True)
     closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     end_x = loop.end
     inner = np.array([pole.x for pole in poles.border if 0.0 < pole.x < end_x])
@@ -100,7 +101,7 @@ class _Inspected:
 
 def _inspect(loop: RationalLoop, poles: SortedPoles, inner: Real, careful: bool) -> _Inspected:
     circles = Circles(loop, poles.values, careful)
-    found = find_crossings(loop, circles, inner, _typical(poles, loop.in_z))
+    found = find_crossings(loop, circles, inner, _typical(poles, loop.in_z), _FLOOR * poles.cloud)
     ends = _ends(loop, poles, found)
     count = nyquist_count(loop, found, poles, ends.dc_order, ends.dc or 0j, ends.end or 0j)
     return _Inspected(circles, found, ends, count)
@@ -117,8 +118,8 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     x = np.concatenate((around * 0.7, np.minimum(around * 1.4, 0.5 * (around + min(end_x, 1e300)))))
     L = loop.response(x)
     x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
-    if not any(pole.x == 0.0 for pole in poles.border):
-        x, L = np.append(x, 0.0), np.append(L, loop.response(np.zeros(1)))
+    at_dc = any(pole.x == 0.0 for pole in poles.border)
+    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else loop.response(np.zeros(1)))
     return smallest(loop, Circles(loop, poles.values), criterion, x, L, end_x)
 
 
@@ -223,11 +224,12 @@ def _typical(poles: SortedPoles, in_z: bool) -> Real:
         return np.array([0.1, 0.3, 1.0, 3.0])
     low, high = float(size.min()), float(size.max())
     x = np.concatenate((size * 1.03, low * _BELOW, high * _ABOVE))
+    x = x[x > _FLOOR * poles.cloud]
     return x[x < math.pi] if in_z else x
 
 
 def _ends(loop: RationalLoop, poles: SortedPoles, found: Crossings) -> Ends:
-    at_dc = sum(pole.multiplicity for pole in poles.border if pole.x == 0.0)
+    at_dc = poles.at_dc
     at_pi = sum(pole.multiplicity for pole in poles.border if loop.in_z and pole.x == math.pi)
     dc, order = None, 0
     if at_dc:
@@ -244,17 +246,15 @@ def _ends(loop: RationalLoop, poles: SortedPoles, found: Crossings) -> Ends:
 
 
 def _order_at_dc(loop: RationalLoop, poles: SortedPoles, first_x: float) -> tuple[int, complex]:
-    """Multiplicity of the pole at zero frequency that L shows, from the slope of its gain."""
+    """Multiplicity of the pole at zero frequency that L shows, and L just beside it.
+
+    The slope of the gain is followed downwards: zeros near zero frequency make it too small at first, the
+    split of a multiple eigenvalue too small again in the end; the steepest whole number is the one.
+    """
     distance = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
-    away = distance[distance > 1e-4 * distance.max()]
-    r = 1e-3 * min(first_x, float(away.min()) if away.size else first_x)
-    for _ in range(12):
-        L = loop.response(np.array([r, 0.1 * r]))
-        slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
-        if abs(slope - round(slope)) < 0.02:
-            return max(round(slope), 0), complex(L[1])
-        r *= 0.1
-    raise InputError("the loop has a pole at zero frequency that is almost cancelled: cancel it first")
+    away = distance[distance > 1e-9 * distance.max()]
+    start = 0.1 * min(first_x, float(away.min()) if away.size else first_x)
+    return slope_at_dc(loop.response, max(start, _FLOOR * poles.cloud), poles.at_dc)
 
 
 def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: Ends) -> tuple[Real, Complex]:
@@ -264,8 +264,5 @@ def _starts(loop: RationalLoop, found: Crossings, closed: SortedPoles, ends: End
     own = own[(values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.in_z else own > 0.0)]
     x = np.concatenate((found.gain_x, found.real_x, found.between_x, own))
     L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own)))
-    if ends.dc is not None:
-        x, L = np.append(x, 0.0), np.append(L, ends.dc)
-    if ends.end is not None:
-        x, L = np.append(x, loop.end), np.append(L, ends.end)
-    return x, L
+    x = np.concatenate((x, [0.0, loop.end]))
+    return x, np.concatenate((L, [FAR if value is None else value for value in (ends.dc, ends.end)]))
