@@ -34,6 +34,26 @@ def test_friction_per_direction_meets_the_published_digits(emps: EmpsRecord) -> 
     assert f"{100 * model.relative_residual:.4f}" == "3.1117"
 
 
+@pytest.mark.parametrize(
+    ("delay_s", "phase_deg", "gain_db", "frequency_rad_s"),
+    [(0.0, 34.84, 21.34, 988.0), (1e-3, 26.61, 14.57, 539.0)],
+)
+def test_the_shipped_design_has_the_published_values_and_their_margins(
+    delay_s: float, phase_deg: float, gain_db: float, frequency_rad_s: float
+) -> None:
+    """The linear loop of the published values, broken at the plant input, recomputed independently."""
+    from actuator_lti import assemble_loops, load_design, stability_margins
+    from actuator_lti.design import with_values
+
+    design = with_values(load_design("emps"), {"control.computing_delay": delay_s})
+    assert (design.motor.rotor_inertia_kgm2, design.friction.viscous_Nms_rad) == (95.1089, 203.5034)
+    loop = assemble_loops(design, operating_point="sliding").break_points["u"]
+    margins = stability_margins(loop.open_loop)
+    assert margins.phase_margin_deg == pytest.approx(phase_deg, abs=0.005)
+    assert margins.gain_margin_db == pytest.approx(gain_db, abs=0.005)
+    assert any(m.frequency_rad_s == pytest.approx(frequency_rad_s, abs=0.5) for m in margins.gain_margins)
+
+
 def _motion(seconds: float = 6.0) -> tuple[np.ndarray, np.ndarray, float]:
     period = 1e-3
     time = np.arange(0.0, seconds, period)

@@ -1,0 +1,168 @@
+"""`identify` and `correlate` from the command line: what they print, what they write, how they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.design import load_design
+from analyses.virtual_bench import BenchPlan, simulate_bench
+from analyses.virtual_bench_files import write_bench
+from analyses.virtual_bench_instruments import measure_bench
+from reports.cli.main import main
+from reports.document import load as load_document
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small campaign: three speeds, three loads, one file missing."""
+    design = load_design("ilr33-amber")
+    plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
+    logs, _ = measure_bench(simulate_bench(design, plan), 2)
+    path = write_bench(tmp_path_factory.mktemp("campaign"), logs, design="ilr33-amber", seed=2)
+    (path.parent / "run05_torque.csv").unlink()
+    return path
+
+
+def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(status or 0), out, err
+
+
+def test_a_campaign_as_json(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = _run(capsys, "identify", str(campaign), "--json", "--suggest", "2")
+    found = json.loads(out)
+    assert status == 0
+    assert found["runs_listed"] == found["runs_used"] + len(found["set_aside"]) == 9
+    assert found["set_aside"][0]["id"] == "05"
+    assert found["rows_in"] >= found["rows_out"] > 0
+    low, high = found["coefficients"]["CM"]["interval_95"]
+    assert low < 1.34e-3 < high
+    assert [term["name"] for term in found["contributions"]["terms"]] == ["C0", "Cv", "CM"]
+    assert len(found["suggestion"]["runs"]) == 2
+
+
+def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = _run(capsys, "identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
+    assert status == 0
+    assert "8 of 9 runs" in out
+    assert "run05_torque.csv: cannot be read" in " ".join(out.split())
+    document = load_document(tmp_path / "identification.json")
+    figures = {b["figure"] for part in document["sections"] for b in part["blocks"] if b["kind"] == "figure"}
+    wanted = {"surface", "residuals", "region", "window"}
+    assert {f"identification_{name}" for name in wanted} <= figures
+    page = (tmp_path / "identification.html").read_text()
+    assert page.count("<svg") >= 4
+    identified = load_design(tmp_path / "ilr33-amber-identified.toml")
+    tolerance = identified.parameters["friction.load_coefficient"].tolerance
+    assert tolerance is not None
+    assert tolerance.kind == "normal"
+    assert len(identified.correlations) >= 1
+
+
+def test_the_identified_design_goes_on_into_margins(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _run(capsys, "identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
+    status, out, _ = _run(capsys, "margins", str(tmp_path / "ilr33-amber-identified.toml"), "--json")
+    assert status == 0
+    assert json.loads(out)["loops"]
+
+
+def test_emps_on_the_command_line(
+    emps_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, _ = _run(capsys, "identify", "--dynamic", str(emps_file), "--json", "--refine")
+    found = json.loads(out)
+    assert status == 0
+    assert round(found["parameters"]["inertia"]["value"], 4) == 95.1089
+    assert found["rows_in"] == 24841
+    assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.28, abs=0.05)
+    status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
+    signals = json.loads(out)[0]["signals"]
+    assert status == 0
+    assert 100.0 * signals["force"]["relative_error"] < 5.848
+    assert (tmp_path / "correlation.html").stat().st_size > 10_000
+
+
+def test_the_chirp_on_the_command_line(
+    odrive_files: dict[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    chirp, step = str(odrive_files["chirp1"]), str(odrive_files["step1"])
+    status, out, _ = _run(capsys, "correlate", "emps", step, "--predict", chirp, "--json")
+    assert status == 0
+    assert json.loads(out)["relative_error"] < 0.025
+
+
+def test_the_virtual_bench_writes_54_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from analyses import virtual_bench as module
+
+    short = BenchPlan(duration_s=2.2)
+    monkeypatch.setattr(module, "BenchPlan", lambda: short)
+    status, out, _ = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "3")
+    assert status == 0
+    assert "54 runs written" in out
+    assert len(list(tmp_path.glob("run*_drive.csv"))) == len(list(tmp_path.glob("run*_torque.csv"))) == 54
+
+
+def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from analyses.records import load_campaign
+
+    status, out, _ = _run(capsys, "identify", "--example")
+    (tmp_path / "c.toml").write_text(out)
+    assert status == 0
+    assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("identify",), "give one of"),
+        (("identify", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read"),
+        (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read"),
+        (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    arguments: tuple[str, ...], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, err = _run(capsys, *arguments)
+    assert (status, out) == (2, "")
+    assert reason in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        (
+            'method = "correlation"',
+            'method = "guess"',
+            "join.method = 'guess': one of correlation, event, given",
+        ),
+        ('signals.current = { column = "Current", unit = "mA" }', "", "drive.signals.current: is needed"),
+        ('unit = "rpm"', 'unit = "kg"', "must be a unit like rad/s"),
+        ("torque_accuracy = 0.005", "torque_acuracy = 0.005", 'did you mean "torque_accuracy"'),
+        ('speed = "105 rad/s"', 'speed = "105 N"', "run[1].speed"),
+        ('id = "02"', 'id = "01"', "given twice"),
+        ("[campaign]", "[campaign", "is no TOML"),
+    ],
+)
+def test_a_bad_campaign_file_is_one_line_with_its_key(
+    old: str, new: str, reason: str, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = campaign.read_text()
+    assert old in text
+    path = tmp_path / "bad.toml"
+    path.write_text(text.replace(old, new, 1))
+    status, _, err = _run(capsys, "identify", str(path))
+    assert status == 2
+    assert "bad.toml" in err
+    assert reason in err
+    assert err.count("\n") == 1
