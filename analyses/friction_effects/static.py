@@ -46,7 +46,7 @@ class StaticThreshold:
 
 
 def torque_gain_Nm_rad(design: Design) -> float:
-    """Motor torque per rad of position error at the output, rotor at rest, current settled, no speed integral."""
+    """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
     control, motor = design.controller, design.motor
     gain = control.position.gain * design.total_ratio
     if control.velocity is not None:

@@ -17,16 +17,16 @@ PARABOLA_SHARE = 0.6  # how far from that of a parabola train
 FRICTION_DB, FRICTION_DEG = 1.0, 10.0
 STEADY = 0.02
 CRITERIA = (
-    f"no motion: at rest at every tick of the last window; stick-slip: at rest at {STICK_FRACTION:.0%} of its "
-    f"ticks or more; triangle: third harmonic, in phase as in a triangle, above {TRIANGLE_SHARE:.0%} of 1/9; "
-    f"parabola: the same within {PARABOLA_SHARE:.0%} of 1/27, with the other sign (both only where a limit "
-    f"acts); sine: distortion below {SINE_DISTORTION:.0%}; else distorted. Not steady: fundamental still changing by more than "
-    f"{STEADY:.0%} from one window to the next."
+    "no motion: at rest at every tick of the last window; stick-slip: at rest at "
+    f"{STICK_FRACTION:.0%} of its ticks or more; triangle: third harmonic, in phase as in a triangle, above "
+    f"{TRIANGLE_SHARE:.0%} of 1/9; parabola: the same within {PARABOLA_SHARE:.0%} of 1/27, with the other "
+    f"sign (both only where a limit acts); sine: distortion below {SINE_DISTORTION:.0%}; else distorted. "
+    f"Not steady: fundamental still changing by more than {STEADY:.0%} from one window to the next."
 )
 CAUSE_RULE = (
     "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if the "
-    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more, friction if the fundamental is off the linear "
-    f"one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°, else none: the linear model holds."
+    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more, friction if the fundamental is off the "
+    f"linear one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°, else none: the linear model holds."
 )
 
 

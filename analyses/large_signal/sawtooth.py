@@ -1,4 +1,4 @@
-"""The sawtooth of the paper: a sine faster than the speed limit, against the formulas of a pure rate limit."""
+"""The sawtooth of the paper: a sine faster than the speed limit, against a pure rate limit's formulas."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def sawtooth(
     rate = limit / design.total_ratio
     if slowest < rate * (1.0 - 1e-9):
         reason = (
-            f"the speed limit is not reached at every load: the drive stays at {slowest / rate:.0%} of it"
+            f"not every load lets the drive reach its speed limit: it stays at {slowest / rate:.0%}"
         )
         return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz

@@ -1,0 +1,208 @@
+"""Limit cycles in the simulator: foreseen ones confirmed or refuted, others found by waiting after a step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.drive_figures import drive_figures
+from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
+from analyses.large_signal.steady_start import PLACES
+from nonlinear import commands, simulate
+from nonlinear._kernels import layout as at
+from nonlinear.batch import put_step, repeat_row, run_rows
+from nonlinear.parameters import design_row
+
+WAIT_TICKS = 40_000
+BELOW = 0.3
+STEADY_SHARE = 0.9  # of the span one window before: still there
+QUIET = 1e-3  # of the step: what counts as motion
+SCALES = np.geomspace(0.4, 2.5, 41)
+CYCLES_WATCHED = 12.0
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A foreseen cycle against the simulator, from initial states of its shape at several sizes.
+
+    Attributes
+    ----------
+    foreseen : ForeseenCycle
+    simulated_ratio : float or None
+        Size, relative to the foreseen, at which motion neither grows nor dies out; ``None``: refuted, as it
+        does one or the other at every size from 0.4 to 2.5.
+    simulated_hz : float or None
+        Frequency next to that size.
+    """
+
+    foreseen: ForeseenCycle
+    simulated_ratio: float | None
+    simulated_hz: float | None
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the simulator has it."""
+        return self.simulated_ratio is not None
+
+
+@dataclass(frozen=True)
+class Settling:
+    """The end of a long wait after a step.
+
+    Attributes
+    ----------
+    amplitude_rad, wait_s : float
+        The step and how long was waited.
+    error_rad : float
+        Command less output at the end (output side); mean of the last quarter if it still moves.
+    at_rest : bool
+        Whether the rotor rests at the end.
+    limited : bool
+        Whether a limit acts in the last quarter: then a cycle is one of the limits, not of friction.
+    hunting : bool
+        Whether the output still swings in the last quarter, by at least 0.9 of the quarter before.
+    hunting_rad, hunting_hz : float or None
+        Half the span of the output, and its frequency.
+    time_s, angle_error_rad : ndarray
+        The last quarter, thinned, for drawing.
+    """
+
+    amplitude_rad: float
+    wait_s: float
+    error_rad: float
+    at_rest: bool
+    limited: bool
+    hunting: bool
+    hunting_rad: float | None
+    hunting_hz: float | None
+    time_s: np.ndarray
+    angle_error_rad: np.ndarray
+
+
+@dataclass(frozen=True)
+class LimitCycles:
+    """Everything about limit cycles at one hinge moment.
+
+    Attributes
+    ----------
+    confirmations : tuple of Confirmation
+        Empty: the describing function foresees none.
+    settlings : tuple of Settling
+        Steps of several sizes, the last below the threshold: it rests, breaks away, and may hunt.
+    """
+
+    confirmations: tuple[Confirmation, ...]
+    settlings: tuple[Settling, ...]
+
+    @property
+    def hunting(self) -> Settling | None:
+        """The largest cycle that a step ended in, if any did."""
+        swings = [one for one in self.settlings if one.hunting]
+        return max(swings, key=lambda one: one.hunting_rad or 0.0, default=None)
+
+    @property
+    def as_foreseen(self) -> bool:
+        """Whether simulator and describing function agree on whether friction makes a cycle.
+
+        A stable cycle is foreseen exactly where a step ends in one, and every foreseen one is confirmed.
+        """
+        stable = any(item.foreseen.stable for item in self.confirmations)
+        found = self.hunting is not None and not self.hunting.limited
+        return all(item.confirmed for item in self.confirmations) and stable == found
+
+
+def limit_cycles(
+    design: Design, load_Nm: float, step_rad: float, threshold_rad: float | None = None
+) -> LimitCycles:
+    """Foresee limit cycles, look for them in the simulator, and wait what steps end in.
+
+    Parameters
+    ----------
+    step_rad : float
+        A step, and a tenth of it.
+    threshold_rad : float, optional
+        Command that breaks away at once; a step of `BELOW` of it is waited for too.
+    """
+    top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
+    if not 0.0 < top < math.inf:
+        top = 1e3
+    foreseen = foreseen_cycles(design, load_Nm, top)
+    checked = tuple(_confirm(design, load_Nm, cycle) for cycle in foreseen)
+    sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
+    return LimitCycles(checked, tuple(settle(design, load_Nm, size) for size in sizes))
+
+
+def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmation:
+    """Start in the shape of the cycle at many sizes; find where motion turns from dying out to growing."""
+    Ts = design.controller.period_s
+    window = round(3.0 / (cycle.frequency_hz * Ts))
+    rows = repeat_row(design_row(design, limits_on=False), len(SCALES))
+    rows[:, at.LOAD] = load_Nm
+    put_step(rows, at.COMMAND, 0.0)
+    for name, value in cycle.state.items():
+        if name in PLACES:
+            rows[:, PLACES[name]] = SCALES * cycle.speed_amplitude_rad_s * value.real
+    if "th" in cycle.state and design.controller.velocity is not None:
+        before = -design.controller.position.gain * cycle.state["th"].real
+        rows[:, at.SPEED_COMMAND_START] = SCALES * cycle.speed_amplitude_rad_s * before
+    rows[:, at.WINDOW], rows[:, at.CYCLES] = window, 3
+    rows[:, at.TICKS] = round(CYCLES_WATCHED / 3.0) * window
+    result = run_rows(rows)
+    low, high = result.span("motor_speed_rad_s")
+    peak = np.maximum(-low, high)
+    grows = ~result.ok | (peak > SCALES * cycle.speed_amplitude_rad_s)
+    turns = np.flatnonzero(grows[1:] != grows[:-1])
+    if len(turns) != 1:
+        return Confirmation(cycle, None, None)
+    k = int(turns[0])
+    ratio = float(math.sqrt(SCALES[k] * SCALES[k + 1]))
+    run = simulate_row(design, rows[k if cycle.stable else k + 1], window)
+    return Confirmation(cycle, ratio, run)
+
+
+def simulate_row(design: Design, row: np.ndarray, ticks: int) -> float | None:
+    """Frequency of the motor speed over the first ticks of a row."""
+    from nonlinear.simulation import run_row
+
+    row = row.copy()
+    row[at.TICKS] = ticks
+    run = run_row(design, row, np.zeros(1))
+    return _frequency(run.time_s, run.motor_speed_rad_s)
+
+
+def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
+    """Step, wait, and look at the last quarter."""
+    Ts = design.controller.period_s
+    run = simulate(design, commands.step(step_rad), WAIT_TICKS * Ts, load_Nm, raise_on_failure=False)
+    error = run.reference_rad - run.output_angle_rad
+    quarter = WAIT_TICKS // 4
+    last, before = error[-quarter:], error[-2 * quarter : -quarter]
+    span, earlier = float(np.ptp(last)), float(np.ptp(before))
+    frequency = _frequency(run.time_s[-2 * quarter :], error[-2 * quarter :] - error[-2 * quarter :].mean())
+    moves = not math.isfinite(span) or (span > QUIET * step_rad and span >= STEADY_SHARE * earlier)
+    hunting = moves and frequency is not None
+    thin = slice(None, None, max(1, quarter // 600))
+    return Settling(
+        amplitude_rad=step_rad,
+        wait_s=WAIT_TICKS * Ts,
+        error_rad=float(last.mean()) if hunting else float(last[-1]),
+        at_rest=bool(run.limit_flags[-1] & at.FLAG_STICK),
+        limited=bool((run.limit_flags[-quarter:] & ~np.uint8(at.FLAG_STICK)).any()),
+        hunting=hunting,
+        hunting_rad=0.5 * span if hunting else None,
+        hunting_hz=frequency if hunting else None,
+        time_s=run.time_s[-quarter:][thin] - run.time_s[-quarter],
+        angle_error_rad=last[thin],
+    )
+
+
+def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:
+    """Frequency from the rising zero crossings; ``None`` with fewer than two of them."""
+    up = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    if len(up) < 2:
+        return None
+    exact = time_s[up] - values[up] * (time_s[up + 1] - time_s[up]) / (values[up + 1] - values[up])
+    return float((len(up) - 1) / (exact[-1] - exact[0]))

@@ -1,0 +1,105 @@
+"""Everything that is said of dry friction at small signals, in one result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.friction_effects.breakaway import Threshold, threshold
+from analyses.friction_effects.cycles import LimitCycles, limit_cycles
+from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
+from analyses.large_signal.steady_start import linear_steady_state
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class FrictionPoint:
+    """What dry friction does at one hinge moment.
+
+    Attributes
+    ----------
+    load_Nm, dry_torque_Nm : float
+        Dry friction at the motor, forward.
+    threshold : Threshold or None
+        ``None`` where a forward step has none.
+    hysteresis : Hysteresis or None
+    cycles : LimitCycles
+    """
+
+    load_Nm: float
+    dry_torque_Nm: float
+    threshold: Threshold | None
+    hysteresis: Hysteresis | None
+    cycles: LimitCycles
+
+
+@dataclass(frozen=True)
+class FrictionEffects:
+    """Friction at small signals, one point a hinge moment.
+
+    Attributes
+    ----------
+    design : Design
+    points : tuple of FrictionPoint
+    integrates : bool
+        Whether the speed controller integrates: then friction leaves no lasting error by itself.
+    reason : str
+        Why there is nothing to show; then ``points`` is empty.
+    """
+
+    design: Design
+    points: tuple[FrictionPoint, ...]
+    integrates: bool
+    reason: str = ""
+
+
+def friction_effects(
+    design: Design, loops: Loops | None = None, *, progress: Progress | None = None
+) -> FrictionEffects:
+    """Find threshold, hysteresis, standing error and limit cycles at each hinge moment of the design.
+
+    Parameters
+    ----------
+    design : Design
+    loops : Loops, optional
+        Sampled and sliding, of this design, if they are there already.
+    progress : callable, optional
+        Called with (hinge moments done, in all).
+
+    Raises
+    ------
+    InputError, NumericalError
+        As `assemble_loops` and `simulate`.
+    """
+    from actuator_lti.loops import assemble_loops
+
+    velocity = design.controller.velocity
+    integrates = velocity is not None and velocity.integral_time_s is not None
+    loads = design.validation.loads_Nm
+    if not any(design.friction.dry_Nm(load, way) > 0.0 for load in loads for way in (1, -1)):
+        return FrictionEffects(design, (), integrates, "the design has no dry friction")
+    loops = assemble_loops(design) if loops is None else loops
+    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    points = []
+    for load in loads:
+        points.append(_point(design, load, settling))
+        if progress is not None:
+            progress(len(points), len(loads))
+    return FrictionEffects(design, tuple(points), integrates)
+
+
+def _point(design: Design, load_Nm: float, settling_ticks: int) -> FrictionPoint:
+    step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+    found = threshold(design, load_Nm, settling_ticks)
+    loop = None if found is None else hysteresis(design, load_Nm, found.static, settling_ticks)
+    dry = design.friction.dry_Nm(load_Nm, 1)
+    breakaway = None if found is None else found.static.forward_rad
+    return FrictionPoint(load_Nm, dry, found, loop, limit_cycles(design, load_Nm, step, breakaway))
