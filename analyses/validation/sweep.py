@@ -32,7 +32,8 @@ Flags = npt.NDArray[np.bool_]
 STEADY = 1e-5  # relative change of the fundamental from one window to the next (rule H3)
 USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the amplitude takes
 SETTLE_TIME_CONSTANTS = 14.0
-LONGEST_SETTLE_TICKS = 400_000
+LONGEST_SETTLE_TICKS = 20_000  # at first; a point that is not steady then is given more
+FAINT_SETTLE_TICKS = 2_000
 EXTENSIONS = 3
 PLANT_SIGNAL = {"u": "current_A", "i_ref": "motor_speed_rad_s", "w_ref": "motor_speed_rad_s"}
 
@@ -168,16 +169,28 @@ def frequency_response(
     return stepped_sine(setup, asked, wait, threads)
 
 
-def stepped_sine(setup: Rig, frequency_hz: Floats, settle_ticks: int, threads: int | None = None) -> Sweep:
-    """Measure at a rig that has been set up; see `frequency_response`."""
+def stepped_sine(
+    setup: Rig,
+    frequency_hz: Floats,
+    settle_ticks: int,
+    threads: int | None = None,
+    amplitude: Floats | None = None,
+) -> Sweep:
+    """Measure at a rig that has been set up; see `frequency_response`.
+
+    ``amplitude`` (injected, peak) is what to begin with; by default a faint run says what fits.
+    """
     window = coherent(frequency_hz, setup.design.controller.period_s, setup.base_ticks)
-    amplitude = fitting_amplitude(setup, window, settle_ticks, threads)
+    if amplitude is None:
+        amplitude = fitting_amplitude(setup, window, settle_ticks, threads)
     result = _run(setup, window, amplitude, settle_ticks, threads)
     for _ in range(EXTENSIONS):
-        poor = np.flatnonzero([bool(text) for text in _reasons(setup, result)])
+        reasons = _reasons(setup, result)
+        poor = np.flatnonzero([bool(text) for text in reasons])
         if not poor.size:
             break
-        limited = np.array([_reasons(setup, result)[k] != "not steady" for k in poor])
+        settle_ticks *= 4
+        limited = np.array([reasons[k] != "not steady" for k in poor])
         amplitude[poor[limited]] *= 0.4
         settle_ticks = min(4 * settle_ticks, LONGEST_SETTLE_TICKS)
         part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
@@ -223,7 +236,7 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
             setup.design.total_ratio * setup.design.controller.position.gain
         )
     faint = np.full(window.ticks.size, 1e-4 * scale)
-    result = _run(setup, window, faint, settle_ticks, threads)
+    result = _run(setup, window, faint, min(settle_ticks, FAINT_SETTLE_TICKS), threads)
     most = np.full(faint.size, inf)
     for name, room in rooms.items():
         low, high = result.span(name)

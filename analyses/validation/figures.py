@@ -1,0 +1,235 @@
+"""Bandwidth, resonance, peaks, phase margin and step figures read from measurements.
+
+From a sweep: crossings and maxima are first bracketed on the measured grid, then measured again inside each
+bracket, then interpolated by a polynomial through the nearest points; no linear model takes part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from analyses.validation.rig import Rig
+from analyses.validation.sweep import Sweep, stepped_sine
+from nonlinear._kernels import layout as at
+from nonlinear.batch import injection_place
+from nonlinear.simulation import run_row
+
+Floats = npt.NDArray[np.float64]
+INSIDE = 5  # points measured again inside a bracket
+NEAREST = 6  # points of the interpolating polynomial
+STEP_PART = 0.02  # of the room of the signal
+
+
+@dataclass(frozen=True)
+class StepMeasured:
+    """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
+
+    ``reason`` is empty where neither a limit nor a reversal took part.
+    """
+
+    rise_time_s: float
+    overshoot_percent: float
+    settling_time_s: float
+    final_value: float
+    time_s: Floats
+    response: Floats
+    reason: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Figures of one loop as measured; ``None`` where the response has no such figure in the range.
+
+    Attributes
+    ----------
+    bandwidth_hz, minus90deg_hz : float or None
+        As `actuator_lti.bandwidth.Bandwidth`, 1/sqrt(2) of the value at zero frequency.
+    resonance_db, resonance_hz : float
+        Largest T over its value at zero frequency.
+    sensitivity_peak_db, complementary_peak_db : float
+    phase_margin_deg, crossover_hz : float or None
+        The phase margin nearest to zero.
+    step : StepMeasured
+    sweep : Sweep
+        With the points measured again.
+    """
+
+    bandwidth_hz: float | None
+    minus90deg_hz: float | None
+    resonance_db: float
+    resonance_hz: float
+    sensitivity_peak_db: float
+    complementary_peak_db: float
+    phase_margin_deg: float | None
+    crossover_hz: float | None
+    step: StepMeasured
+    sweep: Sweep
+
+
+def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int) -> Measured:
+    """Measure what a sweep brackets, and the step.
+
+    Parameters
+    ----------
+    setup : Rig
+    sweep : Sweep
+        Wide enough to hold what is looked for.
+    settle_ticks : int
+        In which the loop settles.
+    """
+    step = step_response(setup, settle_ticks)
+    dc = step.final_value
+    fine = refined(setup, sweep, _brackets(sweep, dc), settle_ticks)
+    f = fine.frequency_hz
+    closed = np.abs(fine.closed_loop) / abs(dc)
+    phase = np.degrees(np.unwrap(np.angle(fine.closed_loop * np.sign(dc))))
+    crossover, margin = _phase_margin(fine)
+    peak_t, at_t = maximum(f, closed)
+    peak_s, _ = maximum(f, np.abs(fine.sensitivity))
+    return Measured(
+        bandwidth_hz=first_fall(f, closed, sqrt(0.5)),
+        minus90deg_hz=first_fall(f, phase, -90.0),
+        resonance_db=max(20.0 * np.log10(peak_t), 0.0),
+        resonance_hz=at_t if peak_t > 1.0 else 0.0,
+        sensitivity_peak_db=20.0 * np.log10(peak_s),
+        complementary_peak_db=20.0 * np.log10(abs(dc) * max(peak_t, 1.0)),
+        phase_margin_deg=margin,
+        crossover_hz=crossover,
+        step=step,
+        sweep=fine,
+    )
+
+
+def refined(setup: Rig, sweep: Sweep, brackets: list[tuple[float, float]], settle_ticks: int) -> Sweep:
+    """The sweep with more points inside each bracket, at the amplitudes found before."""
+    if not brackets:
+        return sweep
+    inside = [np.geomspace(a, b, INSIDE + 2)[1:-1] for a, b in brackets]
+    asked = np.unique(np.concatenate(inside))
+    amplitude = np.interp(np.log(asked), np.log(sweep.frequency_hz), sweep.amplitude)
+    return sweep.joined(stepped_sine(setup, asked, settle_ticks, amplitude=amplitude))
+
+
+def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
+    """Where to look closer: crossings of T and L, maxima of T and S."""
+    f = sweep.frequency_hz
+    closed = np.abs(sweep.closed_loop) / abs(dc)
+    phase = np.degrees(np.unwrap(np.angle(sweep.closed_loop * np.sign(dc))))
+    pairs = []
+    for below in (closed < sqrt(0.5), phase < -90.0):
+        k = int(np.argmax(below))
+        if below[k] and k > 0:
+            pairs.append((k - 1, k))
+    outside = np.abs(sweep.open_loop) > 1.0
+    pairs += [(int(k), int(k) + 1) for k in np.flatnonzero(outside[1:] != outside[:-1])]
+    for values in (closed, np.abs(sweep.sensitivity)):
+        k = int(np.argmax(np.where(np.isfinite(values), values, -1.0)))
+        pairs += [(j, j + 1) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
+    return [(float(f[a]), float(f[b])) for a, b in dict.fromkeys(pairs)]
+
+
+def _phase_margin(sweep: Sweep) -> tuple[float | None, float | None]:
+    """Crossover (Hz) and phase margin (deg) nearest to zero."""
+    gain = np.log(np.abs(sweep.open_loop))
+    phase = np.unwrap(np.angle(sweep.open_loop))
+    found = []
+    for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
+        hertz = _root(sweep.frequency_hz, gain, int(k), 0.0)
+        angle = np.degrees(float(_local(sweep.frequency_hz, phase, int(k))(np.log(hertz))))
+        found.append((hertz, (angle + 180.0 + 180.0) % 360.0 - 180.0))
+    return min(found, key=lambda item: abs(item[1]), default=(None, None))
+
+
+def first_fall(frequency_hz: Floats, values: Floats, level: float) -> float | None:
+    """Frequency at which values first fall below a level; ``None`` if never in the range."""
+    below = values < level
+    k = int(np.argmax(below))
+    return None if not below[k] or k == 0 else _root(frequency_hz, values, k - 1, level)
+
+
+def maximum(frequency_hz: Floats, values: Floats) -> tuple[float, float]:
+    """Largest value between the points, and where."""
+    from scipy.optimize import minimize_scalar
+
+    k = int(np.argmax(np.where(np.isfinite(values), values, -np.inf)))
+    if k in (0, values.size - 1):
+        return float(values[k]), float(frequency_hz[k])
+    curve = _local(frequency_hz, values, k)
+    ends = (np.log(frequency_hz[k - 1]), np.log(frequency_hz[k + 1]))
+    found = minimize_scalar(
+        lambda x: -float(curve(x)), bounds=ends, method="bounded", options={"xatol": 1e-9}
+    )
+    return -float(found.fun), float(np.exp(found.x))
+
+
+def _root(frequency_hz: Floats, values: Floats, k: int, level: float) -> float:
+    """Where the curve passes a level between points k and k + 1."""
+    from scipy.optimize import brentq
+
+    curve = _local(frequency_hz, values - level, k)
+    a, b = np.log(frequency_hz[k]), np.log(frequency_hz[k + 1])
+    return float(np.exp(brentq(lambda x: float(curve(x)), a, b, xtol=1e-13)))
+
+
+def _local(frequency_hz: Floats, values: Floats, k: int) -> Callable[[float], float]:
+    """Polynomial in log f through the points nearest to k; exact at the points."""
+    from scipy.interpolate import BarycentricInterpolator
+
+    x = np.log(frequency_hz)
+    good = np.flatnonzero(np.isfinite(values) & np.concatenate([[True], np.diff(x) > 1e-9]))
+    order = np.argsort(np.abs(x[good] - 0.5 * (x[k] + x[min(k + 1, x.size - 1)])), kind="stable")
+    near = np.sort(good[order[:NEAREST]])
+    curve = BarycentricInterpolator(x[near], values[near])
+    return lambda at_x: float(curve(at_x))
+
+
+def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
+    """Step added at the rig's point: what comes back is the step response of T."""
+    signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
+    room = setup.room[signal]
+    size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.ride.speed_rad_s), 1.0))
+    for _ in range(3):
+        time_s, response, reason = _step(setup, size, settle_ticks)
+        if not reason:
+            break
+        size *= 0.2
+    return step_figures_of(time_s, response, reason)
+
+
+def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str]:
+    """Run one step; times and response at the updates of the point."""
+    row = setup.row()
+    n = setup.hold_ticks
+    row[at.TICKS] = settle_ticks + 4 * n
+    place = injection_place(setup.point)
+    row[place], row[place + 1], row[place + 2] = at.STEP, size, 0.0
+    run = run_row(setup.design, row, np.zeros(1))
+    before = run.probes[setup.point].before[::n]
+    steady = before[0]
+    reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
+    if run.status != "ok":
+        reason = run.status
+    elif not reason and run.events and setup.ride.friction_on:
+        reason = "speed reversal"
+    return run.time_s[::n], (steady - before) / size, reason
+
+
+def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
+    """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response."""
+    final = float(response[-1])
+    y = response / final
+    rise = float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
+    outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
+    settled = float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0
+    over = max(100.0 * (float(y.max()) - 1.0), 0.0)
+    return StepMeasured(rise, over, settled, final, time_s, response, reason)
+
+
+def hertz(omega_rad_s: float | None) -> float | None:
+    """rad/s as Hz."""
+    return None if omega_rad_s is None else omega_rad_s / (2.0 * pi)
