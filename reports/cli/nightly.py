@@ -76,7 +76,7 @@ def nightly(
     from reports.nightly.source import read_study
 
     approving, path = _split(words)
-    study = read_study(path, pdf=pdf, validation=not no_validation)
+    study = read_study(path, pdf=pdf, validation=False if no_validation else None)
     settings = Settings(workers=workers, time_limit_s=time_limit, wait_s=wait, keep_reports=keep, state=state)
     if approving:
         night = approve(study, site, by=by, reason=reason, names=design or (), settings=settings)
@@ -119,7 +119,7 @@ def _show(night: Overview, site: Path, as_json: bool) -> None:
             if design.state == "regression":
                 worst = design.regressions[0].figure
                 why = f"{len(design.regressions)} figures worse than the baseline, {worst}"
-            print_line(f"{STATE_WORDS[design.state]:>10}  {one_line(design.name, 60)}: {one_line(why, 120)}")
+            print_line(f"{STATE_WORDS[design.state]:>10}  {one_line(design.name, 60)}: {one_line(why, 300)}")
     counts = ", ".join(f"{night.count(s)} {words}" for s, words in STATE_WORDS.items() if night.count(s))
     cached = sum(d.result.cached for d in night.designs)
     print_line(f"night {night.run.id}: {counts} ({cached} unchanged)\n{site / 'index.html'}")

@@ -90,6 +90,9 @@ def _verdict(name: str, item: Mapping[str, Any]) -> Verdict:
     if limit is None:
         limit = first_number(str(item.get("limit", "")))
     scale = abs(limit) if limit else 1.0
+    certain = (
+        item.get("unit") == "%" and limit == 100.0 and bool(item.get("passed"))
+    )  # cannot be more than met
     return Verdict(
         id=name,
         label=str(item.get("label", "") or name),
@@ -97,7 +100,7 @@ def _verdict(name: str, item: Mapping[str, Any]) -> Verdict:
         limit=_limit_text(item),
         unit=str(item.get("unit", "") or ""),
         distance=distance,
-        relative=None if distance is None else distance / scale,
+        relative=None if distance is None or certain else distance / scale,
         passed=item.get("passed"),
         source=str(item.get("source", "") or ""),
         reason=str(item.get("reason", "") or ""),
@@ -109,7 +112,8 @@ def _limit_text(item: Mapping[str, Any]) -> str:
     if limit is None:
         return ""
     text = f"{limit:.6g}" if _is_number(limit) else str(limit)
-    return f"{item.get('comparison') or ''} {text}".strip()
+    comparison = str(item.get("comparison") or "").replace(">=", "≥").replace("<=", "≤")
+    return f"{comparison} {text}".strip()
 
 
 def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:

@@ -57,6 +57,8 @@ def execute(
     """
     try:
         meta, files = function(payload)
+    except InputError as error:
+        return ("error", one_line(str(error), 600), "")
     except Exception as error:  # noqa: BLE001 - the one place where a design may raise anything
         where = "".join(traceback.format_exception(error)[-6:])
         return ("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:])

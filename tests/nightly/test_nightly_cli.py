@@ -1,0 +1,127 @@
+"""The command itself, on real designs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from site_checks import check_whole
+
+from reports.cli.main import main
+
+STUDY = """
+[study]
+name = "gears"
+title = "Gears"
+base = "ctms-motor-position"
+
+[[variant]]
+name = "slower"
+override = { "control.position.gain" = "12 V/rad" }
+
+[[variant]]
+name = "no <b>motor</b>"
+override = { "motor.resistance" = "-1 ohm" }
+
+[nightly]
+tolerance = { "*phase margin*" = "0.5 deg" }
+"""
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A first night of a small study, on real worker processes."""
+    folder = tmp_path_factory.mktemp("cli")
+    (folder / "study.toml").write_text(STUDY)
+    command = (
+        [sys.executable, "-m", "reports.cli.main"]
+        if False
+        else [str(Path(sys.executable).with_name("actuator-lti"))]
+    )
+    arguments = ["nightly", str(folder / "study.toml"), "--site", str(folder / "site"), "--no-validation"]
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False, timeout=300)
+    return folder, done
+
+
+def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -> None:
+    folder, done = built
+    assert done.returncode == 1, done.stderr
+    assert "no result  no <b>motor</b>: " in done.stdout
+    assert "motor.resistance = " in done.stdout
+    assert "allowed: above 0" in done.stdout
+    summary = json.loads((folder / "site" / "summary.json").read_text())
+    assert {d["name"] for d in summary["designs"]} == {
+        "ctms-motor-position", "slower", "no <b>motor</b>", "Comparison of all variants",
+    }  # fmt: skip
+    assert summary["counts"]["broken"] == 1
+    check_whole(folder / "site")
+
+
+def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) -> None:
+    folder, _ = built
+    words = ["nightly", str(folder / "study.toml"), "--site", str(folder / "site"), "--no-validation"]
+    assert main([*words, "--workers", "1"]) == 1
+    assert "(3 unchanged)" in capsys.readouterr().out
+    approval = ["nightly", "approve", *words[1:], "--by", "A. Engineer", "--reason", "review 3"]
+    main(approval)
+    capsys.readouterr()
+    main([*words, "--json"])
+    summary = json.loads(capsys.readouterr().out)
+    good = [d for d in summary["designs"] if d["state"] != "broken"]
+    assert {d["approved_by"] for d in good} == {"A. Engineer"}
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["nightly", "no-such-study.toml", "--site", "s"], "no-such-study.toml"),
+        (["nightly", "a", "b", "c", "--site", "s"], "nightly STUDY --site DIR"),
+        (["nightly", "approve", "ilr33-amber", "--site", "s"], "--by and --reason"),
+        (["nightly", "ilr33-amber"], "--site"),
+        (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "0"], "--time-limit"),
+    ],
+)
+def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, words, expected) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    line = capsys.readouterr().err
+    assert expected in line
+    assert line.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "expected"),
+    [
+        ("nightly = 1", "nightly: allowed: a table"),
+        ("[nightly]\npdff = true", "unknown key; allowed: pdf, tolerance"),
+        ("[nightly]\npdf = 1", "allowed: true or false"),
+        ("[nightly]\ntolerance = 3", "a table of name pattern"),
+        ('[nightly.tolerance]\n"*" = "much"', "a number of at least 0"),
+    ],
+)
+def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expected: str) -> None:
+    from actuator_lti.errors import InputError
+    from reports.nightly.source import read_study
+
+    path = tmp_path / "s.toml"
+    path.write_text(
+        f'{table if "nightly = " in table else ""}\n[study]\nbase = "emps"\n'
+        + (table if "[" in table else "")
+    )
+    with pytest.raises(InputError, match=r"s\.toml") as caught:
+        read_study(str(path))
+    assert expected in str(caught.value)
+
+
+def test_any_report_becomes_a_pdf(built, capsys) -> None:
+    folder, _ = built
+    report = next((folder / "site" / "reports").glob("slower-*/*/report.json"))
+    assert main(["pdf", str(report), "--out", str(folder / "r.pdf")]) == 0
+    assert (folder / "r.pdf").read_bytes().startswith(b"%PDF")
+    (folder / "no.json").write_text("{}")
+    assert main(["pdf", str(folder / "no.json")]) == 2
+    capsys.readouterr()
