@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,29 +19,38 @@ from reports.cli.options import (
 ProcessesOption = Annotated[
     int, typer.Option("--processes", min=1, max=64, metavar="N", help="Processes that draw the figures.")
 ]
+IncludeOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--include", metavar="JSON", help="Add the sections that identify or correlate wrote (repeatable)."
+    ),
+]
 
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
     out: OutOption = DEFAULT_OUT,
     processes: ProcessesOption = 2,
+    include: IncludeOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Write report.html and report.json of a design.
 
     The page needs no network and opens from disk. With --json the document also goes to standard output.
+    With --include the results of identify and correlate become sections of it.
     """
     from actuator_lti.design import load_design
     from reports.build import design_report, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
-    from reports.document import dumps
+    from reports.document import dumps, load
 
     drive = load_design(design)
+    added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
-        made = design_report(drive, progress=computing)
+        made = design_report(drive, added, progress=computing)
     with progress("drawing figures", quiet=quiet) as drawing:
         page, data = write_report(made, out, processes=processes, progress=drawing)
     if as_json:

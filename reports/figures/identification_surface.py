@@ -25,7 +25,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
         )
         look: dict[str, Any] = {
             "color": colour,
-            "marker": "osD^v"[k % 5],
+            "marker": "osD^vPX"[k % 7],
             "markersize": 4.5,
             "linestyle": "none",
         }

@@ -88,6 +88,17 @@ def test_emps_on_the_command_line(
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
 
 
+def test_the_results_become_sections_of_the_report(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _run(capsys, "identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
+    result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
+    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out, "--processes", "1")
+    ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
+    assert "identification" in ids
+    assert ids.count("provenance") == 1
+
+
 def test_the_chirp_on_the_command_line(
     odrive_files: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
