@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,6 +14,8 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 _BELOW = 1e-8  # relative: how much lower a second place may be without being found
 _ROUNDS = 30
+_NEWTON_STEPS = 12
+_NEWTON_STEP = 1e-9
 FAR = 1e300  # stands for L at a pole on the end of the axis: T = 1, disk distance 2
 
 
@@ -21,15 +24,15 @@ class Criterion:
     """A distance \\|G(L)\\| that is to be smallest, and the circle on which it has a given value."""
 
     distance: Callable[[Complex], Real]
-    derivatives: Callable[[Complex], tuple[Complex, Complex, Complex]]
+    derivatives: Callable[[complex], tuple[complex, complex, complex]]
     circle: Callable[[float], tuple[float, float, float]]
 
 
-def _modulus_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
-    return 1.0 + L, np.ones_like(L), np.zeros_like(L)
+def _modulus_derivatives(L: complex) -> tuple[complex, complex, complex]:
+    return 1.0 + L, 1.0 + 0j, 0j
 
 
-def _disk_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+def _disk_derivatives(L: complex) -> tuple[complex, complex, complex]:
     below = 1.0 - L
     return 2.0 * (1.0 + L) / below, 4.0 / below**2, 8.0 / below**3
 
@@ -44,7 +47,7 @@ def _disk_circle(alpha: float) -> tuple[float, float, float]:
     return 1.0 - k, 1.0 + k, 1.0 - k
 
 
-def _complementary_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+def _complementary_derivatives(L: complex) -> tuple[complex, complex, complex]:
     return 1.0 + 1.0 / L, -1.0 / L**2, 2.0 / L**3
 
 
@@ -53,7 +56,7 @@ def _complementary_distance(L: Complex) -> Real:
         return np.where(L == 0.0, np.inf, np.abs((1.0 + L) / L))
 
 
-def _peak_derivatives(L: Complex) -> tuple[Complex, Complex, Complex]:
+def _peak_derivatives(L: complex) -> tuple[complex, complex, complex]:
     return 1.0 / L, -1.0 / L**2, 2.0 / L**3
 
 
@@ -95,10 +98,10 @@ def smallest(
             return value, best
         w = np.concatenate((w, np.sqrt(w[1:] * w[:-1])))
         at = unwarped(w, loop.in_z)
-        lower, place = _refined(loop, criterion, at, loop.response(at), top)
-        if lower >= value * (1.0 - _BELOW):
+        L = loop.response(at)
+        if float(criterion.distance(L).min()) >= value * (1.0 - _BELOW):
             return value, best
-        value, best = lower, place
+        value, best = _refined(loop, criterion, at, L, top)
     raise NumericalError("the smallest distance to -1 was not settled: rescale the states of the loop")
 
 
@@ -111,20 +114,20 @@ def _refined(
     value, best = float(distance[k]), float(x[k])
     if not 0.0 < best < top or not loop.order:
         return value, best
-    at = np.array([best])
-    for _ in range(12):
+    at = best
+    for _ in range(_NEWTON_STEPS):
         L0, L1, L2 = loop.jet(at)
         G, G_L, G_LL = criterion.derivatives(L0)
-        G1, G2 = G_L * L1, G_L * L2 + G_LL * L1 * L1
-        here = float(np.abs(G[0]))
-        if here <= value:
-            value, best = here, float(at[0])
-        slope = float((G.conj() * G1).real[0])
-        curvature = float((np.abs(G1) ** 2 + (G.conj() * G2).real)[0])
-        step = -slope / curvature if curvature > 0.0 else -np.sign(slope) * 0.2 * float(at[0])
-        step = float(np.clip(step, -0.5 * at[0], min(float(at[0]), 0.5 * (top - float(at[0])))))
-        at = at + step
-        if abs(step) <= 1e-10 * at[0]:
+        G1 = G_L * L1
+        G2 = G_L * L2 + G_LL * L1 * L1
+        if abs(G) <= value:
+            value, best = abs(G), at
+        slope = (G.conjugate() * G1).real
+        curvature = abs(G1) ** 2 + (G.conjugate() * G2).real
+        step = -slope / curvature if curvature > 0.0 else -math.copysign(0.2 * at, slope)
+        step = max(min(step, at, 0.5 * (top - at)), -0.5 * at)
+        at += step
+        if abs(step) <= _NEWTON_STEP * at:
             break
     return value, best
 

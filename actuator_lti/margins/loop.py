@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgebal
+from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
 
 from actuator_lti.errors import InputError
 
@@ -97,20 +98,19 @@ class RationalLoop:
         second = np.linalg.solve(matrix, first)
         return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
 
-    def jet(self, x: Real) -> tuple[Complex, Complex, Complex]:
-        """L and its first two derivatives by x."""
-        points = self.point(x)
+    def jet(self, x: float) -> tuple[complex, complex, complex]:
+        """L and its first two derivatives by x at one point."""
+        point = cmath.exp(1j * x) if self.in_z else 1j * x
         if self.order == 0:
-            zero = np.zeros(points.shape, dtype=complex)
-            return zero + self.d, zero, zero
-        matrix = self._resolvent(points)
-        first = np.linalg.solve(matrix, self.b[:, None])
-        second = np.linalg.solve(matrix, first)
-        third = np.linalg.solve(matrix, second)
-        d_point, dd_point = -(second[..., 0] @ self.c), 2.0 * (third[..., 0] @ self.c)
-        L = self.d + first[..., 0] @ self.c
+            return complex(self.d), 0j, 0j
+        lu, pivots, _ = zgetrf(self._resolvent(np.array([point]))[0], overwrite_a=1)
+        first = zgetrs(lu, pivots, self.b)[0]
+        second = zgetrs(lu, pivots, first)[0]
+        third = zgetrs(lu, pivots, second)[0]
+        L = complex(self.d + first @ self.c)
+        d_point, dd_point = -complex(second @ self.c), 2.0 * complex(third @ self.c)
         if self.in_z:
-            return L, 1j * points * d_point, -points * (d_point + points * dd_point)
+            return L, 1j * point * d_point, -point * (d_point + point * dd_point)
         return L, 1j * d_point, -dd_point
 
     def delayed(self, samples: int) -> RationalLoop:
