@@ -75,16 +75,17 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         operating_points,
         requirements,
     )
+    from reports.sections.names import load_unit
 
     design, figures = survey.design, survey.figures
-    sections = [requirements.section(verdicts), margins.section(figures, survey.locked)]
+    sections = [requirements.section(verdicts, load_unit(design)), margins.section(figures, survey.locked)]
     for name, found in figures.items():
         locked = survey.locked if name == "current" else None
         status = "info" if found.stable else "fail"
         sections.append(loop.section(name, design, found, locked, status))
     sections.append(forms.section(survey.forms))
     sections.append(break_points.section(survey.break_points, figures))
-    sections.append(operating_points.section(survey.operating_points, _load_unit(design)))
+    sections.append(operating_points.section(survey.operating_points, design))
     if survey.budgets:
         sections.append(delays.section(survey.budgets))
     if survey.onset is not None:
@@ -129,7 +130,3 @@ def write_report(
     paths = (Path(folder) / "report.html", Path(folder) / "report.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths
-
-
-def _load_unit(design: Design) -> str:
-    return "N" if design.axis == "linear" else "N m"

@@ -36,6 +36,7 @@ def margins(
     from analyses.loop_figures import all_loop_figures
     from analyses.requirements import all_pass, evaluate_requirements
     from reports.cli.errors import leave_with
+    from reports.sections.names import load_unit
 
     drive = load_design(design)
     loops = assemble_loops(
@@ -47,7 +48,13 @@ def margins(
     figures = all_loop_figures(loops, step=form != "continuous")
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
-    where = {"design": drive.name, "form": form, "operating_point": operating_point, "load_Nm": load}
+    where: dict[str, Any] = {
+        "design": drive.name,
+        "form": form,
+        "operating_point": operating_point,
+        "load_Nm": load,
+    }
+    where["load_unit"] = load_unit(drive)
     if as_json:
         _print_json(where, figures, verdicts)
     else:
@@ -66,7 +73,14 @@ def _print_json(
 
     loops = {name: loop_json(found) for name, found in figures.items()}
     passed = all_pass(tuple(verdicts)) and all(found.stable for found in figures.values())
-    print_json({**where, "passed": passed, "loops": loops, "verdicts": [item(v) for v in verdicts]})
+    print_json(
+        {
+            **where,
+            "passed": passed,
+            "loops": loops,
+            "verdicts": [item(v, where["load_unit"]) for v in verdicts],
+        }
+    )
 
 
 def _print_tables(
@@ -79,11 +93,12 @@ def _print_tables(
     from reports.terminal import print_blocks, side_by_side
 
     named = {LOOPS[name]: found for name, found in figures.items()}
-    head = f"{where['design']}: {where['form']}, {where['operating_point']}, load {where['load_Nm']:g} N m"
+    load = f"load {where['load_Nm']:g} {where['load_unit']}"
+    head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
     if any(
         len(found.margins.gain_margins) + len(found.margins.phase_margins) > 2 for found in figures.values()
     ):
         blocks.append(crossing_table(named))
     notes = [note for found in figures.values() for note in (*found.margins.notes, *found.notes)]
-    print_blocks([*blocks, *section(verdicts)["blocks"]], notes)
+    print_blocks([*blocks, *section(verdicts, where["load_unit"])["blocks"]], notes)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
+from actuator_lti.design.model import Design
+
 LOOPS = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 FORMS = {"sampled": "sampled", "continuous": "continuous with delays", "ideal": "ideal, no delay"}
 POINTS = {
@@ -28,6 +32,11 @@ QUANTITIES = {
 }
 
 
+def load_unit(design: Design) -> str:
+    """Give the unit of the load at the output."""
+    return "N" if design.axis == "linear" else "N m"
+
+
 def hertz(omega_rad_s: float | None) -> float | None:
     """Turn rad/s into Hz; nothing stays nothing."""
-    return None if omega_rad_s is None else omega_rad_s / 6.283185307179586
+    return None if omega_rad_s is None else omega_rad_s / (2.0 * math.pi)

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from actuator_lti.design.model import Design
 from analyses.loop_survey import OperatingPointFigures
 from reports import document as doc
 from reports.sections.margins import margin_row, response_row
+from reports.sections.names import load_unit
 
 
-def section(points: Sequence[OperatingPointFigures], unit: str = "N m") -> dict[str, Any]:
+def section(points: Sequence[OperatingPointFigures], design: Design) -> dict[str, Any]:
     """Make the section; one line an operating point, three figures a loop."""
     names = list(points[0].figures)
+    linear = design.axis == "linear"
     columns = [
         doc.column("point", "Operating point"),
-        doc.column("load", "Load", unit, format="short:3"),
-        doc.column("slope", "Friction slope", "mN m s/rad", format="sig:3"),
+        doc.column("load", "Load", load_unit(design), format="short:3"),
+        doc.column("slope", "Friction slope", "N s/m" if linear else "mN m s/rad", format="sig:3"),
     ]
     for name in names:
         label = name.capitalize()
@@ -25,7 +28,7 @@ def section(points: Sequence[OperatingPointFigures], unit: str = "N m") -> dict[
             doc.column(f"{name}_gain", f"{label} GM", "dB", format="fix:1"),
             doc.column(f"{name}_band", f"{label} −3 dB", "Hz", format="sig:3"),
         ]
-    rows = [_row(point) for point in points]
+    rows = [_row(point, 1.0 if linear else 1e3) for point in points]
     note = (
         "Sliding: the dry part is a constant torque and leaves no trace in the loops, whatever the load. "
         "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
@@ -36,8 +39,8 @@ def section(points: Sequence[OperatingPointFigures], unit: str = "N m") -> dict[
     return doc.section("operating-points", "Operating points", blocks, intro=intro)
 
 
-def _row(point: OperatingPointFigures) -> dict[str, Any]:
-    row: dict[str, Any] = {"point": point.label, "slope": point.slope_Nms_rad * 1e3}
+def _row(point: OperatingPointFigures, scale: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"point": point.label, "slope": point.slope_Nms_rad * scale}
     row["load"] = "any" if point.load_Nm is None else point.load_Nm
     for name, found in point.figures.items():
         margins, response = margin_row(found), response_row(found)

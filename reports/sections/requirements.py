@@ -11,8 +11,8 @@ from reports import document as doc
 from reports.sections.names import QUANTITIES
 
 
-def section(verdicts: Sequence[RequirementVerdict]) -> dict[str, Any]:
-    """Make the section from the verdicts."""
+def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> dict[str, Any]:
+    """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
         blocks = [doc.text("The design file states no requirement.")]
         return doc.section("verdicts", "Verdicts", blocks, status="info")
@@ -21,13 +21,13 @@ def section(verdicts: Sequence[RequirementVerdict]) -> dict[str, Any]:
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
-    items = [item(verdict) for verdict in verdicts]
+    items = [item(verdict, load_unit) for verdict in verdicts]
     status = "pass" if all_pass(tuple(verdicts)) else "fail"
     title = "Verdicts" if not failed else f"Verdicts: {failed} not met"
     return doc.section("verdicts", title, [doc.verdicts(items)], intro=intro, status=status)
 
 
-def item(verdict: RequirementVerdict) -> dict[str, Any]:
+def item(verdict: RequirementVerdict, load_unit: str = "N m") -> dict[str, Any]:
     """Make one line of the verdicts."""
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)
@@ -39,7 +39,7 @@ def item(verdict: RequirementVerdict) -> dict[str, Any]:
     )
     return doc.verdict(
         verdict.id,
-        label(verdict),
+        label(verdict, load_unit),
         value=verdict.value,
         limit=limit,
         comparison=comparison,
@@ -51,13 +51,13 @@ def item(verdict: RequirementVerdict) -> dict[str, Any]:
     )
 
 
-def label(verdict: RequirementVerdict) -> str:
+def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
     """Say what is required of what, in words."""
     requirement = verdict.requirement
     what = QUANTITIES.get(requirement.quantity, requirement.quantity)
     if verdict.loop is not None:
         return f"{verdict.loop.capitalize()} loop: {what}"
-    load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} N m"
+    load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} {load_unit}"
     return f"Drive: {what}{load}"
 
 

@@ -270,6 +270,15 @@ def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
     assert "unstable" in page(document)
 
 
+def test_a_linear_axis_is_told_in_its_own_units() -> None:
+    document = design_report(load_design("emps"))
+    table = next(
+        block for part in document["sections"] if part["id"] == "operating-points" for block in part["blocks"]
+    )
+    assert [column["unit"] for column in table["columns"][1:3]] == ["N", "N s/m"]
+    assert table["rows"][0]["slope"] == pytest.approx(203.5034)  # viscous friction, published
+
+
 def test_limits_are_those_of_the_linear_onset(built: Built) -> None:
     from actuator_lti.limiters import onset
 
