@@ -86,10 +86,14 @@ def simulate_bench(
 
     Raises
     ------
+    InputError
+        For a linear axis or a drive without a current.
     NumericalError
         If a run does not reach its speed, because a limit of the drive holds it back.
     """
     plan = BenchPlan() if plan is None else plan
+    if design.axis != "rotary" or design.motor.torque_constant_Nm_A is None:
+        raise InputError("the bench needs a rotary drive with a torque constant", where=design.name)
     children = np.random.default_rng(seed).spawn(len(plan.runs))
     runs = []
     for k, ((speed, load), rng) in enumerate(zip(plan.runs, children, strict=True), 1):

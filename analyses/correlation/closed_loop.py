@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-REFERENCES = ("reference", "position_reference")
+REFERENCES = {"rotary": "reference", "linear": "position_reference"}
 UNITS = {
     "angle": "rad",
     "output_angle": "rad",

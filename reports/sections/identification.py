@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -159,15 +160,12 @@ def law_table(laws: RicherLaws) -> dict[str, Any]:
 def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
     """What to measure next, and for which margins."""
     columns = [
-        doc.column("order", "Run", format="fix:0"),
+        doc.column("order", "Run"),
         doc.column("speed", "Speed", "rad/s", format="fix:1"),
         doc.column("load", "Load", "N m", format="fix:2"),
         doc.column("remaining", "Random variance left", "%", format="fix:1"),
     ]
-    rows = [
-        {"order": float(r.order), "speed": r.speed_rad_s, "load": r.load_Nm, "remaining": 100.0 * r.remaining}
-        for r in suggestion.runs
-    ]
+    rows = _grouped(suggestion)
     note = ""
     if suggestion.largest_shared is not None:
         note = (
@@ -188,9 +186,23 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
     ]
     goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
     return [
-        doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows, note),
+        doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows),
+        *([doc.text(note)] if note else []),
         doc.table("Margins and their uncertainty from the friction, slow motion", margins, spread),
     ]
+
+
+def _grouped(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
+    """Suggested runs, the same point several times in one row."""
+    rows: list[dict[str, Any]] = []
+    for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
+        same = list(runs)
+        first, last = same[0].order, same[-1].order
+        order = str(first) if first == last else f"{first} to {last}"
+        rows.append(
+            {"order": order, "speed": point[0], "load": point[1], "remaining": 100.0 * same[-1].remaining}
+        )
+    return rows
 
 
 def account_blocks(result: CampaignResult) -> list[dict[str, Any]]:

@@ -48,6 +48,11 @@ def test_one_sample_more_of_delay_in_the_design_is_seen(emps_file: Path) -> None
     assert 100.0 * correlate_record(late, open_record(emps_file))["force"].relative_error > 7.0
 
 
+def test_a_record_of_another_axis_is_refused(emps_file: Path) -> None:
+    with pytest.raises(InputError, match='the signal "reference" is needed for a rotary axis'):
+        correlate_record(load_design("ilr33-amber"), open_record(emps_file))
+
+
 def test_figures_of_likeness_by_construction() -> None:
     time = np.linspace(0.0, 1.0, 1001)
     measured = 2.0 + np.sin(20.0 * time)

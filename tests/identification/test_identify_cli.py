@@ -137,6 +137,7 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
         (("identify", "nowhere.toml"), "nowhere.toml: cannot be read"),
         (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read"),
+        (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
 )
