@@ -160,11 +160,10 @@ def model_signals(
     """
     from nonlinear import commands, loads, simulate
 
-    reference = next((record[name] for name in REFERENCES if name in record.signals), None)
-    if reference is None:
-        raise InputError(
-            f"no command: one of the signals {', '.join(REFERENCES)} is needed", where=record.name
-        )
+    wanted = REFERENCES[design.axis]
+    if wanted not in record.signals:
+        raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
+    reference = record[wanted]
     time = record.time_s - record.time_s[0]
     load = 0.0 if "torque" not in record.signals else loads.series(time, record["torque"])
     period = design.controller.period_s
