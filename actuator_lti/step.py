@@ -66,8 +66,8 @@ def step_figures(system: Any) -> StepFigures:
 
     A continuous state space is propagated exactly (matrix exponentials) on a grid as fine as its fastest
     mode still alive, and each figure is then located inside its grid interval. A sampled system is looked at
-    at its samples. A system with inner delays is stepped along its delays, its delayed signals straight
-    between points at least 20 to the shortest delay.
+    at its samples. A system with inner delays is stepped along its first delays, the delayed signals straight
+    between points at least 20 to the shortest one, and is then the sum over its exact poles.
 
     Parameters
     ----------
@@ -87,8 +87,7 @@ def step_figures(system: Any) -> StepFigures:
     """
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
-            time, response, final = delayed_response(system)
-            return _figures(time, response, final, _straight(time, response), None)
+            return _figures(*delayed_response(system), None)
         system = system.to_state_space()
     loop = rational_loop(system)
     poles = sorted_poles(loop.A, loop.in_z)
@@ -174,13 +173,6 @@ def powers(P: Real, x: Real, steps: int) -> Real:
         run = np.concatenate((run, P @ run), axis=1)
         P = P @ P
     return run[:, :steps]
-
-
-def _straight(time: Real, response: Real) -> Callable[[int, float], float]:
-    def between(k: int, t: float) -> float:
-        return float(np.interp(t, time[k : k + 2], response[k : k + 2]))
-
-    return between
 
 
 def _located(time: Real, between: Callable[[int, float], float], k: int, level: float) -> float:

@@ -157,6 +157,18 @@ def _matrix(form: DelayForm, points: Complex) -> tuple[Complex, Complex]:
     return F, lag
 
 
+def characteristic(form: DelayForm, s: complex) -> tuple[Complex, Complex, Complex, Complex]:
+    """Characteristic matrix F(s), dF/ds, and the row and column of L = D11 + row F^-1 column, at one point."""
+    F, lag = _matrix(form, np.array([s]))
+    n, q = form.B1.size, form.delays.size
+    slope = np.zeros_like(F[0])
+    slope[:n, :n] = np.eye(n)
+    late = form.delays * lag[0]
+    slope[:n, n:], slope[n:, n:] = form.B2 * late, form.D22 * late
+    column = np.concatenate((form.B1, form.D21)).astype(complex)
+    return F[0], slope, _output(form, lag)[0], column if q else column[:n]
+
+
 def _output(form: DelayForm, lag: Complex) -> Complex:
     n = form.B1.size
     row = np.empty((lag.shape[0], n + form.delays.size), dtype=complex)

@@ -1,0 +1,86 @@
+"""Step response of a system with delays as the sum over its exact poles, once a few delays have passed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.margins.delay_form import DelayForm, characteristic
+from actuator_lti.margins.loop import Complex, Real
+
+_FORGOTTEN = 25.0  # time constants
+_NEWTON = 8
+_FINE = 0.05
+
+
+@dataclass(frozen=True)
+class ModalTail:
+    """Deviation of a unit step response from its final value: the real part of sum(weight exp(pole t)).
+
+    Attributes
+    ----------
+    poles, weights : arrays (m,), complex
+        Poles of the upper half plane (real ones included); a pair counts in one weight.
+    """
+
+    poles: Complex
+    weights: Complex
+
+    def response(self, time: Real) -> Real:
+        """The deviation at the times given, s."""
+        return (np.exp(time[:, None] * self.poles) @ self.weights).real
+
+    def grid(self, start: float, stop: float) -> Real:
+        """Times as close as the fastest pole that is alive asks for."""
+        ends = np.unique(np.clip(14.0 / -self.poles.real, start, stop))
+        ends = np.unique(np.append(ends, stop))
+        parts, at = [], start
+        for end in ends[ends > start]:
+            alive = self.poles[14.0 / -self.poles.real >= end * (1.0 - 1e-12)]
+            fastest = float(np.abs(alive).max()) if alive.size else 1.0 / end
+            count = int(min(max(np.ceil((end - at) * fastest / _FINE), 8), 200_000))
+            parts.append(at + (end - at) * np.arange(1, count + 1) / count)
+            at = float(end)
+        return np.concatenate(parts)
+
+
+def modal_tail(form: DelayForm, poles: Complex, start: float) -> ModalTail:
+    """Sharpen the poles that are still alive after ``start`` (s), and weigh them by their residues in T/s.
+
+    Parameters
+    ----------
+    form : DelayForm
+        The closed loop T, no delay in series.
+    poles : array, complex
+        Estimates from the collocation.
+    """
+    alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
+    found: list[complex] = []
+    weights: list[complex] = []
+    for estimate in poles[alive]:
+        pole, residue = _sharpened(form, complex(estimate))
+        if pole is None or any(abs(pole - p) <= 1e-9 * abs(p) for p in found):
+            continue
+        found.append(pole)
+        weights.append(residue / pole * (1.0 if abs(pole.imag) <= 1e-12 * abs(pole) else 2.0))
+    return ModalTail(np.array(found, dtype=complex), np.array(weights, dtype=complex))
+
+
+def _sharpened(form: DelayForm, pole: complex) -> tuple[complex | None, complex]:
+    """Newton with both null vectors, pole -= (u* F w)/(u* F' w); the residue of T there."""
+    start = pole
+    for _ in range(_NEWTON):
+        F, slope, row, column = characteristic(form, pole)
+        U, _, Vh = np.linalg.svd(F)
+        u, w = U[:, -1], Vh[-1].conj()
+        below = complex(u.conj() @ slope @ w)
+        step = complex(u.conj() @ F @ w) / below
+        pole -= step
+        if abs(step) <= 1e-13 * abs(pole):
+            break
+    if abs(start.imag) <= 1e-9 * abs(start):
+        pole = complex(pole.real)
+    if abs(pole - start) > 0.1 * abs(start):
+        return None, 0j
+    return pole, complex(row @ w) * complex(u.conj() @ column) / below
