@@ -127,6 +127,7 @@ def _campaign(
     from analyses.records import import_campaign, load_campaign
     from reports.cli.output import print_json
     from reports.cli.progress import progress
+    from reports.identification_json import campaign_json
     from reports.sections import identification as pages
 
     listed = load_campaign(path)
@@ -151,7 +152,7 @@ def _campaign(
         identified = design_with_estimate(drive, surface_estimate(result.fit, source))
         _write(drive, identified, made, source, out, quiet)
     if as_json:
-        print_json(_campaign_json(result, shares, suggestion, at))
+        print_json(campaign_json(result, shares, suggestion, at))
         return
     _print_campaign(made, out)
 
@@ -182,52 +183,6 @@ def _print_campaign(made: dict[str, Any], out: Path | None) -> None:
     print_blocks([block for block in made["blocks"] if block["kind"] in ("table", "text")])
     if out is not None:
         print_line(f"written: {out}")
-
-
-def _campaign_json(
-    result: CampaignResult, shares: Any, suggestion: Any, at: dict[str, float]
-) -> dict[str, Any]:
-    """Everything for a machine, in SI."""
-    from dataclasses import asdict
-
-    fit = result.fit
-    names = ("C0", "Cv", "CM")
-    return {
-        "campaign": result.imported.campaign.name,
-        "runs_listed": result.runs_listed,
-        "runs_used": len(fit.points),
-        "set_aside": [asdict(run) for run in result.set_aside],
-        "outliers": [asdict(run) for run in fit.outliers],
-        "rows_in": result.imported.rows_in,
-        "rows_out": result.imported.rows_out,
-        "criterion": str(result.criterion),
-        "coefficients": {
-            name: {
-                "value": fit.values[k],
-                "standard_error": fit.standard_errors[k],
-                "interval_95": fit.intervals[k],
-            }
-            for k, name in enumerate(names)
-        },
-        "units": {"C0": "N m", "Cv": "N m s/rad", "CM": "N m/(N m)"},
-        "covariance": fit.covariance,
-        "shared_shifts": fit.shared_shifts,
-        "run_scatter_Nm": fit.run_scatter_Nm,
-        "birge_ratio": fit.birge_ratio,
-        "contributions": {**at, "terms": [asdict(term) for term in shares]},
-        "richer_laws": None if result.laws is None else asdict(result.laws),
-        "suggestion": None if suggestion is None else asdict(suggestion),
-        "points": [
-            {
-                "run": p.run,
-                "speed_rad_s": p.direction * p.speed_rad_s,
-                "load_Nm": p.load_Nm,
-                "torque_Nm": p.torque_Nm,
-                "steady_s": [p.window.start_s, p.window.stop_s],
-            }
-            for p in fit.points
-        ],
-    }
 
 
 def _dynamic(

@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
-from reports.sections.thinning import kept_rows
+from reports.sections.identification_figures import (
+    NAMES,
+    region_figure,
+    residual_figure,
+    surface_figure,
+    window_figures,
+)
 
 if TYPE_CHECKING:
     from analyses.campaign_design import CampaignSuggestion
@@ -19,7 +24,6 @@ if TYPE_CHECKING:
     from analyses.identification.richer import RicherLaws
     from analyses.identification.surface import SurfaceFit
 
-NAMES = ("C0", "Cv", "CM")
 SHOWN = (("mN m", 1e3), ("µN m s/rad", 1e6), ("mN m/(N m)", 1e3))
 MEANING = ("static", "viscous", "load")
 
@@ -37,10 +41,10 @@ def section(
     blocks = [
         coefficient_table(fit),
         contribution_table(shares, load_Nm, speed_rad_s),
-        _surface_figure(fit),
-        _region_figure(fit),
-        _residual_figure(fit),
-        *_window_figures(result),
+        surface_figure(fit),
+        region_figure(fit),
+        residual_figure(fit),
+        *window_figures(result),
         shared_table(fit),
     ]
     if result.laws is not None:
@@ -270,121 +274,3 @@ def run_table(result: CampaignResult) -> dict[str, Any]:
             }
         )
     return doc.table("Runs", columns, rows)
-
-
-def _surface_figure(fit: SurfaceFit) -> dict[str, Any]:
-    loads = np.array([p.load_Nm for p in fit.points])
-    levels = []
-    for centre in _levels(loads):
-        here = [p for p in fit.points if abs(p.load_Nm - centre) <= 0.25]
-        mean = float(np.mean([p.load_Nm for p in here]))
-        line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
-        levels.append(
-            {
-                "label": f"{mean:.2g} N m",
-                "speed_rad_s": rounded([p.speed_rad_s for p in here]),
-                "torque_mNm": rounded([1e3 * p.torque_Nm for p in here]),
-                "line_speed_rad_s": rounded(line),
-                "line_torque_mNm": rounded(1e3 * fit.predict_Nm(line, np.full(2, mean))),
-            }
-        )
-    named = {o.run for o in fit.outliers}
-    outliers = [
-        {"run": p.run, "speed_rad_s": p.speed_rad_s, "torque_mNm": 1e3 * p.torque_Nm}
-        for p in fit.points
-        if p.run in named
-    ]
-    return doc.figure(
-        "identification_surface",
-        {"levels": levels, "outliers": outliers},
-        caption="Friction torque of every run and the fitted surface, a line for each load",
-        alt="Measured friction torque against motor speed at several loads, with straight fitted lines",
-    )
-
-
-def _levels(loads: np.ndarray) -> list[float]:
-    """Loads that differ by more than 0.5 N m, up to ten."""
-    found: list[float] = []
-    for load in np.sort(loads):
-        if not found or load - found[-1] > 0.5:
-            found.append(float(load))
-    return found[:10]
-
-
-def _residual_figure(fit: SurfaceFit) -> dict[str, Any]:
-    named = {o.run for o in fit.outliers}
-    data = {
-        "speed_rad_s": rounded([p.speed_rad_s for p in fit.points]),
-        "load_Nm": rounded([p.load_Nm for p in fit.points]),
-        "residual_uNm": rounded(1e6 * fit.own_residuals_Nm),
-        "std_uNm": rounded(1e6 * fit.residual_stds_Nm),
-        "outlier": [p.run in named for p in fit.points],
-        "run": [p.run for p in fit.points],
-    }
-    return doc.figure(
-        "identification_residuals",
-        data,
-        caption="Residuals of the runs less the most likely shared errors, with two standard deviations",
-        alt="Residual torque of every run against speed and against load",
-    )
-
-
-def _region_figure(fit: SurfaceFit) -> dict[str, Any]:
-    from scipy.stats import chi2
-
-    radius = float(np.sqrt(chi2.ppf(0.95, 2)))
-    pairs = []
-    for i, j in ((0, 1), (0, 2), (1, 2)):
-        scale = 100.0 / fit.values[[i, j]]
-        pairs.append(
-            {
-                "x_label": f"{NAMES[i]}, % from its value",
-                "y_label": f"{NAMES[j]}, %",
-                "whole": _ellipse(fit.covariance, i, j, scale, radius),
-                "random": _ellipse(fit.random_covariance, i, j, scale, radius),
-                "interval": rounded(fit.half_widths[[i, j]] * scale),
-            }
-        )
-    return doc.figure(
-        "identification_region",
-        {"pairs": pairs},
-        caption="Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone",
-        alt="Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors",
-    )
-
-
-def _ellipse(covariance: np.ndarray, i: int, j: int, scale: np.ndarray, radius: float) -> dict[str, Any]:
-    part = covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(part)
-    turn = np.linspace(0.0, 2.0 * np.pi, 73)
-    circle = np.vstack([np.cos(turn), np.sin(turn)])
-    x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
-    return {"x": rounded(x, 4), "y": rounded(y, 4)}
-
-
-def _window_figures(result: CampaignResult) -> list[dict[str, Any]]:
-    """The first, the middle and the last run with their steady part marked; the others on demand."""
-    runs = {run.id: run for run in result.imported.runs}
-    points = result.fit.points
-    chosen = dict.fromkeys((len(points) - 1, 0, len(points) // 2))
-    figures = []
-    for k in chosen:
-        record, window = runs[points[k].run].record, points[k].window
-        shown = [name for name in ("speed", "current", "torque") if name in record.signals]
-        rows = kept_rows([record[name] for name in shown])
-        labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
-        data = {
-            "time_s": rounded(record.time_s[rows], 6),
-            "panels": [{"label": labels[name], "values": rounded(record[name][rows])} for name in shown],
-            "window": rounded([window.start_s, window.stop_s], 6),
-        }
-        caption = (
-            f"Run {points[k].run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"
-        )
-        alt = f"Speed, current and torque of run {points[k].run} over time with the steady part shaded"
-        figures.append(doc.figure("identification_window", data, caption=caption, alt=alt))
-    return (
-        [figures[0], doc.details("The first and the middle run", figures[1:])]
-        if len(figures) > 1
-        else figures
-    )
