@@ -19,7 +19,8 @@ from site_checks import check_whole
 from reports.nightly.night import run_night
 
 HERE = Path(__file__).parent
-QUIET = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(HERE)}
+PATHS = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
+QUIET = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": PATHS}
 KILLS = 60
 
 
