@@ -67,7 +67,7 @@ def sweep_from_rest(
     settle_ticks: int,
     *,
     load_Nm: float = 0.0,
-    friction_on: bool = True,
+    described: bool = True,
 ) -> RestSweep:
     """Command sines from rest and compare with the describing function of dry friction.
 
@@ -78,6 +78,8 @@ def sweep_from_rest(
         Of the command at the output, one for all or one a frequency.
     settle_ticks : int
         Before the two windows.
+    described : bool
+        Whether there is dry friction to be described.
     """
     tick_s, n = design.controller.period_s, design.controller.position.every
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
@@ -85,7 +87,7 @@ def sweep_from_rest(
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
     window = coherent(asked, tick_s, n, least_cycles=2)
     amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
-    rows = repeat_row(design_row(design, friction_on=friction_on), asked.size)
+    rows = repeat_row(design_row(design), asked.size)
     rows[:, at.LOAD] = load_Nm
     rows[:, at.TICKS] = settle_ticks + 2 * window.ticks + np.ceil(4 * window.ticks / window.cycles)
     rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window.ticks, window.cycles, 1
@@ -94,15 +96,15 @@ def sweep_from_rest(
     measured = result.phasor("output_angle_rad") / amplitude
     speed = np.abs(result.phasor("motor_speed_rad_s"))
     moving = np.abs(measured) > NO_MOTION
-    described = np.full(asked.size, np.nan, complex)
-    for k in np.flatnonzero(moving & friction_on):
-        described[k] = _linear(design, window.frequency_hz[k], load_Nm, float(speed[k]))
+    expected = np.full(asked.size, np.nan, complex)
+    for k in np.flatnonzero(moving & described):
+        expected[k] = _linear(design, window.frequency_hz[k : k + 1], load_Nm, float(speed[k]))[0]
     return RestSweep(
         frequency_hz=window.frequency_hz,
         amplitude_rad=amplitude,
         measured=measured,
-        sliding=np.array([_linear(design, f, load_Nm, None) for f in window.frequency_hz]),
-        described=described,
+        sliding=_linear(design, window.frequency_hz, load_Nm, None),
+        described=expected,
         speed_rad_s=speed,
         stick_fraction=result.window_stick_fraction,
         distortion=result.distortion("motor_speed_rad_s"),
@@ -118,8 +120,8 @@ def _acting(result: BatchResult, k: int) -> str:
     return name if used[name] > 0.0 else ""
 
 
-def _linear(design: Design, frequency_hz: float, load_Nm: float, speed_rad_s: float | None) -> complex:
-    """Command to output at one frequency; sliding, or described at a speed amplitude.
+def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: float | None) -> Complexes:
+    """Command to output at frequencies; sliding, or described at a speed amplitude.
 
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
     answer is the same but for the images of a held signal.
@@ -129,7 +131,7 @@ def _linear(design: Design, frequency_hz: float, load_Nm: float, speed_rad_s: fl
 
     point = "sliding" if speed_rad_s is None else "describing-function"
     wired = cascade(design, point, load_Nm, speed_rad_s)  # type: ignore[arg-type]
-    return complex(linear_response(reference_to_output(wired), frequency_hz)[0])
+    return linear_response(reference_to_output(wired), frequency_hz)
 
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:

@@ -71,7 +71,7 @@ class Measured:
     sweep: Sweep
 
 
-def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int) -> Measured:
+def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int) -> Measured:
     """Measure what a sweep brackets, and the step.
 
     Parameters
@@ -79,10 +79,10 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int) -> Measured:
     setup : Rig
     sweep : Sweep
         Wide enough to hold what is looked for.
-    settle_ticks : int
-        In which the loop settles.
+    settle_ticks, step_ticks : int
+        Waited for before a point of the sweep; length of the step response.
     """
-    step = step_response(setup, settle_ticks)
+    step = step_response(setup, step_ticks)
     dc = step.final_value
     fine = refined(setup, sweep, _brackets(sweep, dc), settle_ticks)
     f = fine.frequency_hz

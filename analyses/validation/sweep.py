@@ -214,7 +214,9 @@ def settling_ticks(setup: Rig) -> int:
     return settling_ticks_of(loop.closed_loop, setup.hold_ticks, setup.design.name)
 
 
-def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
+def settling_ticks_of(
+    closed_loop: Any, hold_ticks: int, where: str, longest: int = LONGEST_SETTLE_TICKS
+) -> int:
     """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
     size = np.abs(closed_loop.poles())
     if (size > 1.0 + 1e-9).any():
@@ -223,7 +225,7 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str) -> int:
     if slowest <= 0.0:
         return 20 * hold_ticks
     samples = SETTLE_TIME_CONSTANTS / -log(slowest)
-    return int(min(ceil(samples + 20.0) * hold_ticks, LONGEST_SETTLE_TICKS))
+    return int(min(ceil(samples + 20.0) * hold_ticks, longest))
 
 
 def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: int | None = None) -> Floats:
@@ -238,6 +240,8 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
     faint = np.full(window.ticks.size, 1e-4 * scale)
     result = _run(setup, window, faint, min(settle_ticks, FAINT_SETTLE_TICKS), threads)
     most = np.full(faint.size, inf)
+    if setup.point in smallest:
+        rooms[setup.before] = rooms.get(smallest[setup.point], inf)
     for name, room in rooms.items():
         low, high = result.span(name)
         moved = np.maximum(high - result.mean(name), result.mean(name) - low)
@@ -347,8 +351,8 @@ def _distortion(setup: Rig, result: BatchResult, held: Complexes) -> Floats:
     return np.sqrt(np.maximum(power - alone, 0.0) / np.maximum(np.maximum(alone, other), 1e-300))
 
 
-def sweep_errors(sweep: Sweep, loop: Any, response: str = "open_loop") -> SweepErrors:
-    """Compare a sweep with an assembled loop (`actuator_lti.loops.Loop`, sampled).
+def sweep_errors(sweep: Any, loop: Any, response: str = "open_loop") -> SweepErrors:
+    """Compare a sweep (`Sweep`, `ToneSweep`) with an assembled loop (`actuator_lti.loops.Loop`, sampled).
 
     Parameters
     ----------

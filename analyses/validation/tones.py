@@ -74,17 +74,28 @@ def multisine_response(design: Design, loop: str, frequency_hz: npt.ArrayLike, *
     asked = np.sort(np.atleast_1d(np.asarray(frequency_hz, dtype=float)))
     if not asked.size or asked[0] <= 0.0 or asked[-1] >= 0.5 / setup.period_s:
         raise InputError(f"frequency_hz: positive and below {0.5 / setup.period_s:g} Hz (Nyquist)")
-    samples = max(round(1.0 / (asked[0] * setup.period_s)), 2)
-    lines = np.unique(np.rint(asked * samples * setup.period_s).astype(int))
+    settle = settling_ticks(setup)
+    single = stepped_sine(setup, asked, settle)
+    return tone_sweep(setup, asked, single.amplitude, settle, seed)
+
+
+def tone_sweep(
+    setup: Rig, frequency_hz: Floats, amplitude: Floats, settle_ticks: int, seed: int = 0
+) -> ToneSweep:
+    """Measure at a rig, sharing the amplitudes that a sine of each (sorted) frequency may have."""
+    samples = max(round(1.0 / (frequency_hz[0] * setup.period_s)), 2)
+    lines = np.unique(np.rint(frequency_hz * samples * setup.period_s).astype(int))
     lines = lines[(lines > 0) & (2 * lines < samples)]
-    single = stepped_sine(setup, lines / (samples * setup.period_s), settling_ticks(setup))
-    return _measure(setup, lines, samples, CROWD * single.amplitude / lines.size, seed)
+    allowed = np.interp(np.log(lines / (samples * setup.period_s)), np.log(frequency_hz), amplitude)
+    return _measure(setup, lines, samples, CROWD * allowed / lines.size, settle_ticks, seed)
 
 
-def _measure(setup: Rig, lines: np.ndarray, samples: int, amplitude: Floats, seed: int) -> ToneSweep:
+def _measure(
+    setup: Rig, lines: np.ndarray, samples: int, amplitude: Floats, settle_ticks: int, seed: int
+) -> ToneSweep:
     """One run: settle, then whole periods; tones by the discrete Fourier transform of each period."""
     n = setup.hold_ticks
-    settle = ceil(settling_ticks(setup) / (n * samples)) * samples
+    settle = ceil(settle_ticks / (n * samples)) * samples
     signal = _signal(lines, samples, amplitude, seed)
     total = settle + PERIODS * samples
     table = np.repeat(np.tile(signal, total // samples), n)

@@ -1,0 +1,131 @@
+"""What a validation finds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from analyses.loop_figures import LoopFigures
+from analyses.validation.at_rest import RestSweep
+from analyses.validation.conditional import Conditional
+from analyses.validation.confirm import Confirmation
+from analyses.validation.figures import Measured
+from analyses.validation.from_rest import RestSteps
+from analyses.validation.ledger import Entry
+from analyses.validation.release import AmplitudeMargin
+from analyses.validation.sweep import Sweep, SweepErrors
+from analyses.validation.tones import ToneSweep
+
+if TYPE_CHECKING:
+    from analyses.friction_effects import FrictionEffects
+    from analyses.large_signal import LargeSignals
+    from analyses.specification import Specification
+
+Complexes = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class LoopValidation:
+    """One loop, linear and measured.
+
+    Attributes
+    ----------
+    name : str
+    figures : LoopFigures
+        Linear.
+    measured : Measured or None
+        ``None`` where the loop is not stable, so that nothing can be measured; ``reason`` says so.
+    open_loop, closed_loop : ndarray of complex, shape (K,)
+        Linear responses at the frequencies of the sweep.
+    open_errors, closed_errors : SweepErrors or None
+    tones : ToneSweep or None
+    tone_errors : SweepErrors or None
+    confirmed : tuple of Confirmation
+    reason : str
+    """
+
+    name: str
+    figures: LoopFigures
+    measured: Measured | None
+    open_loop: Complexes
+    closed_loop: Complexes
+    open_errors: SweepErrors | None
+    closed_errors: SweepErrors | None
+    tones: ToneSweep | None
+    tone_errors: SweepErrors | None
+    confirmed: tuple[Confirmation, ...]
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class PointValidation:
+    """A break point with all other loops closed, linear and measured."""
+
+    name: str
+    sweep: Sweep | None
+    open_errors: SweepErrors | None
+    confirmed: tuple[Confirmation, ...]
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Everything the nonlinear simulator says of a design's linear predictions.
+
+    Attributes
+    ----------
+    ledger : tuple of Entry
+        Every prediction beside its measurement.
+    loops, points : mapping by name
+    amplitude_margins : tuple of AmplitudeMargin
+    conditional : Conditional or None
+    rest_sweep : RestSweep or None
+    rest_steps : RestSteps or None
+    large_signals, friction, specification : results or None
+        Of `analyses.large_signal`, `analyses.friction_effects`, `analyses.specification`.
+    seconds : mapping of str to float
+        How the time divided.
+    notes : tuple of str
+        What could not be done, and why.
+    """
+
+    design: Design
+    ledger: tuple[Entry, ...]
+    loops: Mapping[str, LoopValidation]
+    points: Mapping[str, PointValidation]
+    amplitude_margins: tuple[AmplitudeMargin, ...]
+    conditional: Conditional | None
+    rest_sweep: RestSweep | None
+    rest_steps: RestSteps | None
+    large_signals: LargeSignals | None
+    friction: FrictionEffects | None
+    specification: Specification | None
+    seconds: Mapping[str, float]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> tuple[Entry, ...]:
+        """Predictions that do not hold where they should."""
+        return tuple(row for row in self.ledger if row.passed is False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether all predictions hold, and no command within full deflection makes the drive diverge."""
+        unstable = any(not loop.figures.stable for loop in self.loops.values())
+        diverges = self.conditional is not None and self.conditional.found
+        border = None if self.large_signals is None else self.large_signals.border
+        off = border is not None and border.passed is False
+        return not (self.failed or unstable or diverges or off)
+
+    def __str__(self) -> str:
+        judged = [row for row in self.ledger if row.passed is not None]
+        held = sum(row.passed is True for row in judged)
+        words = f"{self.design.name}: {held} of {len(judged)} predictions hold"
+        words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
+        if self.conditional is not None and self.conditional.found:
+            words += "; a command within full deflection makes the drive diverge"
+        return words

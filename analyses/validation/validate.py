@@ -1,0 +1,313 @@
+"""Validate a design: every linear prediction checked by the simulator, and where it stops holding."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.loop_figures import LoopFigures, loop_figures
+from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
+from analyses.validation.conditional import Conditional, conditional_stability
+from analyses.validation.confirm import (
+    Confirmation,
+    Question,
+    confirm_margins,
+    point_questions,
+    stage_questions,
+)
+from analyses.validation.figures import measure_figures
+from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
+from analyses.validation.ledger import Entry, loop_entries, point_entries
+from analyses.validation.release import AmplitudeMargin, release_margins
+from analyses.validation.result import LoopValidation, PointValidation, Validation
+from analyses.validation.rig import Rig, points_of, rig
+from analyses.validation.settings import Settings
+from analyses.validation.sweep import (
+    linear_response,
+    settling_ticks_of,
+    stepped_sine,
+    sweep_errors,
+)
+from analyses.validation.tones import tone_sweep
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loop, Loops
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+HIGHEST = 0.49  # of the sampling frequency
+THIRD_OF_NYQUIST = 0.5 / 3.0
+LONGEST_STEP_TICKS = 400_000
+BELOW = 20.0  # the sweep begins so far below the lowest figure
+
+
+def validate(
+    design: Design, settings: Settings | None = None, progress: Progress | None = None
+) -> Validation:
+    """Check every linear prediction of a design by the nonlinear simulator.
+
+    Parameters
+    ----------
+    design : Design
+    settings : Settings, optional
+        Extent; by default everything (`analyses.validation.settings`).
+    progress : callable, optional
+        Called with (steps done, steps in all).
+
+    Returns
+    -------
+    Validation
+        With the ledger of predictions; ``passed`` is the verdict.
+
+    Raises
+    ------
+    InputError
+        If the design cannot be tested (no steady motion: dry friction takes the whole current, say).
+    NumericalError
+        From the computations.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> from analyses.validation.settings import QUICK
+    >>> found = validate(load_design("ilr33-amber"), QUICK)
+    >>> found.passed
+    True
+    """
+    return _Work(design, settings or Settings(), progress).run()
+
+
+@dataclass
+class _Work:
+    """One validation under way."""
+
+    design: Design
+    settings: Settings
+    progress: Progress | None
+    seconds: dict[str, float] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    figures: dict[str, LoopFigures] = field(default_factory=dict)
+    settle: dict[str, int] = field(default_factory=dict)
+    done: int = 0
+    STEPS = 9
+
+    def run(self) -> Validation:
+        with self.timed("linear loops"):
+            self.loops = self._assemble()
+        stable = all(found.stable for found in self.figures.values())
+        if not stable:
+            self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
+        with self.timed("frequency response"):
+            loops = {name: self._loop(name, loop) for name, loop in self.loops.present.items()}
+        with self.timed("margins in time"):
+            confirmed = self._confirm()
+        with self.timed("break points"):
+            points = self._points(confirmed) if stable else {}
+        with self.timed("margins by amplitude"):
+            released = self._release(confirmed) if stable and self.settings.amplitude_margins else ()
+        with self.timed("from rest"):
+            rest_sweep, rest_steps = self._rest() if stable else (None, None)
+        with self.timed("conditional stability"):
+            conditional = self._conditional() if stable else None
+        large, friction, specification = self._others(stable)
+        for name, loop in loops.items():
+            own = tuple(item for item in confirmed if item.loop == name)
+            loops[name] = _with_confirmations(loop, own)
+        return Validation(
+            design=self.design,
+            ledger=tuple(self._ledger(loops, points, rest_steps, rest_sweep)),
+            loops=loops,
+            points=points,
+            amplitude_margins=released,
+            conditional=conditional,
+            rest_sweep=rest_sweep,
+            rest_steps=rest_steps,
+            large_signals=large,
+            friction=friction,
+            specification=specification,
+            seconds=self.seconds,
+            notes=tuple(dict.fromkeys(self.notes)),
+        )
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Note how long a part takes, and count it as a step."""
+        started = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - started
+        self.done += 1
+        if self.progress is not None:
+            self.progress(self.done, self.STEPS)
+
+    def _assemble(self) -> Loops:
+        """The linear loops, their figures, and the rigs to test them on."""
+        from actuator_lti.loops import assemble_loops
+
+        loops = assemble_loops(self.design)
+        for name, loop in loops.present.items():
+            self.figures[name] = loop_figures(loop)
+            if self.figures[name].stable:
+                every = rig(self.design, name).hold_ticks
+                self.settle[name] = settling_ticks_of(loop.closed_loop, every, self.design.name)
+        if self.design.controller.position.feedforward != 0.0:
+            self.notes.append("the loops are tested without the feed-forward, which is no part of them")
+        return loops
+
+    def _loop(self, name: str, loop: Loop) -> LoopValidation:
+        """Sweep one loop and read its figures."""
+        figures, nothing = self.figures[name], np.empty(0, complex)
+        if name not in self.settle:
+            reason = "the linear loop is not stable: there is nothing to measure"
+            return LoopValidation(name, figures, None, nothing, nothing, None, None, None, None, (), reason)
+        setup, settle = rig(self.design, name), self.settle[name]
+        sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
+        whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
+        measured = measure_figures(setup, sweep, settle, whole)
+        fine = measured.sweep
+        tones = errors = None
+        if self.settings.multisine:
+            tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
+            errors = sweep_errors(tones, loop)
+        return LoopValidation(
+            name=name,
+            figures=figures,
+            measured=measured,
+            open_loop=linear_response(loop.open_loop, fine.frequency_hz),
+            closed_loop=linear_response(loop.closed_loop, fine.frequency_hz),
+            open_errors=sweep_errors(fine, loop),
+            closed_errors=sweep_errors(fine, loop, "closed_loop"),
+            tones=tones,
+            tone_errors=errors,
+            confirmed=(),
+        )
+
+    def _frequencies(self, name: str, loop: Loop) -> Floats:
+        """From well below the lowest figure of the loop to near Nyquist, evenly on a logarithmic scale."""
+        assert loop.period_s is not None
+        top = HIGHEST / loop.period_s
+        return np.geomspace(max(self._lowest(name), 1e-3 * top), top, self.settings.frequencies)
+
+    def _lowest(self, name: str) -> float:
+        """Where the sweep of a loop begins, Hz."""
+        found, period = self.figures[name], self.loops.present[name].period_s or 1.0
+        marks = [0.1 / period]
+        if found.margins.phase_margin is not None:
+            marks.append(found.margins.phase_margin.frequency_hz)
+        if found.bandwidth is not None:
+            marks += [x for x in (found.bandwidth.minus3db_hz, found.bandwidth.minus90deg_hz) if x]
+            marks += [found.bandwidth.resonance_hz] if found.bandwidth.resonance_hz > 0.0 else []
+        return min(marks) / BELOW
+
+    def _confirm(self) -> tuple[Confirmation, ...]:
+        """All margins of loops and break points, searched for together."""
+        questions: list[Question] = []
+        for name, settle in self.settle.items():
+            loop, margins = self.loops.present[name], self.figures[name].margins
+            questions += stage_questions(rig(self.design, name), loop, margins, settle)
+        if len(self.settle) == len(self.figures):
+            setups = {point: rig(self.design, point) for point in self._inner_points()}
+            questions += point_questions(setups, self.loops, max(self.settle.values()))
+        return confirm_margins(questions)
+
+    def _inner_points(self) -> list[str]:
+        """Break points whose loop differs from that of a stage: all but the outermost, and the output."""
+        outermost = "position"
+        own = rig(self.design, outermost).point
+        return [point for point in points_of(self.design) if point not in ("output", own)] or [own]
+
+    def _points(self, confirmed: tuple[Confirmation, ...]) -> dict[str, PointValidation]:
+        """Sweeps at the break points with all other loops closed."""
+        found = {}
+        for point in self._inner_points():
+            own = tuple(item for item in confirmed if item.loop == point)
+            sweep = errors = None
+            if self.settings.point_frequencies:
+                loop = self.loops.break_points[point]
+                top = THIRD_OF_NYQUIST / (loop.period_s or 1.0)
+                asked = np.geomspace(self._lowest("position"), top, self.settings.point_frequencies)
+                sweep = stepped_sine(rig(self.design, point), asked, self.settle["position"])
+                errors = sweep_errors(sweep, loop)
+            found[point] = PointValidation(point, sweep, errors, own)
+        return found
+
+    def _release(self, confirmed: tuple[Confirmation, ...]) -> tuple[AmplitudeMargin, ...]:
+        setups: dict[str, Rig] = {name: rig(self.design, name) for name in self.settle}
+        return release_margins(setups, confirmed, self.settle)
+
+    def _rest(self) -> tuple[RestSweep | None, RestSteps]:
+        """Sines and steps from rest."""
+        design, settle = self.design, self.settle["position"]
+        part = min(design.validation.amplitude_fractions)
+        band = self.figures["position"].bandwidth
+        sweep = None
+        if band is not None and self.loops.limiters:
+            marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
+            top = 0.8 * HIGHEST / (self.loops.present["position"].period_s or 1.0)
+            high = min(2.0 * max(marks, default=top), top)
+            asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
+            dry = design.friction.dry_Nm(0.0) > 0.0
+            amplitude = free_amplitude(design, self.loops, asked, part)
+            sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)
+        return sweep, steps_from_rest(design, settle)
+
+    def _conditional(self) -> Conditional:
+        return conditional_stability(self.design, self.loops, self.settle["position"])
+
+    def _others(self, stable: bool) -> tuple[Any, Any, Any]:
+        """Large signals, friction effects, specification."""
+        from analyses.friction_effects import friction_effects
+        from analyses.large_signal import large_signals
+        from analyses.specification import specification
+
+        wanted = self.settings
+        parts: dict[str, tuple[bool, Callable[[], Any]]] = {
+            "large signals": (
+                wanted.large_signals,
+                lambda: large_signals(self.design, self.loops, counts=wanted.map_counts),
+            ),
+            "friction effects": (wanted.friction_effects, lambda: friction_effects(self.design, self.loops)),
+            "specification": (wanted.specification, lambda: specification(self.design, self.loops)),
+        }
+        found = []
+        for name, (asked, work) in parts.items():
+            result = None
+            if asked and stable:
+                with self.timed(name):
+                    try:
+                        result = work()
+                    except InputError as error:
+                        self.notes.append(f"{name}: {error}")
+            found.append(result)
+        return found[0], found[1], found[2]
+
+    def _ledger(
+        self,
+        loops: dict[str, LoopValidation],
+        points: dict[str, PointValidation],
+        steps: RestSteps | None,
+        sweep: RestSweep | None,
+    ) -> list[Entry]:
+        """All entries: loops, break points, from rest."""
+        rows: list[Entry] = []
+        for name, loop in loops.items():
+            if loop.measured is None:
+                rows.append(Entry(name, "stability", "", "linear", None, None, 0.0, False, loop.reason))
+            else:
+                rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed)
+        for name, point in points.items():
+            rows += point_entries(name, point.confirmed)
+        if steps is not None:
+            rows += rest_entries(self.design, self.figures["position"], steps, sweep)
+        return rows
+
+
+def _with_confirmations(loop: LoopValidation, confirmed: tuple[Confirmation, ...]) -> LoopValidation:
+    return replace(loop, confirmed=confirmed)
