@@ -146,7 +146,7 @@ def _one_loop(n, a, b, c, time_figures, arrays, row):
     if time_figures:
         for i in range(n):
             a[i, i] += 1.0
-        step_figures(n, a, b, c, row)
+        step_figures(n, a, b, c, poles[2], poles[3], row)
 
 
 @kernel
