@@ -25,12 +25,14 @@ IncludeOption = Annotated[
         "--include", metavar="JSON", help="Add the sections that identify or correlate wrote (repeatable)."
     ),
 ]
+PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
     out: OutOption = DEFAULT_OUT,
     processes: ProcessesOption = 2,
+    pdf: PdfOption = False,
     include: IncludeOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
@@ -52,11 +54,15 @@ def report(
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
         made = design_report(drive, added, progress=computing)
     with progress("drawing figures", quiet=quiet) as drawing:
-        page, data = write_report(made, out, processes=processes, progress=drawing)
+        written: tuple[Path, ...] = write_report(made, out, processes=processes, progress=drawing)
+    if pdf:
+        from reports.pdf import write_pdf
+
+        written = (*written, write_pdf(made, out / "report.pdf"))
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
-        print_line(f"{_summary(made['verdict'])}\n{page}\n{data}")
+        print_line(f"{_summary(made['verdict'])}\n" + "\n".join(map(str, written)))
     leave_with(made["verdict"]["passed"] and not _unstable(made))
 
 
