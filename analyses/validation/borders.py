@@ -61,7 +61,8 @@ class Search:
     close : float
         Relative width of the bracket at which the search ends.
     smooth : bool
-        Whether the growth rate is smooth at the border, so that it is interpolated.
+        Whether the growth rate is smooth at the border, so that it is interpolated; then it is that of the
+        expected frequency.
     """
 
     setup: Rig
@@ -104,13 +105,20 @@ class Search:
 
     def growth(self, result: BatchResult) -> Floats:
         """Growth of the oscillation from window to window as a logarithm; +-inf where it is plain."""
-        last, earlier = (np.abs(result.phasor(self.setup.before, 1, k)) for k in (0, 1))
+        last, earlier = (self._size(result, k) for k in (0, 1))
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.log(last / earlier)
         gone = (last <= NOTHING * self.kick) | ~np.isfinite(found)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in at.LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.friction_on)
         return np.where(burst, inf, np.where(gone, -inf, found))
+
+    def _size(self, result: BatchResult, last: int) -> Floats:
+        """Size in a window: of the fundamental, or from crest to crest where no frequency is expected."""
+        if self.smooth:
+            return np.abs(result.phasor(self.setup.before, 1, last))
+        low, high = result.span(self.setup.before, last)
+        return high - low
 
     def grid(self) -> Floats:
         """First values to try, outwards from the nominal drive."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, inf, isfinite, pi
+from math import ceil, isfinite, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +23,7 @@ Progress = Callable[[int, int], None]
 TOLERANCE = 1e-3  # of the ratio or the delay
 SETTLE_CYCLES = 20
 LONGEST_SETTLE_TICKS = 5_000
+FAR = 300.0  # margins beyond this factor count as none
 
 
 @dataclass(frozen=True)
@@ -184,20 +185,22 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
 
 
 def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
-    """A gain margin; where none is predicted the search still looks, at a middling frequency."""
+    """A gain margin; where none is predicted within reach the search looks all the same."""
     nyquist = 0.5 / setup.period_s
-    if predicted is None:
-        hertz = nyquist / 8.0 if kind == "gain up" else nyquist / 100.0
-        return Question(Search(setup, kind, hertz, settle_ticks, reach=100.0), kind, None, None)
+    if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
+        return Question(_blind(setup, kind, settle_ticks), kind, None, None)
     ratio, omega = predicted
     hertz = min(omega / (2.0 * pi), 0.97 * nyquist)
-    far = max(ratio, 1.0 / ratio)
-    reach = 1e3 if far < 300.0 else inf
-    if reach == inf:
-        return Question(Search(setup, kind, hertz, settle_ticks, reach=100.0), kind, None, None)
-    return Question(
-        Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks), reach), kind, ratio, hertz
-    )
+    return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks)), kind, ratio, hertz)
+
+
+def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
+    """Look for a border nobody expects: upwards near Nyquist, downwards over several time constants."""
+    wait = min(settle_ticks, LONGEST_SETTLE_TICKS)
+    if kind == "gain up":
+        return Search(setup, kind, 0.0625 / setup.period_s, wait, reach=100.0, smooth=False)
+    hertz = 3.0 / (max(wait, 100) * setup.design.controller.period_s)
+    return Search(setup, kind, hertz, 3 * wait, reach=10.0, cycles=12, smooth=False)
 
 
 def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:
