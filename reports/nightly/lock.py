@@ -12,7 +12,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from actuator_lti.errors import InputError
-from reports.atomic import write_bytes
+from actuator_lti.atomic import write_bytes
 from reports.nightly.clock import now
 from reports.nightly.text import one_line
 

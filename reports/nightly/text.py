@@ -31,7 +31,7 @@ def slug(name: str) -> str:
     Examples
     --------
     >>> slug("../../etc/passwd")
-    'etc-passwd-9c58ff9a2b'
+    'etc-passwd-3754d6cb3a'
     >>> slug("<b>")[:2]
     'b-'
     """
