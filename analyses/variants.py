@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.errors import InputError, NumericalError
 from analyses.requirements import RequirementVerdict, evaluate_requirements
 from analyses.study import Study, Variant
 from analyses.variant_figures import FigureName, Figures, figure_names, large_signal, small_signal
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.loop_figures import LoopFigures
     from analyses.sensitivity import Sensitivities
+    from analyses.validation.ledger import Entry
 
 Progress = Callable[[int, int], None]
 _ALIKE = 1e-12  # relative; differences below are rounding
@@ -57,6 +59,10 @@ class Compared:
         their interaction (or a key without a number).
     loops : mapping of str to LoopFigures
         For drawing.
+    ledger : tuple of Entry
+        Of the validator: each prediction beside what the simulator shows; empty where not asked for.
+    untested : str
+        Why the validator could not test this design.
     """
 
     variant: Variant
@@ -66,6 +72,8 @@ class Compared:
     differences: Mapping[str, float] = field(default_factory=dict)
     moved_by: Mapping[str, tuple[Contribution, ...]] = field(default_factory=dict)
     loops: Mapping[str, LoopFigures] = field(default_factory=dict, repr=False)
+    ledger: tuple[Entry, ...] = ()
+    untested: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,8 +113,16 @@ class Comparison:
         return (high, low) if name.better > 0 else (low, high)
 
 
-def compare(study: Study, *, progress: Progress | None = None) -> Comparison:
+def compare(study: Study, *, validation: bool | None = None, progress: Progress | None = None) -> Comparison:
     """Compute every figure of every design of a study and what differs from the base.
+
+    Parameters
+    ----------
+    study : Study
+    validation : bool, optional
+        Whether every design is validated (quick settings); by default as the study says.
+    progress : callable, optional
+        Called with (steps done, steps in all).
 
     Raises
     ------
@@ -120,13 +136,14 @@ def compare(study: Study, *, progress: Progress | None = None) -> Comparison:
     total = 2 * (len(good) + 1)
     tell = progress or (lambda done, total: None)
     plan = large_signal.plan(study.base.design)
-    base = _evaluated(study.base, plan)
+    tested = study.validation if validation is None else validation
+    base = _evaluated(study.base, plan, tested)
     tell(1, total)
     found = sensitivities(study.base.design)
     tell(2, total)
     compared = []
     for k, variant in enumerate(good):
-        one = _evaluated(variant, plan)
+        one = _evaluated(variant, plan, tested)
         tell(3 + 2 * k, total)
         compared.append(_against(one, base))
         tell(4 + 2 * k, total)
@@ -135,7 +152,7 @@ def compare(study: Study, *, progress: Progress | None = None) -> Comparison:
     return Comparison(study, names, base, tuple(compared), found, refused)
 
 
-def _evaluated(variant: Variant, plan: Any) -> Compared:
+def _evaluated(variant: Variant, plan: Any, tested: bool) -> Compared:
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
 
@@ -143,7 +160,19 @@ def _evaluated(variant: Variant, plan: Any) -> Compared:
     loops = assemble_loops(variant.design)
     found = all_loop_figures(loops)
     figures = {**small_signal(variant.design, found), **plan.figures(variant.design, loops)}
-    return Compared(variant, figures, evaluate_requirements(variant.design, found), loops=found)
+    ledger, untested = _ledger(variant.design) if tested else ((), "")
+    verdicts = evaluate_requirements(variant.design, found)
+    return Compared(variant, figures, verdicts, loops=found, ledger=ledger, untested=untested)
+
+
+def _ledger(design: Design) -> tuple[tuple[Entry, ...], str]:
+    """The validator's ledger, or why there is none."""
+    from analyses.validation import QUICK, validate
+
+    try:
+        return validate(design, QUICK).ledger, ""
+    except (InputError, NumericalError) as error:
+        return (), str(error)
 
 
 def _against(one: Compared, base: Compared) -> Compared:
@@ -159,7 +188,7 @@ def _against(one: Compared, base: Compared) -> Compared:
         if abs(value - before) > _ALIKE * max(abs(value), abs(before)):
             differences[key] = value - before
     moved = _moved_by(base, one, changed, differences)
-    return Compared(one.variant, one.figures, one.verdicts, changed, differences, moved, one.loops)
+    return replace(one, changed=changed, differences=differences, moved_by=moved)
 
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:

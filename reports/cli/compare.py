@@ -18,10 +18,16 @@ VariantOption = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help='A variant more: "gear.worm.ratio=50"; repeatable.'),
 ]
 
+ValidateOption = Annotated[
+    bool | None,
+    typer.Option("--validate/--no-validate", help="The nonlinear check of every design; as the study says."),
+]
+
 
 def compare(
     study: StudyArgument,
     change: VariantOption = None,
+    validation: ValidateOption = None,
     out: OutOption = Path("out/compare"),
     as_json: JsonOption = False,
     quiet: QuietOption = False,
@@ -38,7 +44,7 @@ def compare(
     plan = _study(study, change or [])
     assert plan.base.design is not None
     with progress(f"comparing {plan.name}", quiet=quiet) as computing:
-        found = compared(plan, progress=computing)
+        found = compared(plan, validation=validation, progress=computing)
     made = study_document(
         plan.base.design,
         sections(found),
@@ -53,7 +59,8 @@ def compare(
     else:
         print_blocks([overview(found)])
         print_line(f"{page}\n{data}")
-    leave_with(made["verdict"]["passed"] and not found.refused)
+    untrue = any(entry.passed is False for one in found.all for entry in one.ledger)
+    leave_with(made["verdict"]["passed"] and not found.refused and not untrue)
 
 
 def _study(path: str, changes: list[str]) -> Study:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
 from reports.numbers import significant
-from reports.sections import compare_figures
+from reports.sections import compare_figures, compare_ledger
 from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label
 
@@ -25,6 +25,7 @@ _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 def sections(comparison: Comparison) -> list[dict[str, Any]]:
     """Make all sections of a comparison."""
     made = [verdicts(comparison), figures(comparison), differences(comparison)]
+    made += compare_ledger.sections(comparison)
     made += compare_figures.sections(comparison)
     return made
 

@@ -226,3 +226,18 @@ override = { "control.position.gain" = "90 1/s" }
 def test_a_single_design_is_a_study_of_one():
     alone = study_of(load_design("emps"))
     assert alone.variants == ()
+
+
+def test_the_ledger_of_every_design_stands_side_by_side(tmp_path):
+    from reports.sections.compare_ledger import sections
+
+    change = 'override = { "control.velocity.gain" = "0.2 A*s/rad" }\n'
+    path = study(tmp_path, HEAD + '[[variant]]\nname = "faster"\n' + change)
+    found = compare(load_study(path), validation=True)
+    assert len(found.base.ledger) == len(found.variants[0].ledger) > 20
+    (made,) = sections(found)
+    assert made["status"] == "pass"
+    rows = made["blocks"][0]["rows"]
+    assert [row["design"] for row in rows] == ["ilr33-amber", "faster"]
+    assert rows[0]["e0"]["status"] == "pass"
+    assert sections(compare(study_of(load_design("ilr33-amber")))) == []

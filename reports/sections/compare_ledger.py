@@ -1,0 +1,68 @@
+"""The validator's ledgers of several designs, side by side."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.numbers import significant
+from reports.sections.names import LOOPS, QUANTITIES
+
+if TYPE_CHECKING:
+    from analyses.validation.ledger import Entry
+    from analyses.variants import Compared, Comparison
+
+Key = tuple[str, str, str]
+
+
+def sections(comparison: Comparison) -> list[dict[str, Any]]:
+    """Make the section; nothing where no design was validated."""
+    tested = [one for one in comparison.all if one.ledger or one.untested]
+    if not tested:
+        return []
+    keys = dict.fromkeys(_key(entry) for one in tested for entry in one.ledger)
+    conditions = dict.fromkeys((loop, condition) for loop, _, condition in keys)
+    blocks: list[dict[str, Any]] = []
+    for loop, condition in conditions:
+        wanted = [key for key in keys if key[0] == loop and key[2] == condition]
+        blocks.append(_table(loop, condition, wanted, tested))
+    blocks += [doc.text(f"{one.variant.name}: not tested. {one.untested}") for one in tested if one.untested]
+    failed = sum(entry.passed is False for one in tested for entry in one.ledger)
+    intro = (
+        "What the nonlinear simulator shows, in brackets the difference to the linear prediction. Marked: "
+        "within the tolerance, outside, or not judged because the prediction need not hold there."
+    )
+    title = "Predictions checked" if not failed else f"Predictions checked: {failed} do not hold"
+    return [doc.section("ledger", title, blocks, intro=intro, status="fail" if failed else "pass")]
+
+
+def _key(entry: Entry) -> Key:
+    return (entry.loop, entry.quantity, entry.condition)
+
+
+def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -> dict[str, Any]:
+    units = {_key(entry): entry.unit for one in tested for entry in one.ledger}
+    columns = [doc.column("design", "Design")]
+    for k, key in enumerate(keys):
+        unit = "" if units[key] == "1" else units[key]
+        columns.append(doc.column(f"e{k}", QUANTITIES.get(key[1], key[1]).capitalize(), unit, align="right"))
+    rows = []
+    for one in tested:
+        known = {_key(entry): entry for entry in one.ledger}
+        cells = {f"e{k}": _cell(known.get(key)) for k, key in enumerate(keys)}
+        rows.append({"design": one.variant.name, **cells})
+    return doc.table(f"{LOOPS.get(loop, loop)}: {condition}", columns, rows)
+
+
+def _cell(entry: Entry | None) -> dict[str, str] | None:
+    if entry is None:
+        return None
+    status = {True: "pass", False: "fail", None: "info"}[entry.passed]
+    if entry.measured is None or not math.isfinite(entry.measured):
+        return {"text": "none", "status": status}
+    words = significant(entry.measured, 4)
+    difference = entry.difference
+    if difference is not None and math.isfinite(difference):
+        words += f" ({'+' if difference > 0 else ''}{significant(difference, 2)})"
+    return {"text": words, "status": status}
