@@ -1,0 +1,5 @@
+"""What a specification of an actuator asks for: rates, acceleration, current, duty, step times."""
+
+from analyses.specification.result import Specification, specification
+
+__all__ = ["Specification", "specification"]

@@ -1,0 +1,99 @@
+"""Rate, acceleration and current at each hinge moment, in closed form and simulated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.drive_figures import DriveFigures, drive_figures
+from analyses.specification.manoeuvres import thermal_duty
+from nonlinear import commands, simulate
+
+LONGEST_TICKS = 40_000
+STEADY_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Capability:
+    """What the drive can do at one hinge moment; output side unless a name says motor.
+
+    Attributes
+    ----------
+    figures : DriveFigures
+        In closed form.
+    simulated_rate_rad_s : float or None
+        Steady rate when the command runs away from the output; ``None`` where the rate has no bound, or was
+        not reached in the time that a run may take.
+    simulated_acceleration_rad_s2 : float or None
+        Largest mean acceleration over a stretch of the start, from rest.
+    simulated_current_A : float or None
+        Mean motor current at the steady rate.
+    current_ratio : float or None
+        That current over the continuous current.
+    duty : float or None
+        Share of the time in which that current may flow (`thermal_duty`).
+    """
+
+    figures: DriveFigures
+    simulated_rate_rad_s: float | None
+    simulated_acceleration_rad_s2: float | None
+    simulated_current_A: float | None
+    current_ratio: float | None
+    duty: float | None
+
+
+def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
+    """Run the command away from the output, and read what the drive makes of it."""
+    figures = drive_figures(design, load_Nm)
+    rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
+    current = figures.motor_current_A
+    ratio, duty = None, thermal_duty(design, current)
+    if current is not None and math.isfinite(design.limits.continuous_current_A):
+        ratio = current / design.limits.continuous_current_A
+    if not (0.0 < rate < math.inf and 0.0 < push < math.inf):
+        return Capability(figures, None, None, None, ratio, duty)
+    direction = 1 if _forward_is_worse(design, load_Nm) else -1
+    Ts = design.controller.period_s
+    viscous_s = (
+        design.inertia_kgm2 / design.friction.viscous(direction) if _force_bound(figures, design) else 0.0
+    )
+    time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, LONGEST_TICKS * Ts)
+    load = direction * -abs(load_Nm) if design.load.path == "back-drivable" else load_Nm
+    run = simulate(design, commands.ramp(direction * 3.0 * rate), time, load)
+    speed = direction * run.motor_speed_rad_s / design.total_ratio
+    tail = max(4, int(STEADY_SHARE * speed.size))
+    steady = float(speed[-tail:].mean())
+    settled = abs(float(speed[-1] - speed[-tail])) < 2e-3 * abs(steady)
+    found_current = abs(float(run.current_A[-tail:].mean())) if design.motor.has_electrical_dynamics else None
+    return Capability(
+        figures,
+        steady if settled else None,
+        _acceleration(design, load, direction, rate, push),
+        found_current if settled else None,
+        ratio,
+        duty,
+    )
+
+
+def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:
+    """Largest mean acceleration over a tenth of the run-up after a step far away."""
+    Ts = design.controller.period_s
+    stretch = max(2, round(0.1 * rate / push / Ts))
+    command = commands.step(direction * 1e3 * (rate * Ts + design.validation.full_deflection_rad))
+    run = simulate(design, command, (14 * stretch + 20) * Ts, load_Nm)
+    speed = direction * run.motor_speed_rad_s / design.total_ratio
+    return float(np.max(speed[stretch:] - speed[:-stretch])) / (stretch * Ts)
+
+
+def _forward_is_worse(design: Design, load_Nm: float) -> bool:
+    """Whether forward motion meets the greater resistance."""
+    friction = design.friction
+    forward = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm
+    return forward >= friction.dry_Nm(load_Nm, -1) - friction.offset_torque_Nm
+
+
+def _force_bound(figures: DriveFigures, design: Design) -> bool:
+    return figures.rate_limit == "force" and design.friction.viscous(1) > 0.0

@@ -1,0 +1,154 @@
+"""Standard manoeuvres, simulated: what speed, torque and current they take."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.large_signal.grid import tone
+from nonlinear import Trajectory, commands, simulate
+from nonlinear.commands import Command
+
+POINTS = 400
+SINE_SHARE, OVERRUN = 0.7, 3.0
+LONGEST_TICKS = 60_000
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One manoeuvre at one hinge moment.
+
+    Attributes
+    ----------
+    name : str
+    load_Nm : float
+    speed_rad_s, torque_Nm : ndarray
+        Motor speed and motor torque along it, thinned for drawing.
+    rms_current_A, peak_current_A : float or None
+        ``None`` for an ideal source, which has no current.
+    rms_torque_Nm, peak_torque_Nm : float
+        Of the motor.
+    duty : float or None
+        Share of the time in which the manoeuvre may run, resting in between, for the rms current to stay at
+        the continuous current: ``(I_cont/I_rms)^2``, at most 1.
+    limits : mapping of str to float
+        Fraction of the time in which each limit acts, where it does.
+    periodic : bool
+        Whether it repeats: only then rms and duty say what can be kept up.
+    """
+
+    name: str
+    load_Nm: float
+    speed_rad_s: np.ndarray
+    torque_Nm: np.ndarray
+    rms_current_A: float | None
+    peak_current_A: float | None
+    rms_torque_Nm: float
+    peak_torque_Nm: float
+    duty: float | None
+    limits: dict[str, float]
+    periodic: bool
+
+
+def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
+    """Share of the time that keeps the rms current at the continuous current; ``None`` where unknown.
+
+    Copper heat goes with the square of the current, and the winding's time constant is taken as long against
+    the manoeuvre.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> thermal_duty(load_design("ilr33-amber"), 8.0)
+    0.25
+    """
+    if rms_current_A is None or not math.isfinite(design.limits.continuous_current_A):
+        return None
+    if rms_current_A <= design.limits.continuous_current_A:
+        return 1.0
+    return (design.limits.continuous_current_A / rms_current_A) ** 2
+
+
+def manoeuvres(
+    design: Design, load_Nm: float, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
+) -> tuple[Manoeuvre, ...]:
+    """Simulate a step, a sine below the top rate, and a sawtooth at it, all at full deflection.
+
+    Parameters
+    ----------
+    rate_rad_s, acceleration_rad_s2 : float
+        Largest rate and acceleration of the output (`analyses.drive_figures`).
+    settling_s : float
+        How long the linear loop takes to settle.
+    """
+    full = design.validation.full_deflection_rad
+    found = []
+    travel = full / rate_rad_s if 0.0 < rate_rad_s < math.inf else 0.0
+    swing = 2.0 * math.sqrt(full / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else 0.0
+    time = min(travel + 4.0 * swing + 4.0 * settling_s, LONGEST_TICKS * design.controller.period_s)
+    found.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
+    slow = _sine_hz(full, rate_rad_s, acceleration_rad_s2)
+    names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
+    for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True):
+        if slow is not None:
+            found.append(_sine(design, name, full, share * slow, load_Nm))
+    return tuple(found)
+
+
+def _sine_hz(full: float, rate: float, acceleration: float) -> float | None:
+    """Frequency at which a sine of full deflection needs all of the rate, or of the acceleration."""
+    bounds = []
+    if 0.0 < rate < math.inf:
+        bounds.append(rate / full)
+    if 0.0 < acceleration < math.inf:
+        bounds.append(math.sqrt(acceleration / full))
+    return min(bounds) / (2.0 * math.pi) if bounds else None
+
+
+def _sine(design: Design, name: str, full: float, hz: float, load_Nm: float) -> Manoeuvre:
+    """Two periods of a sine; the second counts."""
+    every = design.controller.position.every
+    hz = min(hz, 0.2 / (every * design.controller.period_s))
+    chosen = tone(hz, design)
+    period = chosen.ticks / chosen.cycles * design.controller.period_s
+    time = min(2.0 * period, LONGEST_TICKS * design.controller.period_s)
+    return _manoeuvre(
+        design, f"{name} ({hz:.3g} Hz)", commands.sine(full, chosen.frequency_hz), time, load_Nm, period
+    )
+
+
+def _manoeuvre(
+    design: Design, name: str, command: Command, time: float, load_Nm: float, period: float | None
+) -> Manoeuvre:
+    """Simulate, and read speeds, torques and currents."""
+    run = simulate(design, command, time, load_Nm, raise_on_failure=False)
+    count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
+    torque = motor_torque_Nm(design, run)[-count:]
+    current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
+    thin = slice(None, None, max(1, count // POINTS))
+    rms = None if current is None else float(np.sqrt(np.mean(current**2)))
+    return Manoeuvre(
+        name=name,
+        load_Nm=load_Nm,
+        speed_rad_s=run.motor_speed_rad_s[-count:][thin],
+        torque_Nm=torque[thin],
+        rms_current_A=rms,
+        peak_current_A=None if current is None else float(current.max()),
+        rms_torque_Nm=float(np.sqrt(np.mean(torque**2))),
+        peak_torque_Nm=float(np.max(np.abs(torque))),
+        duty=thermal_duty(design, rms) if period is not None else None,
+        limits={key: use.fraction for key, use in run.limits.items() if use.active},
+        periodic=period is not None,
+    )
+
+
+def motor_torque_Nm(design: Design, run: Trajectory) -> np.ndarray:
+    """Motor torque at the ticks: ``kM i``, or the gain times the drive signal of an ideal source."""
+    motor = design.motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * run.voltage_V
+    assert motor.torque_constant_Nm_A is not None
+    return motor.torque_constant_Nm_A * run.current_A

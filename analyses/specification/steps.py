@@ -1,0 +1,92 @@
+"""Step times of the whole nonlinear drive from small to full deflection, at each hinge moment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout as at
+from nonlinear.batch import put_step, repeat_row, run_rows
+from nonlinear.parameters import design_row
+
+SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
+BAND = 0.02
+LONGEST_TICKS = 60_000
+
+
+@dataclass(frozen=True)
+class StepTime:
+    """A step of the command, output side; ``None`` where a level was not reached in ``waited_s``.
+
+    Attributes
+    ----------
+    load_Nm, fraction, amplitude_rad : float
+        Fraction of full deflection, and the step itself.
+    rise_time_s, overshoot_percent, settling_time_s : float or None
+        10 to 90 %; beyond the target; into 2 % for good.
+    peak_rate_rad_s : float
+        Largest rate of the output.
+    peak_current_A : float or None
+    limits : mapping of str to float
+        Fraction of the time in which each limit acts, where it does.
+    waited_s : float
+    """
+
+    load_Nm: float
+    fraction: float
+    amplitude_rad: float
+    rise_time_s: float | None
+    overshoot_percent: float
+    settling_time_s: float | None
+    peak_rate_rad_s: float
+    peak_current_A: float | None
+    limits: dict[str, float]
+    waited_s: float
+
+
+def step_times(
+    design: Design, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
+) -> tuple[StepTime, ...]:
+    """Simulate steps at every fraction of full deflection and every hinge moment."""
+    fractions = sorted({SMALLEST, *design.validation.amplitude_fractions})
+    loads = design.validation.loads_Nm
+    full, Ts = design.validation.full_deflection_rad, design.controller.period_s
+    sizes = np.tile(np.array(fractions) * full, len(loads))
+    rows = repeat_row(design_row(design), len(sizes))
+    put_step(rows, at.COMMAND, sizes)
+    rows[:, at.LOAD] = np.repeat(loads, len(fractions))
+    rows[:, at.STEP_TARGET], rows[:, at.STEP_BAND] = sizes, BAND
+    rows[:, at.WITH_EXTREMES] = 1.0
+    travel = sizes / rate_rad_s if 0.0 < rate_rad_s < math.inf else np.zeros(len(sizes))
+    swing = np.sqrt(sizes / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else travel
+    wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + 8.0 * settling_s) / Ts), LONGEST_TICKS)
+    rows[:, at.TICKS] = wait
+    result = run_rows(rows)
+    speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
+    electric = design.motor.has_electrical_dynamics
+    return tuple(
+        StepTime(
+            load_Nm=float(rows[k, at.LOAD]),
+            fraction=fractions[k % len(fractions)],
+            amplitude_rad=float(sizes[k]),
+            rise_time_s=_number(result.step.rise_time_s[k]),
+            overshoot_percent=float(result.step.overshoot_percent[k]),
+            settling_time_s=_number(result.step.settling_time_s[k]),
+            peak_rate_rad_s=float(max(-speeds[0][k], speeds[1][k])) / design.total_ratio,
+            peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
+            limits={
+                name: float(result.limit_fraction(name)[k])
+                for name in at.LIMITERS
+                if result.limit_fraction(name)[k] > 0.0
+            },
+            waited_s=float(wait[k]) * Ts,
+        )
+        for k in range(len(sizes))
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
