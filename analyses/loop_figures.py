@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -97,9 +97,31 @@ def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
         return None
 
 
-def all_loop_figures(loops: Loops, *, step: bool = True) -> Mapping[str, LoopFigures]:
-    """Compute the figures of every loop that the design has, innermost first, by name."""
-    return {
-        name: loop_figures(loop, loops.reference_to_output if name == "position" else None, step=step)
-        for name, loop in loops.present.items()
-    }
+def all_loop_figures(
+    loops: Loops, *, step: bool = True, refused: list[str] | None = None
+) -> dict[str, LoopFigures]:
+    """Compute the figures of every loop that the design has, innermost first, by name.
+
+    Parameters
+    ----------
+    loops : Loops
+    step : bool
+        Whether step figures are wanted.
+    refused : list of str, optional
+        Where given, a loop whose margins cannot be found is left out and the reason added here.
+
+    Raises
+    ------
+    InputError, NumericalError
+        If the margins of a loop cannot be found, and ``refused`` is not given.
+    """
+    found = {}
+    for name, loop in loops.present.items():
+        response = loops.reference_to_output if name == "position" else None
+        try:
+            found[name] = loop_figures(loop, response, step=step)
+        except (InputError, NumericalError) as error:
+            if refused is None:
+                raise
+            refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
+    return found

@@ -41,11 +41,11 @@ class BreakPoint:
     reason: str = ""
 
     @property
-    def stable(self) -> bool:
-        """Whether the closed loop is known to be stable."""
+    def stable(self) -> bool | None:
+        """Whether the closed loop is stable; ``None`` where that is not known."""
         if self.exact is not None:
             return self.exact.stable
-        return self.figures is not None and self.figures.stable
+        return None if self.figures is None else self.figures.margins.stable
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,8 @@ class LoopSurvey:
         At the lowest gain crossover of each loop that has one.
     onset : Onset or None
         The border of linear validity; ``None`` where nothing limits.
+    refused : tuple of str
+        Loops of the other forms and operating points whose margins were not found, and why.
     """
 
     design: Design
@@ -96,6 +98,7 @@ class LoopSurvey:
     operating_points: tuple[OperatingPointFigures, ...]
     budgets: Mapping[str, DelayBudget]
     onset: Onset | None
+    refused: tuple[str, ...] = ()
 
     @property
     def figures(self) -> Mapping[str, LoopFigures]:
@@ -124,9 +127,10 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
             progress(done, 6)
 
     loops = assemble_loops(design)
+    refused: list[str] = []
     forms = {"sampled": all_loop_figures(loops)}
     for form in FORMS[1:]:
-        forms[form] = all_loop_figures(assemble_loops(design, form=form), step=False)
+        forms[form] = all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused)
     step(1)
     locked = None
     if loops.current is not None:
@@ -135,13 +139,15 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     step(2)
     break_points = {name: _break_point(loops, name) for name in loops.break_points}
     step(3)
-    points = _operating_points(design)
+    points = _operating_points(design, refused)
     step(4)
     budgets = _budgets(design, forms["sampled"])
     step(5)
     border = _onset(loops, forms["sampled"])
     step(6)
-    return LoopSurvey(design, loops, forms, locked, break_points, points, budgets, border)
+    return LoopSurvey(
+        design, loops, forms, locked, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
+    )
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
@@ -156,7 +162,7 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
         return BreakPoint(None, exact, str(error))
 
 
-def _operating_points(design: Design) -> tuple[OperatingPointFigures, ...]:
+def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPointFigures, ...]:
     """Measure the loops sliding, at rest, and described at small speeds, at each load."""
     from actuator_lti.loops import assemble_loops
     from actuator_lti.plant import friction_slope
@@ -167,7 +173,7 @@ def _operating_points(design: Design) -> tuple[OperatingPointFigures, ...]:
         moment = load or 0.0
         slope = friction_slope(design, kind, moment, speed, 1)
         found = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
-        return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False))
+        return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False, refused=refused))
 
     points = [point("sliding", None, "sliding")]
     for load in dict.fromkeys(design.validation.loads_Nm):

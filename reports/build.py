@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design.model import Design
 from reports import document as doc
-from reports.atomic import write_together
+from actuator_lti.atomic import write_together
 
 if TYPE_CHECKING:
     from analyses.loop_survey import LoopSurvey
@@ -81,9 +81,8 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     sections = [requirements.section(verdicts, load_unit(design)), margins.section(figures, survey.locked)]
     for name, found in figures.items():
         locked = survey.locked if name == "current" else None
-        status = "info" if found.stable else "fail"
-        sections.append(loop.section(name, design, found, locked, status))
-    sections.append(forms.section(survey.forms))
+        sections.append(loop.section(name, design, found, locked))
+    sections.append(forms.section(survey.forms, survey.refused))
     sections.append(break_points.section(survey.break_points, figures))
     sections.append(operating_points.section(survey.operating_points, design))
     if survey.budgets:

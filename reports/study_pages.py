@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.atomic import write_together
 from reports import document as doc
-from reports.atomic import write_together
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design

@@ -8,7 +8,7 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import BreakPoint
 from reports import document as doc
-from reports.sections.margins import finite, margin_row, times
+from reports.sections.margins import finite, margin_row, times, worst_status
 from reports.sections.names import POINTS
 
 COLUMNS = [
@@ -55,7 +55,7 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
         "A gain error or a delay sits at one place in the finished drive, with every other loop running. "
         "The matrix shows what the drive tolerates at each place."
     )
-    status = "info" if all(point.stable for point in points.values()) else "fail"
+    status = worst_status([point.stable for point in points.values()])
     return doc.section("break-points", "Break-point matrix", blocks, intro=intro, status=status)
 
 

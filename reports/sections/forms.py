@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyses.loop_figures import LoopFigures
@@ -26,12 +26,13 @@ COLUMNS = [
 ]
 
 
-def section(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
-    """Make the section from the figures by form and loop."""
+def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> dict[str, Any]:
+    """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
-        _row(name, form, forms[form][name], forms["ideal"][name])
+        _row(name, form, found[name], forms["ideal"].get(name))
         for name in forms["sampled"]
-        for form in forms
+        for form, found in forms.items()
+        if name in found
     ]
     note = (
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
@@ -39,17 +40,18 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
     )
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The difference between the forms is the price of sampling, hold and computing delay."
-    return doc.section("forms", "Sampled, continuous, ideal", [_overlay(forms), table], intro=intro)
+    blocks = [_overlay(forms), table, *(doc.text(f"Not found: {reason}.") for reason in refused)]
+    return doc.section("forms", "Sampled, continuous, ideal", blocks, intro=intro)
 
 
-def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures) -> dict[str, Any]:
+def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures | None) -> dict[str, Any]:
     """Give one line, with the phase margin lost against the ideal form."""
     margins, response = margin_row(found), response_row(found)
-    reference = margin_row(ideal)["phase_margin_deg"]
+    reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
     row = {**margins, **response, "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
-    return row | ({} if found.stable else {"_status": "fail"})
+    return row | ({"_status": "fail"} if found.margins.stable is False else {})
 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
@@ -57,7 +59,11 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
     panels = []
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
-        series = [(FORMS[form], curve(found[name].loop.open_loop, grid)) for form, found in forms.items()]
+        series = [
+            (FORMS[form], curve(found[name].loop.open_loop, grid))
+            for form, found in forms.items()
+            if name in found
+        ]
         panels.append({"title": LOOPS[name], **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."
     return doc.figure("forms", {"panels": panels}, caption=caption, alt=f"Bode diagrams. {caption}")

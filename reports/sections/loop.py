@@ -14,7 +14,7 @@ from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, resp
 from reports import document as doc
 from reports.document import rounded
 from reports.numbers import fixed, seconds
-from reports.sections.margins import finite, margin_row, response_row
+from reports.sections.margins import finite, margin_row, response_row, worst_status
 from reports.sections.names import LOOPS, hertz
 
 REACH = 1.6
@@ -22,11 +22,11 @@ STEP_POINTS = 300
 
 
 def section(
-    name: str, design: Design, found: LoopFigures, locked: LoopFigures | None = None, status: str = "info"
+    name: str, design: Design, found: LoopFigures, locked: LoopFigures | None = None
 ) -> dict[str, Any]:
     """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
     grid = frequency_grid(found)
-    title = LOOPS[name]
+    title, status = LOOPS[name], worst_status([found.margins.stable])
     blocks = [_facts(found), open_bode(title, found, grid)]
     if found.stable:
         blocks.append(closed_bode(title, found, grid, locked))

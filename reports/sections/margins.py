@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
 from reports.sections.names import LOOPS, hertz
 
+STATUS = {True: "pass", False: "fail", None: "warn"}
 MARGIN_COLUMNS = [
     doc.column("loop", "Loop"),
     doc.column("stable", "Closed loop"),
@@ -53,7 +54,6 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
     named = {LOOPS[name]: found for name, found in figures.items()}
     if locked is not None:
         named["Current loop, rotor locked"] = locked
-    unstable = any(not found.stable for found in figures.values())
     blocks = [
         margin_table(named),
         response_table(named),
@@ -63,7 +63,7 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
         "Sampled form: exact hold and computing delay, no approximation; sliding friction."
     )
-    status = "fail" if unstable else "info"
+    status = worst_status([found.margins.stable for found in figures.values()])
     return doc.section("margins", "Margins and bandwidths", blocks, intro=intro, status=status)
 
 
@@ -99,7 +99,7 @@ def margin_row(found: LoopFigures) -> dict[str, Any]:
     m = found.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
     return {
-        "stable": {"text": m.verdict, "status": "pass" if m.stable else "fail"},
+        "stable": {"text": m.verdict, "status": STATUS[m.stable]},
         "gain_margin_db": finite(m.gain_margin_db),
         "gain_margin_hz": hertz(gain.frequency_rad_s) if gain else None,
         "phase_margin_deg": finite(m.phase_margin_deg),
@@ -170,6 +170,14 @@ def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float)
 def _gain_note(ratio: float, tangent: bool) -> str:
     limit = "upper limit of the gain" if ratio >= 1.0 else "lower limit of the gain"
     return limit + (", touches, does not cross" if tangent else "")
+
+
+def worst_status(stable: Iterable[bool | None]) -> str:
+    """Give the status of a section from the stability of its loops: unstable fails, unknown warns."""
+    known = list(stable)
+    if False in known:
+        return "fail"
+    return "warn" if None in known else "info"
 
 
 def finite(value: float | None) -> float | None:

@@ -14,7 +14,7 @@ from reports.sections.names import load_unit
 
 def section(points: Sequence[OperatingPointFigures], design: Design) -> dict[str, Any]:
     """Make the section; one line an operating point, three figures a loop."""
-    names = list(points[0].figures)
+    names = list(dict.fromkeys(name for point in points for name in point.figures))
     linear = design.axis == "linear"
     columns = [
         doc.column("point", "Operating point"),
@@ -44,9 +44,9 @@ def _row(point: OperatingPointFigures, scale: float) -> dict[str, Any]:
     row["load"] = "any" if point.load_Nm is None else point.load_Nm
     for name, found in point.figures.items():
         margins, response = margin_row(found), response_row(found)
-        row[f"{name}_phase"] = margins["phase_margin_deg"] if found.stable else "unstable"
+        row[f"{name}_phase"] = margins["phase_margin_deg"] if found.stable else found.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
         row[f"{name}_band"] = response["minus3db_hz"]
-    if not all(found.stable for found in point.figures.values()):
+    if any(found.margins.stable is False for found in point.figures.values()):
         row["_status"] = "fail"
     return row
