@@ -33,6 +33,9 @@ A study file is TOML and only data::
     [monte_carlo]
     samples = 1000
     seed = 0
+
+    [nightly]                                # read by the nightly alone: see `reports.nightly.source`
+    pdf = true
 """
 
 from __future__ import annotations
@@ -159,7 +162,7 @@ def study_of(design: Design) -> Study:
 def study_from_tree(tree: dict[str, Any], where: str, folder: Path, *, keep_going: bool = False) -> Study:
     """Build a study from its parsed tree; designs are looked for beside the file."""
     reader = Reader(where, folder)
-    reader.only(tree, "", {"study", "variant", "sweep", "grid", "requirement", "monte_carlo"})
+    reader.only(tree, "", {"study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"})
     head = reader.table(tree, "study")
     reader.only(head, "study", {"name", "title", "description", "base", "validation"})
     base = reader.design(reader.text(head, "study", "base"))
