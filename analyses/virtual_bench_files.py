@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from actuator_lti.atomic import write_bytes
 from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -118,8 +117,8 @@ def write_bench(
     folder.mkdir(parents=True, exist_ok=True)
     bounds = (BenchInstruments() if instruments is None else instruments).bounds
     for k, log in enumerate(logs, 1):
-        _write(folder / f"run{log.id}_drive.csv", _drive_text(log.drive))
-        _write(folder / f"run{log.id}_torque.csv", _sensor_text(log.sensor))
+        write_bytes(folder / f"run{log.id}_drive.csv", _drive_text(log.drive))
+        write_bytes(folder / f"run{log.id}_torque.csv", _sensor_text(log.sensor))
         if progress is not None:
             progress(k, len(logs))
     head = _HEAD.format(
@@ -134,7 +133,7 @@ def write_bench(
     )
     parts = [_RUN.format(id=g.id, speed=g.speed_setting_rad_s, load=g.load_setting_Nm) for g in logs]
     path = folder / "campaign.toml"
-    _write(path, (head + "".join(parts)).encode())
+    write_bytes(path, (head + "".join(parts)).encode())
     return path
 
 
@@ -159,16 +158,3 @@ def _csv(columns: list[np.ndarray], formats: tuple[str, ...], separator: str) ->
     out = io.StringIO()
     np.savetxt(out, np.column_stack(columns), fmt=list(formats), delimiter=separator)
     return out.getvalue()
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Callable
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
-from actuator_lti.errors import InputError
+from actuator_lti.atomic import write_stream
 
 if TYPE_CHECKING:
     from nonlinear.trajectory import Trajectory
@@ -23,7 +19,7 @@ def write_csv(run: Trajectory, path: str | PathLike[str]) -> None:
     columns = {name: (v.astype("u1") if v.dtype == bool else v) for name, v in run.columns().items()}
     table = pa.table(columns)
     options = pyarrow.csv.WriteOptions(quoting_style="none")
-    _replace(path, lambda file: pyarrow.csv.write_csv(table, file, options))
+    write_stream(path, lambda file: pyarrow.csv.write_csv(table, file, options))
 
 
 def write_parquet(run: Trajectory, path: str | PathLike[str]) -> None:
@@ -33,23 +29,4 @@ def write_parquet(run: Trajectory, path: str | PathLike[str]) -> None:
 
     about = {"design": run.design_name, "parameters": run.parameters_hash, "status": run.status}
     table = pa.table(run.columns()).replace_schema_metadata(about)
-    _replace(path, lambda file: pyarrow.parquet.write_table(table, file))
-
-
-def _replace(path: str | PathLike[str], write: Callable[[BinaryIO], None]) -> None:
-    """Write into a neighbour and move it into place."""
-    target = Path(path)
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    write_stream(path, lambda file: pyarrow.parquet.write_table(table, file))

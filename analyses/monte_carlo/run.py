@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.errors import InputError
 from analyses.engine import Engine
@@ -16,7 +17,7 @@ from analyses.monte_carlo.judging import judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
-from analyses.monte_carlo.store import CHUNK, Store, write_atomic
+from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
 from analyses.sampling import Table, sampler_of
@@ -187,7 +188,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
             title=f"{task.design.title or task.design.name}: worst case for {tally.requirement.id}",
         )
         path = folder / f"{name}.toml"
-        write_atomic(path, write_design(titled).encode())
+        write_bytes(path, write_design(titled).encode())
         found.append(replace(case, file=path))
     return tuple(found)
 

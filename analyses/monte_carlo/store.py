@@ -7,37 +7,20 @@ is interrupted, killed included, goes on from the chunks that are there.
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
 from analyses.engine import Arrays, Chunk
 
 SCHEMA = "actuator-lti/samples"
 VERSION = 1
 CHUNK = 4096
-
-
-def write_atomic(path: Path, data: bytes) -> None:
-    """Write a file so that its name never stands for half of it."""
-    handle, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(name, path)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(name)
-        raise
 
 
 @dataclass(frozen=True)
@@ -78,7 +61,7 @@ class Store:
                                  where=str(folder))  # fmt: skip
             return cls(folder, int(found["chunk"]))
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
-        write_atomic(path, text.encode())
+        write_bytes(path, text.encode())
         return cls(folder, chunk)
 
     def path(self, chunk: Chunk) -> Path:
@@ -100,7 +83,7 @@ class Store:
 
         sink = pa.BufferOutputStream()
         pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
-        write_atomic(self.path(chunk), sink.getvalue().to_pybytes())
+        write_bytes(self.path(chunk), sink.getvalue().to_pybytes())
 
     def blocks(self, total: int, columns: list[str] | None = None, size: int = 4096) -> Iterator[Arrays]:
         """Columns in blocks of a fixed size in order of number, however the chunks were cut."""

@@ -263,8 +263,8 @@ def _bench(folder: Path, name: str, seed: int, as_json: bool, quiet: bool) -> No
 def _write(
     drive: Design, identified: Design, made: dict[str, Any], source: str, out: Path, quiet: bool
 ) -> None:
+    from actuator_lti.atomic import write_text
     from actuator_lti.design import write_design
-    from reports.atomic import write_text
     from reports.cli.progress import progress
     from reports.study_pages import study_document, write_pages
 

@@ -19,8 +19,8 @@ def init(
     file: FileArgument = Path("my-drive.toml"), source: FromOption = None, force: ForceOption = False
 ) -> None:
     """Write a commented design file to start one's own drive from."""
+    from actuator_lti.atomic import write_text
     from actuator_lti.design import read_design_text
-    from reports.atomic import write_text
     from reports.cli.output import print_line
     from reports.cli.targets import refuse_existing
 

@@ -52,11 +52,11 @@ def export(
     """Write a design's settings as controller objects: TOML, or XML where FILE ends in .xdc or .xml."""
     from dataclasses import replace
 
+    from actuator_lti.atomic import write_text
     from actuator_lti.design import load_design
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import write_settings_toml
     from actuator_lti.design.settings_xml import settings_xml
-    from reports.atomic import write_text
     from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
 
@@ -96,10 +96,10 @@ def import_settings(
     as_json: JsonOption = False,
 ) -> None:
     """Put controller settings into a design and write it as a design file."""
+    from actuator_lti.atomic import write_text
     from actuator_lti.design import load_design, write_design
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
-    from reports.atomic import write_text
     from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
 

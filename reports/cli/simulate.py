@@ -198,7 +198,7 @@ def write_files(run: Trajectory, csv: Path | None, parquet: Path | None, plot: P
     if parquet is not None:
         run.to_parquet(parquet)
     if plot is not None:
-        from reports.atomic import write_text
+        from actuator_lti.atomic import write_text
         from reports.figures.registry import draw_svg
         from reports.sections.trajectory import figure_data
 

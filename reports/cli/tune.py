@@ -22,6 +22,8 @@ RoundOption = Annotated[
 ]
 CurveOption = Annotated[bool, typer.Option("--curve/--no-curve", help="Trade-off curve.")]
 
+_SUBTITLE = "Gains from requirements, over all corners of the tolerances, on the exact sampled loops."
+
 
 def tune(
     design: DesignArgument = DEFAULT_DESIGN,
@@ -53,8 +55,8 @@ def tune(
 
 def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> None:
     """Write page, JSON and the tuned design; print the tables."""
+    from actuator_lti.atomic import write_text
     from actuator_lti.design import write_design
-    from reports.atomic import write_text
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
     from reports.sections import tuning
@@ -63,7 +65,7 @@ def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> Non
 
     part = tuning.section(result)
     title = f"{result.before.title or result.before.name}: tuning"
-    made = study_document(result.design, [part], title=title, subtitle=part["intro"], kind="tuning")
+    made = study_document(result.design, [part], title=title, subtitle=_SUBTITLE, kind="tuning")
     with progress("drawing figures", quiet=quiet) as drawing:
         page, data = write_pages(made, out, "tune", progress=drawing)
     file = out / "tuned.toml"

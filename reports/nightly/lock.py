@@ -11,8 +11,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from actuator_lti.errors import InputError
 from actuator_lti.atomic import write_bytes
+from actuator_lti.errors import InputError
 from reports.nightly.clock import now
 from reports.nightly.text import one_line
 

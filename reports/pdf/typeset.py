@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError, NumericalError
-from reports.atomic import write_bytes
 from reports.pdf.printable import printable
 
 TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "pdf" / "report.typ"

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 from actuator_lti.errors import InputError
 
 
-def write_text(path: str | Path, text: str) -> None:
+def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
 
     Raises
@@ -22,12 +24,17 @@ def write_text(path: str | Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: str | Path, data: bytes) -> None:
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """Write bytes; see `write_text`."""
     write_together({path: data})
 
 
-def write_together(files: Mapping[str | Path, bytes]) -> None:
+def write_stream(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]) -> None:
+    """Let ``write`` fill a file that need not fit in memory; see `write_text`."""
+    _write_all({path: write})
+
+
+def write_together(files: Mapping[str | os.PathLike[str], bytes]) -> None:
     """Write several files: none is moved into place before all are on disk.
 
     Parameters
@@ -40,11 +47,20 @@ def write_together(files: Mapping[str | Path, bytes]) -> None:
     InputError
         If a folder cannot be made or written; nothing is left behind then.
     """
+    _write_all({path: partial(_put, data) for path, data in files.items()})
+
+
+def _put(data: bytes, file: BinaryIO) -> None:
+    file.write(data)
+
+
+def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], object]]) -> None:
+    """Fill every file beside its place, then move all into place."""
     staged: list[tuple[Path, Path]] = []
     try:
-        for name, data in files.items():
+        for name, write in files.items():
             path = Path(name)
-            staged.append((_stage(path, data), path))
+            staged.append((_stage(path, write), path))
         while staged:
             temporary, path = staged[0]
             os.replace(temporary, path)
@@ -59,13 +75,13 @@ def write_together(files: Mapping[str | Path, bytes]) -> None:
                 temporary.unlink(missing_ok=True)
 
 
-def _stage(path: Path, data: bytes) -> Path:
-    """Put the data beside its place, flushed to disk, and give the temporary path."""
+def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
+    """Fill a file beside its place, flushed to disk, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            write(file)
             file.flush()
             os.fsync(file.fileno())
         os.chmod(name, 0o666 & ~_umask())
