@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 _ALIKE = 1e-12  # relative; differences below are rounding
+_SEEN = 5e-5  # relative; differences below change no digit that is shown
 
 
 @dataclass(frozen=True)
@@ -105,9 +106,9 @@ class Comparison:
         return (self.base, *self.variants)
 
     def ends(self, name: FigureName) -> tuple[float, float] | None:
-        """Best and worst value of a figure over all designs; ``None`` if they do not differ."""
+        """Best and worst value of a figure over all designs; ``None`` if they hardly differ (0.005 %)."""
         values = [v for c in self.all if (v := c.figures.get(name.key)) is not None and isfinite(v)]
-        if name.better == 0 or len(values) < 2 or max(values) - min(values) <= _ALIKE * max(map(abs, values)):
+        if name.better == 0 or len(values) < 2 or max(values) - min(values) <= _SEEN * max(map(abs, values)):
             return None
         low, high = min(values), max(values)
         return (high, low) if name.better > 0 else (low, high)

@@ -48,8 +48,8 @@ def compare(
     made = study_document(
         plan.base.design,
         sections(found),
-        title=plan.title or plan.name,
-        subtitle=plan.description or f"{plan.base.name} and {len(plan.variants)} variants",
+        title=f"{plan.title or plan.name}: variants",
+        subtitle=f"{plan.base.name} and {len(plan.variants)} variants",
         kind="compare",
     )
     with progress("drawing figures", quiet=quiet) as drawing:

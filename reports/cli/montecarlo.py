@@ -51,6 +51,8 @@ WorstOption = Annotated[
     bool, typer.Option("--worst/--no-worst", help="Seek the worst case of each requirement.")
 ]
 
+_SUBTITLE = "What the tolerances do to the requirements: odds, distributions, worst cases."
+
 
 def montecarlo(
     design: DesignArgument = DEFAULT_DESIGN,
@@ -135,7 +137,7 @@ def _written(
 
     part = section(result, at_least=at_least)
     title = f"{drive.title or drive.name}: tolerances"
-    made = study_document(drive, [part], title=title, subtitle=part["intro"], kind="montecarlo")
+    made = study_document(drive, [part], title=title, subtitle=_SUBTITLE, kind="montecarlo")
     with progress("drawing figures", quiet=quiet) as drawing:
         page, _ = write_pages(made, out, "montecarlo", progress=drawing)
     if as_json:

@@ -114,7 +114,7 @@ def figures(comparison: Comparison) -> dict[str, Any]:
 
 def _group_table(title: str, names: Sequence[FigureName], comparison: Comparison) -> dict[str, Any]:
     columns = [doc.column("design", "Design")]
-    columns += [doc.column(name.key, name.label.capitalize(), name.unit, align="right") for name in names]
+    columns += [doc.column(name.key, _title(name.label), name.unit, align="right") for name in names]
     rows = []
     for one in comparison.all:
         row: dict[str, Any] = {"design": one.variant.name}
@@ -122,6 +122,10 @@ def _group_table(title: str, names: Sequence[FigureName], comparison: Comparison
             row[name.key] = _cell(one, name, comparison)
         rows.append(row)
     return doc.table(title, columns, rows)
+
+
+def _title(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None:

@@ -46,13 +46,17 @@ def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -
     columns = [doc.column("design", "Design")]
     for k, key in enumerate(keys):
         unit = "" if units[key] == "1" else units[key]
-        columns.append(doc.column(f"e{k}", QUANTITIES.get(key[1], key[1]).capitalize(), unit, align="right"))
+        columns.append(doc.column(f"e{k}", _title(QUANTITIES.get(key[1], key[1])), unit, align="right"))
     rows = []
     for one in tested:
         known = {_key(entry): entry for entry in one.ledger}
         cells = {f"e{k}": _cell(known.get(key)) for k, key in enumerate(keys)}
         rows.append({"design": one.variant.name, **cells})
     return doc.table(f"{LOOPS.get(loop, loop)}: {condition}", columns, rows)
+
+
+def _title(words: str) -> str:
+    return words[:1].upper() + words[1:]
 
 
 def _cell(entry: Entry | None) -> dict[str, str] | None:

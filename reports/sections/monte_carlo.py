@@ -17,11 +17,11 @@ ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
     doc.column("limit", "Limit"),
     doc.column("probability", "Met by", "%", format="fix:3"),
-    doc.column("low", "95 % interval from", "%", format="fix:3"),
-    doc.column("high", "to", "%", format="fix:3"),
+    doc.column("low", "at least, 95 %", "%", format="fix:3"),
+    doc.column("high", "at most", "%", format="fix:3"),
     doc.column("nominal", "Nominal", format="sig:4"),
     doc.column("sampled", "Worst sample", format="sig:4"),
-    doc.column("number", "its number", align="right"),
+    doc.column("number", "No.", align="right"),
     doc.column("worst", "Worst case", format="sig:4"),
     doc.column("unit", "Unit"),
 ]
@@ -113,9 +113,9 @@ def _why(odds: Odds, case: WorstCase | None) -> str:
 def _limit(odds: Odds) -> str:
     parts = []
     if odds.minimum is not None:
-        parts.append(f"at least {odds.minimum:g} {odds.unit}")
+        parts.append(f"≥ {odds.minimum:g} {odds.unit}")
     if odds.maximum is not None:
-        parts.append(f"at most {odds.maximum:g} {odds.unit}")
+        parts.append(f"≤ {odds.maximum:g} {odds.unit}")
     return ", ".join(parts)
 
 

@@ -1,0 +1,80 @@
+"""`actuator-lti montecarlo` from the command line: page, JSON, replay, exit status."""
+
+import json
+import tomllib
+
+import pytest
+import tomli_w
+from typer.testing import CliRunner
+
+from actuator_lti import load_design, write_design
+from reports.cli.app import build
+
+
+@pytest.fixture(scope="module")
+def app():
+    return build()
+
+
+@pytest.fixture(scope="module")
+def wide(tmp_path_factory):
+    """The baseline with a friction coefficient that may be 60 % off: some samples need too much current."""
+    tree = tomllib.loads(write_design(load_design("ilr33-amber")))
+    tree["friction"]["load_coefficient"]["tolerance"] = "60 %"
+    path = tmp_path_factory.mktemp("wide") / "wide.toml"
+    path.write_text(tomli_w.dumps(tree))
+    return path
+
+
+def run(app, *words):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_a_study_that_fails_says_so_and_can_be_accepted(app, wide, tmp_path):
+    done = run(app, "montecarlo", wide, "--samples", 300, "--out", tmp_path, "--quiet")
+    assert done.exit_code == 1
+    assert "motor current" in done.output
+    made = json.loads((tmp_path / "montecarlo.json").read_text())
+    verdicts = {v["id"]: v for v in made["sections"][0]["blocks"][0]["items"]}
+    assert verdicts["tolerance/motor-current"]["passed"] is False
+    assert verdicts["tolerance/gain-margin"]["passed"] is True
+    again = run(app, "montecarlo", wide, "--samples", 300, "--out", tmp_path, "--quiet", "--at-least", 0.5)
+    assert again.exit_code == 0
+    assert "<svg" in (tmp_path / "montecarlo.html").read_text()
+    (folder,) = tmp_path.glob("samples-*")
+    worst = load_design(folder / next(p.name for p in folder.glob("worst-*-motor-current.toml")))
+    assert worst.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
+
+
+def test_one_sample_is_printed_as_a_design(app, wide, tmp_path):
+    first = run(app, "montecarlo", wide, "--sample", 41, "--seed", 2)
+    assert first.exit_code == 0
+    path = tmp_path / "sample.toml"
+    path.write_text(first.output)
+    assert 0.4 * 1.34e-3 <= load_design(path).friction.load_coefficient <= 1.6 * 1.34e-3
+    assert run(app, "montecarlo", wide, "--sample", 41, "--seed", 2).output == first.output
+    assert run(app, "montecarlo", wide, "--sample", 41, "--seed", 3).output != first.output
+
+
+def test_json_goes_to_standard_output_alone(app, tmp_path):
+    done = run(
+        app, "montecarlo", "--samples", 64, "--out", tmp_path, "--json", "--no-worst", "--step", "1 deg"
+    )
+    made = json.loads(done.output)
+    assert made["kind"] == "montecarlo"
+    names = [row["figure"] for block in made["sections"][0]["blocks"] if block["kind"] == "table"
+             for row in block["rows"] if "figure" in row]  # fmt: skip
+    assert "nonlinear step: overshoot" in names
+
+
+@pytest.mark.parametrize("words", [
+    ("--samples", "0"), ("--seed", "-1"), ("--step", "5 kg"), ("--workers", "2", "--scheduler", "tcp://a:1"),
+])  # fmt: skip
+def test_bad_usage_is_refused_before_anything_is_written(words, tmp_path):
+    from reports.cli.main import main
+
+    out = tmp_path / "o"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["actuator-lti", "montecarlo", "--out", str(out), *words])
+        assert main() == 2
+    assert not list(tmp_path.rglob("*.html"))
