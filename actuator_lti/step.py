@@ -66,8 +66,8 @@ def step_figures(system: Any) -> StepFigures:
 
     A continuous state space is propagated exactly (matrix exponentials) on a grid as fine as its fastest
     mode still alive, and each figure is then located inside its grid interval. A sampled system is looked at
-    at its samples. A system with inner delays is stepped along its first delays, the delayed signals straight
-    between points at least 20 to the shortest one, and is then the sum over its exact poles.
+    at its samples. A system with inner delays is stepped along its first delays, the delayed signals
+    parabolas over steps of which at least 12 make the shortest one, and is then the sum over its exact poles.
 
     Parameters
     ----------

@@ -17,6 +17,7 @@ _POSSIBLE_TOUCH = 1e-3
 _NEWTON_STEP = 1e-9
 _NEWTON_STEPS = 8
 _SAME = 1e-8
+_AT_POLE = 1e-7
 _NONE = np.empty(0, dtype=complex)
 
 
@@ -48,9 +49,13 @@ class Crossings:
 @dataclass(frozen=True)
 class _Candidates:
     x: Real  # sorted, border poles among them
-    possible_touch: Mask
+    off_axis: Real  # distance of the candidate to the border of stability over its frequency
     is_pole: Mask
     samples: Real  # one more than x
+
+    @property
+    def possible_touch(self) -> Mask:
+        return self.off_axis <= _POSSIBLE_TOUCH
 
     @property
     def count(self) -> int:
@@ -135,24 +140,27 @@ def _candidates(zeros: Complex, border_x: Real, in_z: bool, floor_x: float) -> _
     near = on_axis(zeros)
     if floor_x:
         near = near[near.imag > warped(floor_x, in_z)]
-    w, touch = near.imag, np.abs(near.real) <= _POSSIBLE_TOUCH * near.imag
+    w, off_axis = near.imag, np.abs(near.real) / near.imag
     if (
         w.size > 1 and (w[1:] - w[:-1] <= _SAME * w[1:]).any()
     ):  # one candidate twice, or a pair: looked at as one
         first = np.flatnonzero(np.concatenate(([True], w[1:] - w[:-1] > _SAME * w[1:])))
-        w, touch = w[first], np.logical_or.reduceat(touch, first)
+        w, off_axis = w[first], np.minimum.reduceat(off_axis, first)
     pole = np.zeros(w.size, dtype=bool)
     if border_x.size:
-        w = np.concatenate((w, warped(border_x, in_z)))
+        pole_w = warped(border_x, in_z)
+        apart = (np.abs(w[:, None] - pole_w) > _AT_POLE * pole_w).all(axis=1)  # L - L~ has the pole itself
+        w, off_axis, pole = w[apart], off_axis[apart], pole[apart]
+        w = np.concatenate((w, pole_w))
         pole = np.concatenate((pole, np.ones(border_x.size, dtype=bool)))
-        touch = np.concatenate((touch, np.zeros(border_x.size, dtype=bool)))
+        off_axis = np.concatenate((off_axis, np.full(border_x.size, np.inf)))
         order = w.argsort()
-        w, pole, touch = w[order], pole[order], touch[order]
+        w, pole, off_axis = w[order], pole[order], off_axis[order]
     samples = np.empty(w.size + 1 if w.size else 0)
     if w.size:
         samples[0], samples[-1] = 0.5 * w[0], 2.0 * w[-1]
         samples[1:-1] = np.sqrt(w[:-1] * w[1:])
-    return _Candidates(unwarped(w, in_z), touch, pole, unwarped(samples, in_z))
+    return _Candidates(unwarped(w, in_z), off_axis, pole, unwarped(samples, in_z))
 
 
 def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> tuple[Real, Complex]:
@@ -214,6 +222,10 @@ def _with_touches(
     more: list[float] = []
     touch: list[bool] = []
     for k in np.flatnonzero(open_question):
+        at = float(found.x[k])
+        near = 10.0 * float(found.off_axis[k]) + 1e-6
+        low, high = max(at / (1.0 + near), found.samples[k]), min(at * (1.0 + near), found.samples[k + 1])
+        _near_touch(loop, float(low), float(high), gain, more, touch)
         _near_touch(loop, float(found.samples[k]), float(found.samples[k + 1]), gain, more, touch)
         if k + 1 < found.count and open_question[k + 1]:
             _near_touch(loop, float(found.samples[k]), float(found.samples[k + 2]), gain, more, touch)

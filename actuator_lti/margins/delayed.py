@@ -115,11 +115,13 @@ def _tail(form: DelayForm, start: float) -> float:
                 [-np.abs(form.C2), np.eye(q) - np.abs(form.D22)],
             ]
         )
-        rhs = np.concatenate((np.abs(form.B1), np.abs(form.D21)))
-        X = np.linalg.solve(M, rhs)
-        inverse = np.linalg.inv(M)
-        if inverse.min() < -1e-12 * np.abs(inverse).max():
+        try:
+            inverse = np.linalg.inv(M)
+        except np.linalg.LinAlgError:
             return math.inf
+        if inverse.min() < -1e-12 * np.abs(inverse).max():
+            return math.inf  # w is not yet large enough for an M-matrix
+        X = inverse @ np.concatenate((np.abs(form.B1), np.abs(form.D21)))
         return float(np.abs(form.C1) @ X[:n] + np.abs(form.D12) @ X[n:]) + abs(form.D11)
 
     w = start
@@ -267,7 +269,7 @@ def _polished(
     at_ends = criterion.distance(ends_L)
     best, place = float(at_ends.min()), float(ends_x[int(at_ends.argmin())])
     k = int(distance.argmin())
-    if distance[k] > best:
+    if distance[k] > best * (1.0 - 1e-12):
         return best, place
     low = float(found.x[max(k - 1, 0)])
     high = float(found.x[min(k + 1, found.x.size - 1)])

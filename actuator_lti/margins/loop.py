@@ -16,6 +16,7 @@ from actuator_lti.errors import InputError
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
+_AT_MINUS_ONE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool =
     n = den.size - 1
     if warp and period_s is not None and n and np.isfinite(num).all() and np.isfinite(den).all():
         warped_den = warped_coefficients(den, n)
-        if warped_den[0]:
+        if abs(warped_den[0]) > _AT_MINUS_ONE * np.abs(den).sum():
             loop = from_coefficients(warped_coefficients(num, n), warped_den, None)
             return replace(loop, period_s=period_s)
     above = np.zeros(n + 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from mpmath import mp, mpc, mpf
@@ -101,7 +102,7 @@ def _estimates(p: list[mpf]) -> np.ndarray:
             hull.pop()
         hull.append(k)
     start = []
-    for low, high in zip(hull[:-1], hull[1:], strict=True):
+    for low, high in pairwise(hull):
         radius = np.exp((logs[low] - logs[high]) / (high - low))
         angles = 2 * np.pi * np.arange(high - low) / (high - low) + 0.7 + 0.3 * low
         start += list(radius * np.exp(1j * angles))

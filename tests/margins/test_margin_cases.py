@@ -34,8 +34,8 @@ LOOPS = {
     "G4 inner": 3 / (s + 2) * 0.244 * (1 + 1 / (0.134 * s)),
     "G5": 72 * 0.01 / ((0.01 * s + 0.1) * (0.5 * s + 1) + 0.0001),
 }  # fmt: skip
-# name: stable, gain margins (ratio, rad/s), phase margins (deg, rad/s); digits of cases.md where it is printed,
-# recomputed at 40 digits with mpmath where more are given
+# name: stable, gain margins (ratio, rad/s), phase margins (deg, rad/s); the digits of
+# cases.md, and beyond them those of mpmath at 40 digits
 EXPECTED: dict[str, tuple[bool, list[tuple[float, float]], list[tuple[float, float]]]] = {
     "A1": (True, [(3.6, math.sqrt(10))], [(29.1103691304, 1.78443562083)]),
     "A2": (True, [(2.05172413793, 5.43741315711), (2351.1389, 10 * math.pi)],
@@ -45,7 +45,8 @@ EXPECTED: dict[str, tuple[bool, list[tuple[float, float]], list[tuple[float, flo
     "A5": (True, [(2.5, math.sqrt(11))], [(35.4254199888, 2.06385145801)]),
     "A5 held 0.3 s": (True, [(1.41205400689, 2.47750745166)], [(18.6021379183, 2.04369751003)]),
     "A6": (True, [(2.27158587032, 10.0052763665)],
-           [(97.5939791371, 0.0850451549923), (-157.784483214, 0.937253347097), (134.732573654, 1.09191889152)]),
+           [(97.5939791371, 0.0850451549923), (-157.784483214, 0.937253347097),
+            (134.732573654, 1.09191889152)]),
     "B2": (False, [(0.05, 1000.0)],
            [(89.9988531664, 20.0080096114), (87.1919002742, 989.858246607), (-87.0772800293, 1009.84124058)]),
     "C1": (True, [(0.1, 0.22360679775)], [(63.8424459348, 1.06498625116)]),

@@ -1,0 +1,116 @@
+"""Bandwidths (cases F3, F5, F6, F7), resonance, peaks of S and T, against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+
+from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
+from actuator_lti.delay_system import DelaySystem
+from actuator_lti.errors import InputError
+from actuator_lti.margins import stability_margins
+
+s = control.tf("s")
+W = 2 * math.pi * 30
+SECOND = W**2 / (s**2 + W * s + W**2)
+
+
+@pytest.mark.parametrize("inner", [False, True])
+def test_F3_second_order_with_delay(inner: bool) -> None:
+    if inner:
+        b = closed_loop_bandwidth(DelaySystem.from_system(SECOND) * DelaySystem.delay(0.002))
+    else:
+        b = closed_loop_bandwidth(SECOND, delay_s=0.002)
+    assert b.minus3db_hz == pytest.approx(38.1605894854, rel=1e-9)
+    assert b.minus90deg_hz == pytest.approx(25.4421530721, rel=1e-9)  # cases.md prints 25.4421, cut off
+    assert b.resonance_peak_db == pytest.approx(20 * math.log10(1 / math.sqrt(0.75)), abs=1e-9)
+    assert b.resonance_hz == pytest.approx(30 * math.sqrt(0.5), rel=1e-6)
+
+
+def test_F5_both_definitions_of_minus_3_db() -> None:
+    lag = control.tf([1], [1, 1])
+    half, exact = closed_loop_bandwidth(lag), closed_loop_bandwidth(lag, level="-3 dB")
+    assert half.minus3db_rad_s == pytest.approx(1.0, rel=1e-12)
+    assert exact.minus3db_rad_s == pytest.approx(0.997628345111, rel=1e-9)
+    assert half.definition == "1/sqrt(2)"
+    assert half.minus90deg_rad_s is None
+    assert "1/sqrt(2)" in str(half)
+
+
+def test_F6_sampled() -> None:
+    b = closed_loop_bandwidth(control.tf([0.5], [1, -0.5], 0.001))
+    assert b.minus3db_hz == pytest.approx(115.026728081, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("m", "bandwidth"), [(1, 1.2712), (2, 1.9991), (3, 2.5298), (4, 2.9678), (5, 3.3493)]
+)
+def test_F7_MathWorks(m: int, bandwidth: float) -> None:
+    for loop in (m / (s**2 + s + m), control.ss(m / (s**2 + s + m))):
+        assert closed_loop_bandwidth(loop, level="-3 dB").minus3db_rad_s == pytest.approx(bandwidth, abs=5e-5)
+
+
+def test_first_fall_counts_where_the_gain_comes_back() -> None:
+    loop = (s**2 + 0.02 * s + 1) / (s + 1) ** 2 * 100 / (s**2 + 0.1 * s + 100) * (s / 10 + 1)
+    b = closed_loop_bandwidth(loop)
+    omega = np.geomspace(1e-2, 1e3, 200_001)
+    size = np.abs(loop(1j * omega))
+    assert b.minus3db_rad_s == pytest.approx(omega[np.argmax(size < math.sqrt(0.5))], rel=1e-4)
+    assert b.resonance_peak_db == pytest.approx(20 * math.log10(size.max()), abs=1e-3)
+
+
+def test_a_negative_response_is_measured_from_its_own_phase() -> None:
+    a, b = closed_loop_bandwidth(SECOND), closed_loop_bandwidth(-SECOND)
+    assert b.dc_gain == pytest.approx(-1.0)
+    assert b.minus90deg_rad_s == pytest.approx(a.minus90deg_rad_s, rel=1e-9)
+
+
+def test_closed_loop_of_an_integrator_with_delay() -> None:
+    K, T = 100.0, 0.005
+    closed = (DelaySystem.from_system(K / s) * DelaySystem.delay(T)).feedback()
+    b = closed_loop_bandwidth(closed)
+    omega = np.linspace(1, 400, 400_001)
+    L = K / (1j * omega) * np.exp(-1j * omega * T)
+    response = L / (1 + L)
+    assert b.minus3db_rad_s == pytest.approx(omega[np.argmax(np.abs(response) < math.sqrt(0.5))], rel=1e-5)
+    assert b.minus90deg_rad_s == pytest.approx(
+        omega[np.argmax(np.unwrap(np.angle(response)) < -np.pi / 2)], rel=1e-5
+    )
+
+
+def test_peaks_of_S_and_T() -> None:
+    loop = control.tf([25], [1, 10, 10, 10])
+    found = peaks(loop)
+    omega = np.geomspace(0.1, 30, 400_001)
+    L = loop(1j * omega)
+    S, T = np.abs(1 / (1 + L)), np.abs(L / (1 + L))
+    assert found.sensitivity_db == pytest.approx(20 * math.log10(S.max()), abs=1e-6)
+    assert found.complementary_db == pytest.approx(20 * math.log10(T.max()), abs=1e-6)
+    assert found.sensitivity_rad_s == pytest.approx(omega[S.argmax()], rel=1e-4)
+    assert found.complementary_rad_s == pytest.approx(omega[T.argmax()], rel=1e-4)
+    assert found.sensitivity_db == pytest.approx(stability_margins(loop).sensitivity_peak_db)
+
+
+def test_peaks_with_delay_and_without_any() -> None:
+    omega = np.linspace(1, 1000, 400_001)
+    L = 100 / (1j * omega) * np.exp(-0.005j * omega)
+    found = peaks(100 / s, delay_s=0.005)
+    assert found.sensitivity_db == pytest.approx(20 * math.log10(np.abs(1 / (1 + L)).max()), abs=1e-6)
+    assert found.complementary_db == pytest.approx(0.0, abs=1e-6)
+    assert found.complementary_rad_s == 0.0
+
+
+@pytest.mark.parametrize(
+    ("loop", "message"), [(control.tf([1], [1, 0]), "pole at zero"), (s / (s + 1), "is zero")]
+)
+def test_no_value_to_fall_from(loop: control.LTI, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        closed_loop_bandwidth(loop)
+
+
+def test_unknown_level() -> None:
+    with pytest.raises(InputError, match="level"):
+        closed_loop_bandwidth(SECOND, level="3")  # type: ignore[arg-type]
