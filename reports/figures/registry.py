@@ -31,6 +31,9 @@ MODULES: dict[str, str] = {
     "trajectory": "reports.figures.trajectory",
     "overlay": "reports.figures.overlay",
     "trade_off": "reports.figures.trade_off",
+    "overlay_sweep": "reports.figures.overlay_sweep",
+    "confirmation": "reports.figures.confirmation",
+    "rest_sweep": "reports.figures.rest_sweep",
 }
 
 

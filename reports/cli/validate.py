@@ -1,0 +1,133 @@
+"""`actuator-lti validate`: the linear predictions of a design checked by the nonlinear simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption
+
+if TYPE_CHECKING:
+    from analyses.validation import Validation
+
+FolderOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Also write validation.html and validation.json there."),
+]
+QuickOption = Annotated[
+    bool, typer.Option("--quick", help="Fewer frequencies, a coarser map; no margins by amplitude.")
+]
+
+
+def validate(
+    design: DesignArgument = DEFAULT_DESIGN,
+    out: FolderOption = None,
+    as_json: JsonOption = False,
+    quick: QuickOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Check every linear prediction against the nonlinear simulation.
+
+    Exit status 1 if a prediction fails where it should hold, or if a command within full deflection makes the
+    drive diverge. Predictions that cannot hold (friction, a limit) are shown with the reason.
+    """
+    from actuator_lti.design import load_design
+    from analyses.validation import QUICK, Settings
+    from analyses.validation import validate as run
+    from reports.cli.errors import leave_with
+    from reports.cli.progress import progress
+
+    drive = load_design(design)
+    with progress(f"validating {drive.name}", quiet=quiet) as report:
+        found = run(drive, QUICK if quick else Settings(), report)
+    made = _document(found)
+    paths = _write(made, out, quiet) if out is not None else ()
+    if as_json:
+        _print_json(made)
+    else:
+        _print_tables(found, made, paths)
+    leave_with(found.passed and made["verdict"]["passed"])
+
+
+def _document(found: Validation) -> dict[str, Any]:
+    """The validation as a document of its own."""
+    from actuator_lti.design import design_hash
+    from reports import document as doc
+    from reports.build import design_head
+    from reports.provenance import provenance
+    from reports.sections.validation import section
+
+    design = found.design
+    return doc.document(
+        title=f"{design.title or design.name}: validation",
+        subtitle="Linear predictions against the nonlinear simulation",
+        design=design_head(design),
+        provenance=provenance(design_hash(design)),
+        sections=section(found),
+        kind="validation",
+    )
+
+
+def _write(made: dict[str, Any], folder: Path, quiet: bool) -> tuple[Path, ...]:
+    """Write the page and its JSON; both or neither."""
+    from actuator_lti.atomic import write_together
+    from reports.cli.progress import progress
+    from reports.document import dumps, loads
+    from reports.html import page
+
+    content = dumps(made)
+    with progress("drawing figures", quiet=quiet) as drawing:
+        html = page(loads(content), processes=2, progress=drawing)
+    paths = (folder / "validation.html", folder / "validation.json")
+    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
+    return paths
+
+
+def _print_json(made: dict[str, Any]) -> None:
+    from reports.cli.output import print_line
+    from reports.document import dumps
+
+    print_line(dumps(made).rstrip("\n"))
+
+
+def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
+    """Print the ledger, the conditional stability, and the verdict."""
+    from reports.cli.output import print_line
+    from reports.sections.validation import by_loop, loop_name
+    from reports.terminal import print_blocks
+
+    tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
+    sections = {part["id"]: part for part in made["sections"]}
+    if "conditional" in sections:
+        tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
+    print_blocks(tables, found.notes)
+    for path in paths:
+        print_line(str(path))
+    print_line(f"{'PASS' if found.passed else 'FAIL'}  {found}")
+    print_line(f"{sum(found.seconds.values()):.1f} s")
+
+
+def _ledger(rows: Any, caption: str) -> dict[str, Any]:
+    """The ledger of one loop for a terminal: fewer columns, verdicts in colour."""
+    from reports import document as doc
+    from reports.sections.validation import STATUS, row_of
+
+    columns = [
+        doc.column("quantity", "Prediction"),
+        doc.column("predicted", "Linear", format="sig:5"),
+        doc.column("measured", "Simulated", format="sig:5"),
+        doc.column("unit", ""),
+        doc.column("difference", "Difference", format="sig:2"),
+        doc.column("verdict", "Verdict"),
+        doc.column("why", "Under, because"),
+    ]
+    lines = []
+    for row in rows:
+        shown = row_of(row)
+        small = row.passed is not None
+        shown["verdict"] = {"text": shown["verdict"], "status": STATUS[row.passed]}
+        shown["why"] = row.reason if small else f"{row.condition}: {row.reason}"
+        lines.append(shown)
+    return doc.table(caption, columns, lines)

@@ -1,0 +1,89 @@
+"""Conditional stability that a limit brings out."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from analyses.validation.conditional import Conditional, Prediction
+from reports import document as doc
+from reports.sections.names import POINTS
+
+
+def section(found: Conditional, axis: str = "rotary") -> dict[str, Any]:
+    """Make the section: what the describing functions say, and what steps of growing size do."""
+    scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
+    blocks = [doc.text(_words(found, scale, unit)), _facts(found, scale, unit)]
+    if found.predictions:
+        blocks.append(_table(found.predictions, scale, unit))
+    intro = (
+        "A limit takes gain away. A loop that needs its gain (one with a lower gain margin) can then lose "
+        "its stability at large commands although every margin is healthy."
+    )
+    status = "fail" if found.found else "pass"
+    return doc.section(
+        "conditional", "Large commands and conditional stability", blocks, intro=intro, status=status
+    )
+
+
+def _words(found: Conditional, scale: float, unit: str) -> str:
+    """Say in a sentence or two what was found."""
+    full = f"{found.full_deflection_rad * scale:.4g} {unit}"
+    if not found.found:
+        return f"Every step from rest up to full deflection ({full}) settles."
+    threshold = (found.threshold_rad or 0.0) * scale
+    words = f"Steps beyond {threshold:.4g} {unit} do not settle (full deflection {full})"
+    words += ", although the linear margins call every loop stable." if found.hidden else "."
+    if found.oscillation_hz is not None and found.oscillation_rad is not None:
+        size = f"{found.oscillation_rad * scale:.3g} {unit}"
+        words += (
+            f" At the threshold the output hovers around a limit cycle of {size} at "
+            f"{found.oscillation_hz:.3g} Hz, with the {found.limiter} limit acting."
+        )
+        free = [one for one in found.predictions if not one.antiwindup]
+        if free:
+            best = free[0]
+            words += (
+                f" The describing function of the {best.limiter} predicts "
+                f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
+            )
+    return words
+
+
+def _facts(found: Conditional, scale: float, unit: str) -> dict[str, Any]:
+    threshold = found.threshold_rad
+    items = [
+        doc.fact("Largest step that settles", (threshold or found.full_deflection_rad) * scale, unit),
+        doc.fact("Full deflection", found.full_deflection_rad * scale, unit),
+    ]
+    for point, margins in found.margins.items():
+        if margins.stable and margins.gain_lower > 0.0:
+            label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"
+            items.append(doc.fact(label, 20.0 * math.log10(margins.gain_lower), "dB"))
+    return doc.facts(items)
+
+
+def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> dict[str, Any]:
+    columns = [
+        doc.column("limiter", "Limit"),
+        doc.column("point", "In front of it"),
+        doc.column("gain", "Lower gain margin", "dB", format="sig:4"),
+        doc.column("ratio", "Amplitude over limit", format="sig:3"),
+        doc.column("hertz", "Oscillates at", "Hz", format="sig:3"),
+        doc.column("output", "Output", unit, format="sig:3"),
+        doc.column("antiwindup", "Anti-windup in front"),
+    ]
+    rows = [
+        {
+            "limiter": one.limiter,
+            "point": POINTS.get(one.point, one.point),
+            "gain": 20.0 * math.log10(one.gain_lower),
+            "ratio": one.amplitude / one.limit,
+            "hertz": one.frequency_hz,
+            "output": one.output_rad * scale,
+            "antiwindup": "yes: safer than this" if one.antiwindup else "no",
+        }
+        for one in predictions
+    ]
+    note = "Describing function of saturation: from this amplitude on an oscillation keeps itself up."
+    return doc.table("Predicted limit cycles", columns, rows, note)

@@ -1,0 +1,157 @@
+"""Margins confirmed in time: gain and delay raised until oscillations no longer die out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from analyses.validation.confirm import Confirmation
+from analyses.validation.release import AmplitudeMargin
+from analyses.validation.result import Validation
+from reports import document as doc
+
+SHORT = {
+    "gain up": "gain up",
+    "gain down": "gain down",
+    "delay": "delay",
+    "computing delay": "computing delay",
+}
+
+
+def sections(validation: Validation) -> list[dict[str, Any]]:
+    """Make the section, if anything was confirmed."""
+    items = [item for loop in validation.loops.values() for item in loop.confirmed]
+    items += [item for point in validation.points.values() for item in point.confirmed]
+    if not items:
+        return []
+    blocks = [_figure(items, validation.amplitude_margins), _table(items)]
+    if validation.amplitude_margins:
+        blocks.append(_released(validation.amplitude_margins))
+    intro = (
+        "Gain is raised and lowered, and delay added, in the simulator until an oscillation no longer dies "
+        "out. On a constant speed, without a limit acting, that is the linear margin; from rest, limits and "
+        "dry friction move it."
+    )
+    status = "pass" if all(item.passed for item in items) else "fail"
+    return [doc.section("confirmation", "Margins confirmed in time", blocks, intro=intro, status=status)]
+
+
+def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) -> dict[str, Any]:
+    data = {
+        "margins": [
+            {"label": f"{item.loop}: {SHORT[item.kind]}", "difference": abs(item.difference)}
+            for item in items
+            if item.difference is not None
+        ],
+        "tolerance": items[0].tolerance,
+        "released": _series(released),
+    }
+    worst = max((abs(item.difference) for item in items if item.difference is not None), default=0.0)
+    caption = (
+        f"Left: border found in time against the linear margin, largest difference {worst:.1e} (allowed "
+        f"{items[0].tolerance:g}). Right: the same borders with the drive let go from rest at small, medium "
+        "and large deviations, limits on, with dry friction and without."
+    )
+    return doc.figure("confirmation", data, caption=caption, alt=caption)
+
+
+def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
+    """Borders over linear borders, by loop and kind."""
+    found: dict[str, dict[str, Any]] = {}
+    for item in released:
+        label = f"{item.loop}: {SHORT[item.kind]}"
+        one = found.setdefault(label, {"label": label, "sizes": [], "with_friction": [], "without": []})
+        if item.size not in one["sizes"]:
+            one["sizes"].append(item.size)
+            one["with_friction"].append(None)
+            one["without"].append(None)
+        k = one["sizes"].index(item.size)
+        key = "with_friction" if item.friction_on else "without"
+        one[key][k] = None if item.border.value is None else item.border.value / item.linear
+    return list(found.values())
+
+
+def _table(items: Sequence[Confirmation]) -> dict[str, Any]:
+    columns = [
+        doc.column("where", "Loop or break point"),
+        doc.column("kind", "Varied"),
+        doc.column("linear", "Linear margin", format="sig:6"),
+        doc.column("time", "Found in time", format="sig:6"),
+        doc.column("unit", "Unit"),
+        doc.column("difference", "Difference", "%", format="sig:2"),
+        doc.column("hertz", "Oscillates at", "Hz", format="sig:4"),
+        doc.column("instrument", "Instrument's own error", "%", format="sig:2"),
+        doc.column("runs", "Runs", format="sig:4"),
+    ]
+    note = (
+        "Gains scale the controller in front of the point. Delays go in behind it, a fraction of a sample by "
+        "Lagrange interpolation, whose own error at the border is stated; the computing delay is exact. "
+        "Margins beyond 50 dB count as none."
+    )
+    return doc.table("Gain and delay margins in time", columns, [_row(item) for item in items], note)
+
+
+def _row(item: Confirmation) -> dict[str, Any]:
+    delay = "delay" in item.kind
+    values = [item.predicted, item.border.value]
+    if delay:
+        shown = [None if x is None else 1e3 * x * item.period_s for x in values]
+    else:
+        shown = [None if x is None else 20.0 * math.log10(x) for x in values]
+    return {
+        "where": item.loop,
+        "kind": SHORT[item.kind],
+        "linear": shown[0],
+        "time": shown[1],
+        "unit": "ms" if delay else "dB",
+        "difference": None if item.difference is None else 100.0 * item.difference,
+        "hertz": item.border.frequency_hz,
+        "instrument": 100.0 * item.instrument_error if item.kind == "delay" else None,
+        "runs": item.border.runs,
+        "_status": "pass" if item.passed else "fail",
+    }
+
+
+def _released(items: Sequence[AmplitudeMargin]) -> dict[str, Any]:
+    columns = [
+        doc.column("loop", "Loop"),
+        doc.column("kind", "Varied"),
+        doc.column("size", "Let go from"),
+        doc.column("friction", "Dry friction"),
+        doc.column("linear", "Linear margin", format="sig:4"),
+        doc.column("border", "Oscillations last from", format="sig:3"),
+        doc.column("unit", "Unit"),
+        doc.column("remark", ""),
+    ]
+    return doc.details(
+        "Margins from small, medium and large deviations",
+        [doc.table("Margins by amplitude", columns, [_released_row(item) for item in items])],
+    )
+
+
+def _released_row(item: AmplitudeMargin) -> dict[str, Any]:
+    value, delay = item.border.value, item.kind == "delay"
+    remark = ""
+    if value is None:
+        remark = "no lasting oscillation up to " + _text(max(item.border.bracket), item, delay)
+    elif item.border.bracket == (1.0, 1.0) and not delay:
+        remark = "the nominal drive oscillates"
+    return {
+        "loop": item.loop,
+        "kind": SHORT[item.kind],
+        "size": f"{100.0 * item.part:.0f} % of full range",
+        "friction": "on" if item.friction_on else "off",
+        "linear": _shown(item.linear, item, delay),
+        "border": None if value is None else _shown(value, item, delay),
+        "unit": "ms" if delay else "dB",
+        "remark": remark,
+    }
+
+
+def _shown(value: float, item: AmplitudeMargin, delay: bool) -> float:
+    return 1e3 * value * item.period_s if delay else 20.0 * math.log10(value)
+
+
+def _text(value: float, item: AmplitudeMargin, delay: bool) -> str:
+    return f"{_shown(value, item, delay):.3g} {'ms' if delay else 'dB'}"

@@ -1,0 +1,181 @@
+"""Measured and linear frequency responses over one another: loops on a constant speed, and from rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from analyses.validation.at_rest import RestSweep
+from analyses.validation.result import LoopValidation, PointValidation, Validation
+from reports import document as doc
+from reports.document import rounded
+
+GAIN_DB, PHASE_DEG = 0.01, 0.1  # what the measurement must meet up to a third of Nyquist
+NAMES = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
+
+
+def sections(validation: Validation) -> list[dict[str, Any]]:
+    """Make the section of the loops, and that from rest where there is dry friction."""
+    made = [_injection(validation.loops, validation.points)]
+    sweep = validation.rest_sweep
+    if sweep is not None and np.isfinite(sweep.described).any():
+        made.append(_from_rest(sweep, validation.design.axis))
+    return made
+
+
+def worst_below_third(loop: LoopValidation) -> tuple[float, float]:
+    """Largest differences of the open loop in dB and deg, up to a third of Nyquist."""
+    assert loop.measured is not None
+    assert loop.open_errors is not None
+    sweep = loop.measured.sweep
+    low = sweep.valid & (sweep.frequency_hz <= 0.5 / sweep.period_s / 3.0)
+    gain, phase = (np.abs(x[low]) for x in (loop.open_errors.gain_db, loop.open_errors.phase_deg))
+    return float(gain.max(initial=0.0)), float(phase.max(initial=0.0))
+
+
+def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> dict[str, Any]:
+    """Make the section of the loops measured by injection."""
+    shown = {name: loop for name, loop in loops.items() if loop.measured is not None}
+    blocks: list[dict[str, Any]] = [_overlay(name, loop) for name, loop in shown.items()]
+    blocks.append(_agreement(shown, points))
+    intro = (
+        "A sine is added at the break point while the drive runs at constant speed; fundamentals come from "
+        "correlation over whole periods once two windows agree. The same run gives open loop, closed loop "
+        "and plant. The drive's own limits are on; amplitudes keep clear of them."
+    )
+    good = all(
+        worst_below_third(x)[0] <= GAIN_DB and worst_below_third(x)[1] <= PHASE_DEG for x in shown.values()
+    )
+    return doc.section(
+        "injection", "Frequency response by injection", blocks, intro=intro, status="pass" if good else "fail"
+    )
+
+
+def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
+    """Make the overlay of one loop."""
+    assert loop.measured is not None
+    sweep = loop.measured.sweep
+    f = sweep.frequency_hz
+    panels = [
+        _panel("open loop L", loop.open_loop, sweep.open_loop),
+        _panel("closed loop T", loop.closed_loop, sweep.closed_loop),
+    ]
+    third = 0.5 / sweep.period_s / 3.0
+    data = {
+        "frequency_hz": rounded(f),
+        "valid_to_hz": third,
+        "panels": panels,
+        "tolerance_db": GAIN_DB,
+        "tolerance_deg": PHASE_DEG,
+    }
+    gain, phase = worst_below_third(loop)
+    caption = (
+        f"{NAMES[name]}: linear (line) and measured in the nonlinear simulation (circles), with the "
+        f"magnitude of their difference below. Up to a third of Nyquist ({third:.4g} Hz, dotted) they differ "
+        f"by at most {gain:.1e} dB and {phase:.1e} deg."
+    )
+    return doc.figure("overlay_sweep", data, caption=caption, alt=caption)
+
+
+def _panel(title: str, linear: Any, measured: Any) -> dict[str, Any]:
+    """One response: magnitudes, phases, differences."""
+    ratio = measured / linear
+    phase = np.degrees(np.unwrap(np.angle(linear)))
+    seen = phase + np.degrees(np.angle(ratio))
+    return {
+        "title": title,
+        "linear_db": rounded(20.0 * np.log10(np.abs(linear))),
+        "linear_deg": rounded(phase),
+        "measured_db": rounded(20.0 * np.log10(np.abs(measured))),
+        "measured_deg": rounded(seen),
+        "error_db": rounded(np.abs(20.0 * np.log10(np.abs(ratio))), 3),
+        "error_deg": rounded(np.abs(np.degrees(np.angle(ratio))), 3),
+    }
+
+
+def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> dict[str, Any]:
+    """List how well each response is met, and how clean the measurement was."""
+    columns = [
+        doc.column("name", "Response"),
+        doc.column("points", "Points", format="sig:3"),
+        doc.column("gain", "Gain off by", "dB", format="sig:2"),
+        doc.column("phase", "Phase off by", "deg", format="sig:2"),
+        doc.column("distortion", "Distortion", "%", format="sig:2"),
+        doc.column("unsteady", "Last two windows differ by", format="sig:2"),
+        doc.column("tones", "Multisine off by", "dB", format="sig:2"),
+        doc.column("coherence", "Coherence, 1 less", format="sig:2"),
+        doc.column("left_out", "Not reported"),
+    ]
+    rows = [_loop_row(name, loop) for name, loop in loops.items()]
+    rows += [_point_row(name, point) for name, point in points.items() if point.sweep is not None]
+    note = (
+        "Largest values over all points up to Nyquist. A point whose last two windows differ by more than "
+        "1e-5 is not reported as steady. Distortion at u and i_ref of a multirate drive holds the images of "
+        "its periodic loop."
+    )
+    return doc.table("Measured against assembled loops", columns, rows, note)
+
+
+def _loop_row(name: str, loop: LoopValidation) -> dict[str, Any]:
+    assert loop.measured is not None
+    assert loop.open_errors is not None
+    tones = loop.tones
+    return {
+        "name": f"{NAMES[name]}, open",
+        **_quality(loop.measured.sweep, loop.open_errors),
+        "tones": None if loop.tone_errors is None else loop.tone_errors.worst_gain_db,
+        "coherence": None if tones is None else float(1.0 - tones.coherence.min()),
+    }
+
+
+def _point_row(name: str, point: PointValidation) -> dict[str, Any]:
+    return {"name": f"at {name}, all loops closed", **_quality(point.sweep, point.open_errors)}
+
+
+def _quality(sweep: Any, errors: Any) -> dict[str, Any]:
+    good = sweep.valid
+    left = sorted({text for text in sweep.reason if text})
+    return {
+        "points": int(good.sum()),
+        "gain": errors.worst_gain_db,
+        "phase": errors.worst_phase_deg,
+        "distortion": 100.0 * float(sweep.distortion[good].max(initial=0.0)),
+        "unsteady": float(sweep.unsteadiness[good].max(initial=0.0)),
+        "left_out": "; ".join(left) if left else "none",
+    }
+
+
+def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
+    """Make the section of the sweep from rest."""
+    scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
+    series = [
+        ("measured from rest", sweep.measured, True),
+        ("sliding loop", sweep.sliding, False),
+        ("describing function of dry friction", sweep.described, False),
+    ]
+    data = {
+        "frequency_hz": rounded(sweep.frequency_hz),
+        "series": [
+            {
+                "label": label,
+                "magnitude_db": rounded(20.0 * np.log10(np.abs(values))),
+                "phase_deg": rounded(np.degrees(np.unwrap(np.angle(values)))),
+                "points": points,
+            }
+            for label, values, points in series
+        ],
+    }
+    off = sweep.measured / sweep.described
+    gain = float(np.nanmax(np.abs(20.0 * np.log10(np.abs(off)))))
+    phase = float(np.nanmax(np.abs(np.degrees(np.angle(off)))))
+    low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale
+    caption = (
+        f"Command to output without bias motion, amplitudes of {low:.3g} to {high:.3g} {unit} clear of every "
+        f"limit. The describing function at the speed amplitude that was seen is met within {gain:.2g} dB "
+        f"and {phase:.2g} deg; the sliding loop knows nothing of the reversals."
+    )
+    intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."
+    block = doc.figure("rest_sweep", data, caption=caption, alt=caption)
+    return doc.section("from-rest", "From rest: what dry friction makes of it", [block], intro=intro)

@@ -1,0 +1,233 @@
+"""The verdict of the nonlinear simulator on every linear prediction, and all sections of a validation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from analyses.validation.ledger import Entry
+from analyses.validation.result import Validation
+from reports import document as doc
+from reports.sections.names import LOOPS, POINTS, QUANTITIES
+
+MORE = {
+    "gain_margin_up": "gain margin, upwards",
+    "gain_margin_down": "gain margin, downwards",
+    "computing_delay_margin": "margin of computing delay",
+    "complementary_peak": "peak of T",
+    "resonance": "frequency of the resonance",
+    "stability": "stability",
+}
+STATUS = {True: "pass", False: "fail", None: "info"}
+WORD = {True: "holds", False: "FAILS", None: "not judged"}
+
+
+def section(validation: Validation) -> list[dict[str, Any]]:
+    """Make all sections of a validation, verdicts first."""
+    from reports.sections import conditional, confirmation, sweep
+
+    sections = [summary(validation), *sweep.sections(validation), *confirmation.sections(validation)]
+    if validation.conditional is not None:
+        sections.append(conditional.section(validation.conditional, validation.design.axis))
+    return [*sections, *_others(validation)]
+
+
+def _others(validation: Validation) -> list[dict[str, Any]]:
+    """Make the sections of large signals, friction and specification, as far as they were asked for."""
+    parts = {
+        "large_signal": validation.large_signals,
+        "friction_effects": validation.friction,
+        "specification": validation.specification,
+    }
+    made: list[dict[str, Any]] = []
+    for name, result in parts.items():
+        if result is not None and find_spec(f"reports.sections.{name}") is not None:
+            found = import_module(f"reports.sections.{name}").section(result)
+            made += found if isinstance(found, list) else [found]
+    return made
+
+
+def summary(validation: Validation) -> dict[str, Any]:
+    """Make the section of verdicts with the ledger."""
+    blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation))]
+    failed = [row for row in validation.ledger if row.passed is False]
+    if failed:
+        blocks.append(ledger_table(failed, "Predictions that fail"))
+    for name, rows in by_loop(validation.ledger).items():
+        blocks.append(
+            doc.details(f"{loop_name(name)}: every prediction", [ledger_table(rows, loop_name(name))])
+        )
+    if validation.notes:
+        blocks += [doc.text(note) for note in validation.notes]
+    blocks.append(doc.details("Where the time went", [_times(validation)]))
+    intro = (
+        "Every linear prediction was put to the nonlinear simulator. Small signals ride on a constant speed, "
+        "where dry friction is a constant torque; what cannot hold from rest is shown with the reason."
+    )
+    status = "pass" if validation.passed else "fail"
+    return doc.section(
+        "validation", "Linear predictions against simulation", blocks, intro=intro, status=status
+    )
+
+
+def verdict_items(validation: Validation) -> list[dict[str, Any]]:
+    """One verdict a loop or break point, one for the frequency responses, one for large commands."""
+    items = []
+    for name, rows in by_loop(validation.ledger).items():
+        judged = [row for row in rows if row.passed is not None]
+        held = sum(row.passed is True for row in judged)
+        worst = [f"{quantity_name(row)}: {row.reason or 'off'}" for row in judged if row.passed is False]
+        items.append(
+            _verdict(
+                f"predictions-{name}",
+                f"{loop_name(name)}: predictions that hold",
+                held,
+                len(judged),
+                ">=",
+                "",
+                held == len(judged) if judged else None,
+                "; ".join(worst) or f"{len(rows) - len(judged)} more shown, not judged",
+            )
+        )
+    items += _response_items(validation)
+    conditional = validation.conditional
+    if conditional is not None:
+        full = _size(conditional.full_deflection_rad, validation.design.axis)
+        reached = conditional.threshold_rad if conditional.found else conditional.full_deflection_rad
+        reason = "larger steps diverge although every margin says stable" if conditional.hidden else ""
+        items.append(
+            _verdict(
+                "large-commands",
+                "Largest step that settles",
+                _size(reached or 0.0, validation.design.axis),
+                full,
+                ">=",
+                "mm" if validation.design.axis == "linear" else "deg",
+                not conditional.found,
+                reason,
+            )
+        )
+    border = None if validation.large_signals is None else validation.large_signals.border
+    if border is not None and border.passed is not None:
+        error = border.largest_error
+        items.append(
+            _verdict(
+                "onset",
+                "Onset of saturation against the smallest A_k, largest difference",
+                None if error is None else 100.0 * error,
+                1.0,
+                "<=",
+                "%",
+                border.passed,
+                "",
+            )
+        )
+    return items
+
+
+def _response_items(validation: Validation) -> list[dict[str, Any]]:
+    """Agreement of measured and assembled responses up to a third of Nyquist."""
+    from reports.sections.sweep import GAIN_DB, PHASE_DEG, worst_below_third
+
+    items = []
+    for name, loop in validation.loops.items():
+        if loop.measured is None:
+            continue
+        gain, phase = worst_below_third(loop)
+        for kind, value, limit, unit in (("gain", gain, GAIN_DB, "dB"), ("phase", phase, PHASE_DEG, "deg")):
+            label = f"{loop_name(name)}: {kind} by injection, up to a third of Nyquist, off by"
+            passed = value <= limit
+            items.append(_verdict(f"injection-{name}-{kind}", label, value, limit, "<=", unit, passed, ""))
+    return items
+
+
+def _verdict(
+    id: str,
+    label: str,
+    value: float | None,
+    limit: float,
+    comparison: str,
+    unit: str,
+    passed: bool | None,
+    reason: str,
+) -> dict[str, Any]:
+    """Make one verdict; the distance is positive on the good side."""
+    distance = None
+    if value is not None:
+        distance = value - limit if comparison == ">=" else limit - value
+    return doc.verdict(
+        id, label, value=value, limit=limit, unit=unit, distance=distance, passed=passed, reason=reason,
+        comparison={">=": "≥", "<=": "≤"}[comparison],
+    )  # fmt: skip
+
+
+def by_loop(rows: Sequence[Entry]) -> dict[str, list[Entry]]:
+    """Group entries by loop or break point, in order."""
+    found: dict[str, list[Entry]] = {}
+    for row in rows:
+        found.setdefault(row.loop, []).append(row)
+    return found
+
+
+def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
+    """Lay entries out as a table."""
+    columns = [
+        doc.column("quantity", "Prediction"),
+        doc.column("condition", "Measured"),
+        doc.column("predicted", "Linear", format="sig:6"),
+        doc.column("measured", "Simulated", format="sig:6"),
+        doc.column("unit", "Unit"),
+        doc.column("difference", "Difference", format="sig:2"),
+        doc.column("tolerance", "Allowed", format="sig:2"),
+        doc.column("verdict", "Verdict"),
+        doc.column("reason", "Reason"),
+    ]
+    return doc.table(caption, columns, [row_of(row) for row in rows])
+
+
+def row_of(row: Entry) -> dict[str, Any]:
+    """One entry as a row; seconds as ms."""
+    scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, row.unit)
+    values = {
+        key: None if value is None else value * scale
+        for key, value in (
+            ("predicted", row.predicted),
+            ("measured", row.measured),
+            ("difference", row.difference),
+            ("tolerance", row.tolerance),
+        )
+    }
+    return {
+        "quantity": quantity_name(row),
+        "condition": row.condition,
+        "unit": unit,
+        "verdict": WORD[row.passed],
+        "reason": row.reason,
+        "_status": STATUS[row.passed],
+        **values,
+    }
+
+
+def quantity_name(row: Entry) -> str:
+    """Words for a quantity."""
+    return QUANTITIES.get(row.quantity) or MORE.get(row.quantity, row.quantity)
+
+
+def loop_name(name: str) -> str:
+    """Words for a loop or a break point."""
+    return LOOPS.get(name) or f"At {POINTS.get(name, name)}, all loops closed"
+
+
+def _size(value_rad: float, axis: str) -> float:
+    """Output angle in deg, or way in mm."""
+    return value_rad * (1e3 if axis == "linear" else 57.29577951308232)
+
+
+def _times(validation: Validation) -> dict[str, Any]:
+    """Where the time went."""
+    columns = [doc.column("part", "Part"), doc.column("seconds", "Time", "s", format="fix:2")]
+    rows: list[dict[str, Any]] = [{"part": k, "seconds": v} for k, v in validation.seconds.items()]
+    rows.append({"part": "together", "seconds": sum(validation.seconds.values())})
+    return doc.table("Where the time went", columns, rows)
