@@ -4,7 +4,7 @@ The states of the fast system are the plant (current, speed, angle), the voltage
 (computing delay) and the controllers' integrators.  Each loop closes the ones inside it; a slower loop
 sees the inner one held for n ticks, ``A^n, (I + A + ... + A^(n-1)) B``.  No loop has a direct term.
 
-A row of parameters holds, in this order, the constants ``R`` ... ``T_F`` below; a row of structure the
+A row of parameters holds, in this order, the constants ``R`` ... ``K_FF`` below; a row of structure the
 constants ``ELECTRICAL`` ... ``FILTER``.
 """
 
@@ -16,8 +16,8 @@ import numpy as np
 from ._compiled import kernel
 from ._linalg import exponential, multiply
 
-R, L, K_M, K_E, J, SLOPE, STIFFNESS, PERIOD, DELAY, KP_C, TN_C, KP_V, TN_V, KP_P, T_F = range(15)
-PARAMETERS = 15
+R, L, K_M, K_E, J, SLOPE, STIFFNESS, PERIOD, DELAY, KP_C, TN_C, KP_V, TN_V, KP_P, T_F, K_FF = range(16)
+PARAMETERS = 16
 ELECTRICAL, CURRENT, VELOCITY, N_V, N_P, DIFFERENCE, FILTER = range(7)
 NONE, PROPORTIONAL, PI = 0, 1, 2
 TINY_DELAY = 1e-9  # fraction of a tick below which a delay counts as a whole number of ticks

@@ -13,6 +13,7 @@ from ._response import (
     QUARTER,
     RESONANCE,
     SENSITIVITY,
+    closed_loop,
     evaluate,
     quantity,
     root,
@@ -60,8 +61,8 @@ def _phase_margin(response):
 @kernel
 def _hidden(mode, k, xs, rs, ss):
     """Whether the cubic through both ends, of one sign, comes near zero between them."""
-    f1 = quantity(mode, rs[k], ss[k], 1.0)
-    f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0)
+    f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
+    f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
     width = xs[k + 1] - xs[k]
     d1 = (ss[k] / rs[k]) * width
     d2 = (ss[k + 1] / rs[k + 1]) * width
@@ -89,25 +90,25 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     """The angle between two scanned points where the quantity of a mode is extreme, by golden section."""
     shrink = 0.6180339887498949
     low, high = xs[k], xs[k + 1]
-    f1 = quantity(mode, rs[k], ss[k], 1.0)
+    f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
     sign = 1.0 if f1 > 0.0 else -1.0
     left = high - shrink * (high - low)
     right = low + shrink * (high - low)
     r, s = evaluate(n, h, b, c, left, work, state, exchanged)
-    f_left = sign * quantity(mode, r, s, 1.0)
+    f_left = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
     r, s = evaluate(n, h, b, c, right, work, state, exchanged)
-    f_right = sign * quantity(mode, r, s, 1.0)
+    f_right = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
     for _ in range(40):
         if f_left < f_right:
             high, right, f_right = right, left, f_left
             left = high - shrink * (high - low)
             r, s = evaluate(n, h, b, c, left, work, state, exchanged)
-            f_left = sign * quantity(mode, r, s, 1.0)
+            f_left = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
         else:
             low, left, f_left = left, right, f_right
             right = low + shrink * (high - low)
             r, s = evaluate(n, h, b, c, right, work, state, exchanged)
-            f_right = sign * quantity(mode, r, s, 1.0)
+            f_right = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
         if min(f_left, f_right) < 0.0:
             break
     return left if f_left < f_right else right
@@ -116,7 +117,7 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
 @kernel
 def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
     """Refine one bracketed gain or phase crossover and list it."""
-    x, response = root(mode, 1.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
+    x, response = root(mode, 1.0, 0.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
     if mode == GAIN:
         _list(row, GAIN_CROSSOVERS, FIRST_GAIN, x, _phase_margin(response))
     elif response.real < 0.0:
@@ -127,8 +128,8 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
     for k in range(count - 1):
-        f1 = quantity(mode, rs[k], ss[k], 1.0)
-        f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0)
+        f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
+        f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
         if (f1 > 0.0) != (f2 > 0.0):
             if mode == PHASE and rs[k].real > 0.0 and rs[k + 1].real > 0.0:
                 continue
@@ -136,7 +137,7 @@ def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged)
         elif (mode == GAIN or rs[k].real < 0.0) and _hidden(mode, k, xs, rs, ss):
             x = _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged)
             r, s = evaluate(n, h, b, c, x, work, state, exchanged)
-            f = quantity(mode, r, s, 1.0)
+            f = quantity(mode, r, s, 1.0, 0.0, 0.0)
             if (f > 0.0) != (f1 > 0.0):
                 _crossing(mode, xs[k], f1, x, f, row, n, h, b, c, work, state, exchanged)
                 _crossing(mode, x, f, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
@@ -174,39 +175,42 @@ def modulus(count, xs, rs, ss, nyquist, row, n, h, b, c, work, state, exchanged)
     for k in range(count - 1):
         if min(abs(1.0 + rs[k]), abs(1.0 + rs[k + 1])) > limit:
             continue
-        f1 = quantity(SENSITIVITY, rs[k], ss[k], 1.0)
-        f2 = quantity(SENSITIVITY, rs[k + 1], ss[k + 1], 1.0)
+        f1 = quantity(SENSITIVITY, rs[k], ss[k], 1.0, xs[k], 0.0)
+        f2 = quantity(SENSITIVITY, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
         if f1 < 0.0 and f2 >= 0.0:
-            x, r = root(SENSITIVITY, 1.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+            x, r = root(SENSITIVITY, 1.0, 0.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
             if abs(1.0 + r) < row[MODULUS]:
                 row[MODULUS] = abs(1.0 + r)
                 row[MODULUS_X] = x
 
 
 @kernel
-def resonance(count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
+def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
-    best = 0
+    best = 0.0
     for k in range(count):
-        if abs(rs[k] / (1.0 + rs[k])) > abs(rs[best] / (1.0 + rs[best])):
-            best = k
-    row[PEAK_T] = abs(rs[best] / (1.0 + rs[best]))
-    row[PEAK_T_X] = xs[best]
-    limit = 0.7 * row[PEAK_T]
+        size = abs(closed_loop(rs[k], xs[k], lead))
+        if size > best:
+            best = size
+            row[PEAK_T_X] = xs[k]
+    row[PEAK_T] = best
     for k in range(count - 1):
-        if max(abs(rs[k] / (1.0 + rs[k])), abs(rs[k + 1] / (1.0 + rs[k + 1]))) < limit:
+        f1 = quantity(RESONANCE, rs[k], ss[k], 1.0, xs[k], lead)
+        f2 = quantity(RESONANCE, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], lead)
+        if not (f1 > 0.0 and f2 <= 0.0):
             continue
-        f1 = quantity(RESONANCE, rs[k], ss[k], 1.0)
-        f2 = quantity(RESONANCE, rs[k + 1], ss[k + 1], 1.0)
-        if f1 > 0.0 and f2 <= 0.0:
-            x, r = root(RESONANCE, 1.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
-            if abs(r / (1.0 + r)) > row[PEAK_T]:
-                row[PEAK_T] = abs(r / (1.0 + r))
-                row[PEAK_T_X] = x
+        here = abs(closed_loop(rs[k], xs[k], lead))
+        if max(here, abs(closed_loop(rs[k + 1], xs[k + 1], lead))) < 0.7 * best:
+            continue
+        x, r = root(RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+        size = abs(closed_loop(r, x, lead))
+        if size > row[PEAK_T]:
+            row[PEAK_T] = size
+            row[PEAK_T_X] = x
 
 
 @kernel
-def bandwidths(count, xs, rs, ss, dc, row, n, h, b, c, work, state, exchanged):
+def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchanged):
     """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
     level = abs(dc)
     row[BANDWIDTH_X] = np.nan
@@ -214,17 +218,17 @@ def bandwidths(count, xs, rs, ss, dc, row, n, h, b, c, work, state, exchanged):
     if not (level > 0.0):
         return
     for k in range(count - 1):
-        f1 = quantity(BANDWIDTH, rs[k], ss[k], level)
-        f2 = quantity(BANDWIDTH, rs[k + 1], ss[k + 1], level)
+        f1 = quantity(BANDWIDTH, rs[k], ss[k], level, xs[k], lead)
+        f2 = quantity(BANDWIDTH, rs[k + 1], ss[k + 1], level, xs[k + 1], lead)
         if f1 > 0.0 and f2 <= 0.0:
-            x, _ = root(BANDWIDTH, level, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+            x, _ = root(BANDWIDTH, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
             row[BANDWIDTH_X] = x
             break
     for k in range(count - 1):
-        f1 = quantity(QUARTER, rs[k], ss[k], level)
-        f2 = quantity(QUARTER, rs[k + 1], ss[k + 1], level)
-        closed = rs[k] / (1.0 + rs[k])
+        f1 = quantity(QUARTER, rs[k], ss[k], level, xs[k], lead)
+        f2 = quantity(QUARTER, rs[k + 1], ss[k + 1], level, xs[k + 1], lead)
+        closed = closed_loop(rs[k], xs[k], lead)
         if f1 > 0.0 and f2 <= 0.0 and closed.imag < 0.0:
-            x, _ = root(QUARTER, level, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+            x, _ = root(QUARTER, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
             row[QUARTER_X] = x
             break

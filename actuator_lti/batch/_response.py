@@ -11,7 +11,7 @@ import numpy as np
 
 from ._compiled import kernel
 
-GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE, EXTREMUM = range(7)
+GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE = range(6)
 HALF_LOG_2 = 0.34657359027997264
 
 
@@ -75,26 +75,37 @@ def _again(n, c, work, state, exchanged):
 
 
 @kernel
-def quantity(mode, response, slope, level):
-    """The function whose zero is looked for, from L and dL/dx."""
+def closed_loop(response, x, lead):
+    """T = L/(1 + L) with the feed-forward in front, ``1 + lead (1 - 1/z)``."""
+    closed = response / (1.0 + response)
+    if lead != 0.0:
+        closed *= 1.0 + lead * (1.0 - complex(np.cos(x), -np.sin(x)))
+    return closed
+
+
+@kernel
+def quantity(mode, response, slope, level, x, lead):
+    """The function whose zero is looked for, from L and dL/dx at x."""
     if mode == GAIN:
         return np.log(abs(response))
     if mode == PHASE:
         return response.imag / abs(response)
-    if mode == EXTREMUM:
-        return (slope / response).real
     if mode == SENSITIVITY:
         return (slope / (1.0 + response)).real
-    closed = response / (1.0 + response)
+    if mode == RESONANCE:  # d ln|T| / dx
+        value = (slope / (response * (1.0 + response))).real
+        if lead != 0.0:
+            back = complex(np.cos(x), -np.sin(x))
+            value += (lead * 1j * back / (1.0 + lead * (1.0 - back))).real
+        return value
+    closed = closed_loop(response, x, lead)
     if mode == BANDWIDTH:
         return np.log(abs(closed) / level) + HALF_LOG_2
-    if mode == QUARTER:
-        return closed.real / abs(closed)
-    return (slope / (response * (1.0 + response))).real  # RESONANCE: d ln|T| / dx
+    return closed.real / abs(closed)  # QUARTER
 
 
 @kernel
-def root(mode, level, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
+def root(mode, level, lead, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
     """The zero between x1 and x2 (signs differ), to rounding (Chandrupatla 1997), and L there."""
     t = 0.5
     x3 = x1
@@ -104,7 +115,7 @@ def root(mode, level, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
     for _ in range(80):
         x = x1 + t * (x2 - x1)
         response, derivative = evaluate(n, h, b, c, x, work, state, exchanged)
-        f = quantity(mode, response, derivative, level)
+        f = quantity(mode, response, derivative, level, x, lead)
         if (f > 0.0) == (f1 > 0.0):
             x3, f3 = x1, f1
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._assemble import open_loops
+from ._assemble import K_FF, KP_P, N_P, PERIOD, open_loops
 from ._compiled import kernel
 from ._figures import (
     DC_GAIN,
@@ -115,7 +115,7 @@ def _poles(n, a, b, c, closed, scratch, wr, wi):
 
 
 @kernel
-def _one_loop(n, a, b, c, time_figures, arrays, row):
+def _one_loop(n, a, b, c, lead, time_figures, arrays, row):
     """Every figure of one open loop into its row."""
     points, stack, xs, rs, ss, work, state, exchanged, scratch, poles = arrays
     row[:] = np.nan
@@ -141,12 +141,12 @@ def _one_loop(n, a, b, c, time_figures, arrays, row):
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     ends(open_dc, nyquist.real, count, xs, rs, row)
     modulus(count, xs, rs, ss, nyquist, row, n, a, b, c, work, state, exchanged)
-    resonance(count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    bandwidths(count, xs, rs, ss, dc, row, n, a, b, c, work, state, exchanged)
+    resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
+    bandwidths(count, xs, rs, ss, dc, lead, row, n, a, b, c, work, state, exchanged)
     if time_figures:
         for i in range(n):
             a[i, i] += 1.0
-        step_figures(n, a, b, c, poles[2], poles[3], row)
+        step_figures(n, a, b, c, lead, poles[2], poles[3], row)
 
 
 @kernel
@@ -178,6 +178,10 @@ def many_designs(kind, rows, first, last, size, time_figures, out):
             if orders[loop] == 0:
                 out[k, loop, :] = np.nan
                 continue
+            lead = 0.0  # feed-forward, in front of the position loop
+            if loop == LOOPS - 1:
+                lead = rows[k, K_FF] / (rows[k, KP_P] * kind[N_P] * rows[k, PERIOD])
             _one_loop(
-                orders[loop], loops_a[loop], loops_b[loop], loops_c[loop], time_figures, arrays, out[k, loop]
-            )
+                orders[loop], loops_a[loop], loops_b[loop], loops_c[loop], lead, time_figures, arrays,
+                out[k, loop],
+            )  # fmt: skip

@@ -14,7 +14,7 @@ FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no
 
 
 @kernel
-def step_figures(n, a, b, c, wr, wi, row):
+def step_figures(n, a, b, c, lead, wr, wi, row):
     """Rise 10-90 % and settling 2 % in ticks, overshoot in percent, of the closed loop a - b c.
 
     All are times of samples; the response is followed for 14 time constants of the slowest pole. Where
@@ -41,6 +41,8 @@ def step_figures(n, a, b, c, wr, wi, row):
         for j in range(n):
             total += c[j] * state[j]
         error = 1.0 - total
+        if k == 1:
+            error += lead  # the command has jumped since the sample before
         for i in range(n):
             value = b[i] * error
             for j in range(n):

@@ -68,7 +68,8 @@ class LinearFigures:
 
     Definitions are those of `actuator_lti.stability_margins`, `actuator_lti.bandwidth` and
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
-    are NaN, its delay margin is 0. Closed-loop figures of the position loop do not contain a feed-forward.
+    are NaN, its delay margin is 0.
+    Closed-loop figures of the position loop are from command to output, feed-forward included.
 
     Attributes
     ----------

@@ -188,6 +188,7 @@ class Population:
             *(self._controller(f"control.{loop}.{key}") for loop in ("current", "velocity")
               for key in ("gain", "integral_time")),
             self.get("control.position.gain"), self.get("encoder.filter_time"),
+            self.get("control.position.feedforward"),
         ]  # fmt: skip
         rows = np.empty((self.count, len(columns)))
         for k, column in enumerate(columns):

@@ -92,6 +92,24 @@ def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
             assert peak == pytest.approx(width.resonance_peak_db, abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_feed_forward_is_in_the_figures_of_the_command(share):
+    design = with_values(load_design("ilr33-amber-multirate"), {"control.position.feedforward": share})
+    figures = linear_figures(Population(design, {}, 1))
+    response = assemble_loops(design).reference_to_output
+    width, step = closed_loop_bandwidth(response), step_figures(response)
+    pairs = {
+        "bandwidth": width.minus3db_hz,
+        "bandwidth_90deg": width.minus90deg_hz,
+        "resonance_peak": width.resonance_peak_db,
+        "overshoot": step.overshoot_percent,
+        "rise_time": step.rise_time_s,
+        "settling_time": step.settling_time_s,
+    }
+    for quantity, truth in pairs.items():
+        assert figures.quantity(quantity, "position")[0] == pytest.approx(truth, rel=1e-6, abs=1e-6), quantity
+
+
 def test_an_unstable_loop_is_called_so_and_takes_no_delay():
     design = load_design("ilr33-amber")
     population = Population(design, {"control.current.gain": np.array([0.02, 0.2])}, 2)
