@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.atomic import write_together
 from actuator_lti.design.model import Design
 from reports import document as doc
-from actuator_lti.atomic import write_together
 
 if TYPE_CHECKING:
     from analyses.loop_survey import LoopSurvey

@@ -56,4 +56,6 @@ def _band(data: dict[str, Any], ax: Axes, scale: float) -> None:
         words.append(f"settled to 2 %: {seconds(data['settling_s'])}")
     if words:
         place: dict[str, Any] = {"transform": ax.transAxes, "ha": "right", "va": "center", "linespacing": 1.5}
-        ax.text(0.985, 0.42, "\n".join(words), bbox=style.label_box(), **place)
+        ax.text(
+            0.985, 0.42 if len(data["series"]) > 1 else 0.2, "\n".join(words), bbox=style.label_box(), **place
+        )

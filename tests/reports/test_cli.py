@@ -135,6 +135,16 @@ def test_report_writes_both_files_and_gives_the_document(
     assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
 
 
+def test_a_new_design_gets_its_report_with_one_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "my-drive.toml"]) == 0
+    assert main(["report", "my-drive.toml", "--processes", "1"]) == 0
+    assert "My drive" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    capsys.readouterr()
+
+
 @pytest.mark.parametrize(
     ("raised", "status", "words"),
     [
