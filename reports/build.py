@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from analyses.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
-COMPUTING, DRAWING = 40, 60  # shares of the progress bar
 
 
 def design_report(

@@ -37,11 +37,6 @@ MODULES: dict[str, str] = {
 }
 
 
-def register(name: str, module: str) -> None:
-    """Add a figure: the dotted name of the module that draws it."""
-    MODULES[name] = module
-
-
 def figure_module(name: str) -> ModuleType:
     """Import the module that draws a figure.
 
