@@ -12,8 +12,10 @@ from scipy.optimize import brentq
 from actuator_lti.errors import InputError
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import gain_crossings
+from actuator_lti.margins.delay_distance import delayed_extreme
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, delay_form, from_rational
-from actuator_lti.margins.delayed import delayed_extreme, delayed_gain_crossings, low_frequency
+from actuator_lti.margins.delay_setting import low_frequency
+from actuator_lti.margins.delayed import delayed_gain_crossings
 from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
 from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.poles import sorted_poles
@@ -221,7 +223,7 @@ def _first_turn(form: DelayForm, dc: float) -> float | None:
 
     def resolved(found: Cells) -> Mask:
         size, R = np.abs(found.L), reach(form, found)
-        return (R < 0.3 * size) | (size + R < floor)
+        return (0.3 * size > R) | (size + R < floor)
 
     x0, L0 = low, complex(border_values(form, np.array([low]))[0]) * float(np.sign(dc))
     phase0 = float(np.angle(L0))

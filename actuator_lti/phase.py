@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
-from actuator_lti.margins.delayed import low_frequency
+from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.factors import factor_phase, poles, zeros
 from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
 from actuator_lti.margins.poles import sorted_poles
@@ -82,9 +82,7 @@ def rational_phase(loop: RationalLoop, x: Real) -> Real:
         p[nearest] = at_dc
     near = np.abs(np.concatenate((roots, p)) - at_dc)
     size = float(near.max()) if near.size else 1.0
-    first = 1e-3 * float(
-        min(near[near > 1e-7 * size].min(initial=1.0 if loop.in_z else size or 1.0), 1e300)
-    )
+    first = 1e-3 * float(min(near[near > 1e-7 * size].min(initial=1.0 if loop.in_z else size or 1.0), 1e300))
     everywhere = np.append(x, first)
     factors = factor_phase(roots, everywhere, loop.in_z) - factor_phase(p, everywhere, loop.in_z)
     exact = np.angle(loop.response(everywhere))

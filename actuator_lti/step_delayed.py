@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from actuator_lti.errors import InputError
 from actuator_lti.margins.collocation import open_loop_matrix
 from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
-from actuator_lti.margins.delayed import low_frequency
+from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.loop import Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step_modes import ModalTail, modal_tail

@@ -81,26 +81,26 @@ def nyquist_count(
     angle, last = _start(loop, stops[0], visible_at_dc, L_dc, poles.cloud)
     for k, (x, F, pole) in enumerate(stops):
         if pole is None:
-            angle += _turn(last, F)
+            angle += angle_between(last, F)
             last = F
             continue
         room = min(x - stops[k - 1][0], (stops[k + 1][0] if k + 1 < len(stops) else 2.0 * x) - x)
         before, after = _beside(loop, x, room)
-        angle += _turn(last, before) + _arc(before, after, -np.pi * pole.multiplicity)
+        angle += angle_between(last, before) + angle_about(before, after, -np.pi * pole.multiplicity)
         last = after
     at_end = sum(pole.multiplicity for pole in poles.border if pole.x == end)
     angle += _finish(loop, last, stops[-1][0], at_end, L_end)
     return poles.unstable - round(angle / np.pi)
 
 
-def _turn(start: complex, stop: complex) -> float:
+def angle_between(start: complex, stop: complex) -> float:
     """Angle from one point to another of the same closed half plane, rad."""
     return float(np.angle(stop * np.conj(start)))
 
 
-def _arc(start: complex, stop: complex, about: float) -> float:
+def angle_about(start: complex, stop: complex, about: float) -> float:
     """The angle from start to stop that is nearest to ``about``."""
-    turn = _turn(start, stop)
+    turn = angle_between(start, stop)
     return turn + 2.0 * np.pi * round((about - turn) / (2.0 * np.pi))
 
 
@@ -118,21 +118,21 @@ def _start(
         real_point = np.array([np.exp(r) if loop.in_z else r + 0j], dtype=complex)
         on_real, on_axis = complex(loop.at(real_point)[0]), complex(loop.response(np.array([r]))[0])
         if min(abs(on_real), abs(on_axis)) > _FAR:
-            return _arc(1.0 + on_real.real, 1.0 + on_axis, -0.5 * np.pi * order), 1.0 + on_axis
+            return angle_about(1.0 + on_real.real, 1.0 + on_axis, -0.5 * np.pi * order), 1.0 + on_axis
         r *= 0.1
     raise InputError("a pole at zero frequency is cancelled, all but completely: cancel it in the loop first")
 
 
 def _finish(loop: RationalLoop, last: complex, last_x: float, order: int, L_end: complex) -> float:
     if not order:
-        return _turn(last, 1.0 + L_end.real)
+        return angle_between(last, 1.0 + L_end.real)
     r = 1e-2 * (np.pi - last_x)
     while r > _SMALLEST:
         on_real = complex(loop.at(np.array([-np.exp(r) + 0j]))[0])
         on_circle = complex(loop.response(np.array([np.pi - r]))[0])
         if min(abs(on_real), abs(on_circle)) > _FAR:
-            arc = _arc(1.0 + on_circle, 1.0 + on_real.real, -0.5 * np.pi * order)
-            return _turn(last, 1.0 + on_circle) + arc
+            arc = angle_about(1.0 + on_circle, 1.0 + on_real.real, -0.5 * np.pi * order)
+            return angle_between(last, 1.0 + on_circle) + arc
         r *= 0.1
     raise InputError("a pole at z = -1 is cancelled, all but completely: cancel it in the loop first")
 

@@ -6,181 +6,26 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from actuator_lti.margins.single import (
+    Agreement,
+    DelayMargin,
+    DiskMargin,
+    GainMargin,
+    PhaseMargin,
+    frequency_text,
+)
+
+__all__ = [
+    "Agreement",
+    "DelayMargin",
+    "DiskMargin",
+    "GainMargin",
+    "PhaseMargin",
+    "StabilityMargins",
+    "Verdict",
+]
+
 Verdict = Literal["stable", "unstable", "on the border", "undecided"]
-
-
-def _frequency_text(omega_rad_s: float) -> str:
-    return f"{omega_rad_s:.6g} rad/s ({omega_rad_s / (2.0 * math.pi):.6g} Hz)"
-
-
-@dataclass(frozen=True)
-class GainMargin:
-    """A real factor on the loop that brings a closed-loop pole to the border.
-
-    Attributes
-    ----------
-    ratio : float
-        The factor (> 1: an upper limit, < 1: a lower limit).
-    frequency_rad_s : float
-        Where the pole reaches the border; 0 and the Nyquist frequency are possible, infinity where the
-        loop has a direct feed-through.
-    tangent : bool
-        The curve touches the negative real axis there without crossing it.
-    bracket_rad_s : tuple of float or None
-        Measured data: the two neighbouring frequencies between which the crossing lies.
-    ratio_range : tuple of float or None
-        Measured data: the ratios at those two frequencies.
-    """
-
-    ratio: float
-    frequency_rad_s: float
-    tangent: bool = False
-    bracket_rad_s: tuple[float, float] | None = None
-    ratio_range: tuple[float, float] | None = None
-
-    @property
-    def db(self) -> float:
-        """The ratio in dB."""
-        return 20.0 * math.log10(self.ratio)
-
-    @property
-    def frequency_hz(self) -> float:
-        """The frequency in Hz."""
-        return self.frequency_rad_s / (2.0 * math.pi)
-
-    def __str__(self) -> str:
-        limit = "upper" if self.ratio >= 1.0 else "lower"
-        return f"{self.ratio:.6g} ({self.db:+.4f} dB, {limit}) at {_frequency_text(self.frequency_rad_s)}"
-
-
-@dataclass(frozen=True)
-class PhaseMargin:
-    """A phase lag (negative: a lead) that brings a closed-loop pole to the border.
-
-    Attributes
-    ----------
-    deg : float
-        180 deg plus the phase of the loop, in (-180, 180].
-    frequency_rad_s : float
-        The gain crossover.
-    tangent : bool
-        The gain touches one there without crossing it.
-    bracket_rad_s, deg_range : tuple of float or None
-        Measured data: the neighbouring frequencies, and the margins there.
-    """
-
-    deg: float
-    frequency_rad_s: float
-    tangent: bool = False
-    bracket_rad_s: tuple[float, float] | None = None
-    deg_range: tuple[float, float] | None = None
-
-    @property
-    def frequency_hz(self) -> float:
-        """The frequency in Hz."""
-        return self.frequency_rad_s / (2.0 * math.pi)
-
-    def __str__(self) -> str:
-        return f"{self.deg:+.4f} deg at {_frequency_text(self.frequency_rad_s)}"
-
-
-@dataclass(frozen=True)
-class DelayMargin:
-    """The smallest delay in the loop that brings a closed-loop pole to the border at this crossover.
-
-    Attributes
-    ----------
-    seconds : float
-        The delay.
-    samples : float or None
-        The same in sampling periods; ``None`` for a continuous loop.
-    frequency_rad_s : float
-        The gain crossover.
-    """
-
-    seconds: float
-    samples: float | None
-    frequency_rad_s: float
-
-    def __str__(self) -> str:
-        samples = "" if self.samples is None else f" = {self.samples:.6g} samples"
-        return f"{self.seconds:.6g} s{samples} at {_frequency_text(self.frequency_rad_s)}"
-
-
-@dataclass(frozen=True)
-class DiskMargin:
-    """Balanced disk margin (S + T, skew 0) of Seiler, Packard, Gahinet 2020.
-
-    The loop may be multiplied by any complex factor (2 + d)/(2 - d) with |d| < alpha.
-
-    Attributes
-    ----------
-    alpha : float
-        The smallest of \\|2 (1 + L)/(1 - L)\\|.
-    frequency_rad_s : float
-        Where it is reached.
-    """
-
-    alpha: float
-    frequency_rad_s: float
-
-    @property
-    def deg(self) -> float:
-        """Phase that may be lost or won while the gain stays, in deg."""
-        return math.degrees(2.0 * math.atan(self.alpha / 2.0))
-
-    @property
-    def ratio(self) -> float:
-        """Factor by which the gain may grow or shrink while the phase stays (infinity from alpha = 2)."""
-        return (2.0 + self.alpha) / (2.0 - self.alpha) if self.alpha < 2.0 else math.inf
-
-    @property
-    def db(self) -> float:
-        """The factor in dB."""
-        return 20.0 * math.log10(self.ratio) if self.alpha < 2.0 else math.inf
-
-    def __str__(self) -> str:
-        figures = f"alpha {self.alpha:.6g} (+-{self.deg:.4f} deg, +-{self.db:.4f} dB)"
-        return f"{figures} at {_frequency_text(self.frequency_rad_s)}"
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """Stability found twice: from closed-loop poles, and from the Nyquist count.
-
-    Attributes
-    ----------
-    unstable_poles, unstable_nyquist : int or None
-        Closed-loop poles outside the stable region by either way; ``None`` where a way does not apply.
-    border_poles : int
-        Closed-loop poles on the border itself.
-    """
-
-    unstable_poles: int | None
-    unstable_nyquist: int | None
-    border_poles: int = 0
-
-    @property
-    def agree(self) -> bool:
-        """Whether the two ways do not contradict each other."""
-        if self.unstable_poles is None or self.unstable_nyquist is None or self.border_poles:
-            return True
-        return self.unstable_poles == self.unstable_nyquist
-
-    def __str__(self) -> str:
-        if self.border_poles:
-            return f"{self.border_poles} closed-loop pole(s) on the border"
-        if self.unstable_poles is None and self.unstable_nyquist is None:
-            return "neither poles nor a Nyquist count"
-        if self.unstable_poles is None or self.unstable_nyquist is None:
-            which, count = (
-                ("Nyquist count", self.unstable_nyquist)
-                if self.unstable_poles is None
-                else ("poles", self.unstable_poles)
-            )
-            return f"{which} only: {count} unstable"
-        word = "agree" if self.agree else "DISAGREE"
-        return f"poles ({self.unstable_poles} unstable) and Nyquist ({self.unstable_nyquist}) {word}"
 
 
 @dataclass(frozen=True)
@@ -311,9 +156,7 @@ def _lines(m: StabilityMargins) -> list[str]:
             lines.append(f"{name} margin: none")
         lines += [f"{name} margin: {margin}" for margin in margins]
     if m.modulus_margin is not None and m.modulus_frequency_rad_s is not None:
-        lines.append(
-            f"modulus margin: {m.modulus_margin:.6g} at {_frequency_text(m.modulus_frequency_rad_s)}"
-        )
+        lines.append(f"modulus margin: {m.modulus_margin:.6g} at {frequency_text(m.modulus_frequency_rad_s)}")
     if m.disk_margin is not None:
         lines.append(f"disk margin: {m.disk_margin}")
     lines.append(f"band: {m.band_rad_s[0]:.6g} to {m.band_rad_s[1]:.6g} rad/s; method: {m.method}")

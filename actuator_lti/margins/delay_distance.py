@@ -1,0 +1,96 @@
+"""Smallest distance of the curve to -1 under delay, by splitting what a bound cannot exclude."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, cells
+from actuator_lti.margins.delay_setting import Setting, cells_of, dc_value, setting_of
+from actuator_lti.margins.extremes import COMPLEMENTARY, FAR, MODULUS, PEAK, Criterion
+from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.sweep import reach
+
+_FINEST = 1e-3  # how much lower the smallest distance may be, relative, before it is polished
+_MOST = 400_000
+
+
+def delayed_extreme(form: DelayForm, criterion: Criterion) -> tuple[float, float]:
+    """Smallest value of a criterion over the axis, and where (x)."""
+    setting = setting_of(form, None)
+    return smallest_distance(setting, cells_of(setting), criterion)
+
+
+def smallest_distance(setting: Setting, found: Cells, criterion: Criterion) -> tuple[float, float]:
+    """Smallest value of a criterion and its x, from intervals that cover the axis.
+
+    Intervals in which the bound allows less than 0.999 of the best so far are split; the best is polished.
+
+    Raises
+    ------
+    NumericalError
+        Too many intervals would be needed.
+    """
+    form, count = setting.form, 0
+    ends_x, ends_L = _end_values(setting)
+    at_ends = criterion.distance(ends_L)
+    best, place, half = float(at_ends.min()), float(ends_x[int(at_ends.argmin())]), 0.0
+    while True:
+        distance = criterion.distance(found.L)
+        k = int(distance.argmin())
+        if distance[k] < best * (1.0 - 1e-12):
+            best, place, half = float(distance[k]), float(found.x[k]), float(found.half[k])
+        again = _lower_bound(criterion, found, reach(form, found)) < best * (1.0 - _FINEST)
+        count += int(np.count_nonzero(again))
+        if best < 1e-9 or not again.any():
+            return _polished(form, criterion, best, place, half)
+        if count > _MOST:
+            raise NumericalError("the smallest distance to -1 was not settled: too many turns of the delay")
+        low, high = (found.x - found.half)[again], (found.x + found.half)[again]
+        middle = 0.5 * (low + high)
+        found = cells(form, np.concatenate((low, middle)), np.concatenate((middle, high)))
+
+
+def _polished(
+    form: DelayForm, criterion: Criterion, best: float, place: float, half: float
+) -> tuple[float, float]:
+    if not half:
+        return best, place
+
+    def at(x: float) -> float:
+        return float(criterion.distance(border_values(form, np.array([x])))[0])
+
+    low, high = max(place - 4.0 * half, 0.5 * place), place + 4.0 * half
+    if form.sampled:
+        high = min(high, math.pi)
+    found = minimize_scalar(at, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
+    return (float(found.fun), float(found.x)) if found.fun < best else (best, place)
+
+
+def _end_values(setting: Setting) -> tuple[list[float], Complex]:
+    x: list[float] = [0.0]
+    L: list[complex] = [FAR if setting.order else dc_value(setting)]
+    if setting.form.sampled:
+        x.append(math.pi)
+        L.append(complex(border_values(setting.form, np.array([math.pi]))[0]))
+    else:
+        x.append(math.inf)
+        L.append(0.0)
+    return x, np.array(L, dtype=complex)
+
+
+def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
+    distance = criterion.distance(found.L)
+    if criterion is MODULUS:
+        return distance - R
+    size = np.abs(found.L)
+    if criterion is PEAK:
+        return 1.0 / (size + R)
+    if criterion is COMPLEMENTARY:
+        return np.where(size > R, distance - R / (size * (size - R)), -np.inf)
+    away = np.abs(1.0 - found.L)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)

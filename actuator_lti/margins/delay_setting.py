@@ -1,0 +1,165 @@
+"""Where a loop with delays is to be looked at, and the intervals that leave nothing unseen there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.collocation import open_loop_matrix
+from actuator_lti.margins.delay_form import Cells, DelayForm, border_values
+from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.nyquist import slope_at_dc
+from actuator_lti.margins.poles import SortedPoles, sorted_poles
+from actuator_lti.margins.sweep import RESOLVED, reach, subdivided
+
+FLOOR = 0.01  # gain below which no crossing of the real axis is listed: 40 dB
+_PER_DECADE = 12
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What has to be known of a loop before its intervals are laid out.
+
+    Attributes
+    ----------
+    form : DelayForm
+        The loop.
+    open_poles : SortedPoles
+        Its poles, inner delays collocated.
+    low, high : float
+        Where the intervals run (x): below, L follows its pole at zero; above, the gain stays below `FLOOR`.
+    order, hidden : int
+        Poles at zero frequency that L shows, and that it does not.
+    listed_to : float
+        Up to which x crossings of the real axis are listed however small the gain.
+    """
+
+    form: DelayForm
+    open_poles: SortedPoles
+    low: float
+    high: float
+    order: int
+    hidden: int
+    listed_to: float = 0.0
+
+
+def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> Setting:
+    """Find the setting of a loop; ``band`` in rad/s, as asked for."""
+    poles = sorted_poles(open_loop_matrix(form, 24), form.sampled, gather=True)
+    at_dc = poles.at_dc
+    with np.errstate(divide="ignore"):
+        sizes = np.abs(np.log(poles.values)) if form.sampled else np.abs(poles.values)
+    sizes = sizes[(sizes > 0.0) & np.isfinite(sizes)]
+    low = 1e-3 * float(sizes.min()) if sizes.size else 1e-3
+    longest = max([form.series, *form.delays.tolist()], default=0.0)
+    if longest:
+        low = min(low, 1e-2 / longest)
+    order, hidden = 0, 0
+    if at_dc:
+        low, order = _order_atdc_value(form.without_series(), low, at_dc)
+        hidden = at_dc - order
+        if hidden not in (0, 1):
+            raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
+    if form.sampled:
+        return Setting(form, poles, low, math.pi, order, hidden, math.pi)
+    if not tail:
+        return Setting(form, poles, low, math.inf, order, hidden)
+    high = _tail(form, max(float(sizes.max()) if sizes.size else 0.0, low * 10.0))
+    listed_to = 0.0 if band is None else float(band[1])
+    return Setting(form, poles, low, max(high, listed_to), order, hidden, listed_to)
+
+
+def low_frequency(form: DelayForm) -> tuple[float, int]:
+    """A frequency x below which L follows its pole at zero, and the multiplicity of that pole in L."""
+    setting = setting_of(form.without_series(), None, tail=False)
+    return setting.low, setting.order
+
+
+def _order_atdc_value(form: DelayForm, low: float, most: int) -> tuple[float, int]:
+    """A frequency at which L already follows its pole at zero, and the order of that pole."""
+    order, _ = slope_at_dc(lambda x: border_values(form, x), 10.0 * low, most)
+    for _ in range(14):
+        L = border_values(form, np.array([low, 0.1 * low]))
+        slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
+        if abs(slope - order) < 2e-3 and (not order or abs(L[0]) > 1e3):
+            return low, order
+        low *= 0.1
+    raise InputError("the loop has a pole at zero frequency that is almost cancelled: cancel it first")
+
+
+def _tail(form: DelayForm, start: float) -> float:
+    """A frequency from which on \\|L\\| < FLOOR: with abs(F^-1) <= (w - |A|, ...)^-1 an M-matrix."""
+    n, q = form.B1.size, form.delays.size
+    if form.D11 and not form.series_s:
+        raise InputError("a loop with delays and direct feed-through: its gain does not fall off")
+    if not n and not q:
+        return start
+
+    def bound(w: float) -> float:
+        M = np.block(
+            [
+                [w * np.eye(n) - np.abs(form.A), -np.abs(form.B2)],
+                [-np.abs(form.C2), np.eye(q) - np.abs(form.D22)],
+            ]
+        )
+        try:
+            inverse = np.linalg.inv(M)
+        except np.linalg.LinAlgError:
+            return math.inf
+        if inverse.min() < -1e-12 * np.abs(inverse).max():
+            return math.inf  # w is not yet large enough for an M-matrix
+        X = inverse @ np.concatenate((np.abs(form.B1), np.abs(form.D21)))
+        return float(np.abs(form.C1) @ X[:n] + np.abs(form.D12) @ X[n:]) + abs(form.D11)
+
+    w = start
+    for _ in range(60):
+        if bound(w) < FLOOR:
+            return w
+        w *= 2.0
+    raise InputError(
+        "the gain of the loop does not fall off towards high frequency (direct feed-through through a delay): "
+        "its closed loop is of neutral type, for which no margins are given"
+    )
+
+
+def excluded(found: Cells, R: Real, listed_to: float) -> tuple[Mask, Mask]:
+    """Intervals that hold no crossing of the unit circle; none of the negative real axis."""
+    size = np.abs(found.L)
+    no_gain = (size - found.spread > 1.0) | (size + found.spread < 1.0)
+    to_axis = np.where(found.L.real < 0.0, np.abs(found.L.imag), size)
+    return no_gain, (to_axis > R) | ((size + R < FLOOR) & (found.x > listed_to))
+
+
+def cells_of(setting: Setting) -> Cells:
+    """Intervals over the whole axis in which every crossing and every turn about -1 is resolved."""
+    form = setting.form
+
+    def resolved(found: Cells) -> Mask:
+        R = reach(form, found)
+        no_gain, no_phase = excluded(found, R, setting.listed_to)
+        turns = 0.7 * np.abs(1.0 + found.L) > R
+        return turns & ((RESOLVED * np.abs(found.L) >= R) | (no_gain & no_phase))
+
+    decades = max(math.log10(setting.high / setting.low), 0.1)
+    edges = np.geomspace(setting.low, setting.high, int(_PER_DECADE * decades) + 2)
+    if setting.order == 0 and setting.hidden == 0:
+        edges = np.concatenate(([0.0], edges))
+    try:
+        return subdivided(form, edges, resolved)
+    except NumericalError as error:
+        if _touches(form, edges):
+            raise NumericalError(f"{error} (or a closed-loop pole there)") from error
+        raise
+
+
+def _touches(form: DelayForm, edges: Real) -> bool:
+    return bool(np.abs(1.0 + border_values(form, edges[1:])).min() < 1e-6)
+
+
+def dc_value(setting: Setting) -> float:
+    """L at zero frequency, where it has no pole there."""
+    x = setting.low if setting.hidden else 0.0
+    return float(border_values(setting.form.without_series(), np.array([x]))[0].real)
