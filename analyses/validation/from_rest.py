@@ -62,11 +62,8 @@ def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
 
 def _reason(design: Design, result: BatchResult, k: int) -> str:
     """What took part in a run that the linear loop does not know of."""
-    words = [
-        f"{LIMIT_NAMES[name]} {100.0 * result.limit_fraction(name)[k]:.2g} % of the time"
-        for name in at.LIMITERS
-        if result.limit_fraction(name)[k] > 0.0
-    ]
+    shares = {name: 100.0 * float(result.limit_fraction(name)[k]) for name in at.LIMITERS}
+    words = [f"{LIMIT_NAMES[name]} {share:.2g} %" for name, share in shares.items() if share > 0.0]
     if result.events[k] == 0 and result.stick_fraction[k] > 0.99:
         return "no motion: dry friction holds the rotor"
     if design.friction.dry_Nm(0.0) > 0.0:

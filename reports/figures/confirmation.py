@@ -10,6 +10,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from reports.figures import style
 
@@ -41,8 +42,11 @@ def _differences(ax: Axes, data: dict[str, Any]) -> None:
     ax.set_xlim(LEAST / 2.0, 1e-1)
     ax.set_ylim(-0.6, len(labels) + 0.1)
     ax.set_yticks(places, labels)
-    ax.set_xlabel("border in time against linear margin, relative")
-    ax.set_title("Met on a constant speed, no limit acting")
+    ax.set_xticks([1e-9, 1e-7, 1e-5, 1e-3, 1e-1])
+    ax.xaxis.set_major_formatter(FuncFormatter(style.powers))
+    ax.minorticks_off()
+    ax.set_xlabel("difference from the linear margin, relative")
+    ax.set_title("On a constant speed, no limit acting")
 
 
 def _released(ax: Axes, data: dict[str, Any]) -> None:
@@ -65,5 +69,5 @@ def _released(ax: Axes, data: dict[str, Any]) -> None:
     ax.minorticks_off()
     ax.set_xlabel("deviation that the drive is let go from")
     ax.set_ylabel("border over linear border")
-    ax.set_title("From rest: ● frictionless, ☐ with dry friction")
-    ax.legend(loc="best", fontsize=7.5)
+    ax.set_title("From rest (dashed: dry friction)")
+    ax.figure.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3, fontsize=7.5)

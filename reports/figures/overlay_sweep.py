@@ -11,6 +11,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from reports.figures import style
 
@@ -35,9 +36,9 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
         style.log_frequency(error)
     axes[0][0].set_ylabel("magnitude, dB")
     axes[1][0].set_ylabel("phase, deg")
-    axes[2][0].set_ylabel("difference")
-    axes[0][0].legend(loc="lower left")
-    axes[2][-1].legend(loc="upper left", fontsize=7.5, ncols=2)
+    axes[2][0].set_ylabel("difference, dB and deg")
+    axes[0][0].legend(loc="lower left", fontsize=8)
+    fig.legend(*axes[2][0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
 
 
 def _overlay(ax: Axes, data: dict[str, Any], panel: dict[str, Any], unit: str) -> None:
@@ -56,7 +57,7 @@ def _errors(ax: Axes, data: dict[str, Any], panel: dict[str, Any]) -> None:
     for unit, colour, dash in (("dB", style.PURPLE, "-"), ("deg", style.GREEN, (0, (5, 2)))):
         key = unit.lower()
         values = [max(x, LEAST) if x == x else x for x in style.gaps(panel[f"error_{key}"])]
-        ax.plot(f, values, color=colour, linestyle=dash, linewidth=1.3, label=f"{unit} off")
+        ax.plot(f, values, color=colour, linestyle=dash, linewidth=1.3, label=f"{unit}: linear and measured")
         ax.axhline(
             data[f"tolerance_{key}"], color=colour, linestyle=(0, (1, 1.5)), linewidth=1.1,
             label=f"allowed: {data[f'tolerance_{key}']:g} {unit}",
@@ -64,4 +65,5 @@ def _errors(ax: Axes, data: dict[str, Any], panel: dict[str, Any]) -> None:
     ax.set_yscale("log")
     ax.set_ylim(1e-12, 10.0)
     ax.set_yticks([1e-12, 1e-9, 1e-6, 1e-3, 1.0])
+    ax.yaxis.set_major_formatter(FuncFormatter(style.powers))
     ax.minorticks_off()

@@ -152,6 +152,19 @@ def phase_ticks(ax: Axes, low: float, high: float) -> None:
     ax.set_yticks([tick for tick in ticks if low <= tick <= high])
 
 
+def powers(value: float, _position: int | None = None) -> str:
+    """Write a tick as a power of ten.
+
+    Examples
+    --------
+    >>> powers(1e-6), powers(1.0), powers(1000.0)
+    ('10⁻⁶', '1', '10³')
+    """
+    exponent = round(math.log10(value))
+    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    return "1" if exponent == 0 else "10" + str(exponent).translate(raised)
+
+
 HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
 
 
