@@ -125,8 +125,11 @@ def tanh_segment(p, c, table, part, u, Tb, Tcp, Tcm, i, w, th, result):  # type:
     """Advance over one segment under the smoothed law; returns (i, w, th)."""
     whole = c[LENGTH + part]
     done, steps = 0, 1 << (LEVELS - 1)  # in units of the shortest step
-    far = SATURATED * p[layout.SMOOTHING]
     energy = p[layout.WITH_ENERGY] > 0.0
+    ws, wanted = p[layout.SMOOTHING], p[layout.TANH_TOLERANCE] * p[layout.SMOOTHING]
+    far = SATURATED * ws
+    bend = abs(Tcp - Tcm) / ws + abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS])
+    kink = bend / p[layout.INERTIA] * whole / steps / wanted if p[layout.TANH_LEVEL] < 0.0 else 0.0
     while done < steps:
         s = 1.0 if w > 0.0 else -1.0
         if done == 0 and abs(w) > far and p[layout.TANH_LEVEL] < 0.0 and not energy:
@@ -141,7 +144,12 @@ def tanh_segment(p, c, table, part, u, Tb, Tcp, Tcm, i, w, th, result):  # type:
             unit >>= 1
             level += 1
         i0, w0 = i, w
-        i, w, th1 = etd_step(p, table, (part * LEVELS + level) * LEVEL, i, w, th, u, Tb, Tcp, Tcm)
+        i, w, th1 = etd_step(p, table, (part * LEVELS + level) * LEVEL, i0, w0, th, u, Tb, Tcp, Tcm)
+        # unequal friction has a bend at w = 0: a step across it is halved until the bend does not matter
+        while kink * abs(w - w0) * unit > 1.0 and w * w0 < 0.0 and unit > 1:
+            unit >>= 1
+            level += 1
+            i, w, th1 = etd_step(p, table, (part * LEVELS + level) * LEVEL, i0, w0, th, u, Tb, Tcp, Tcm)
         if energy:
             f0, f1 = tanh_torque(p, w0, Tcp, Tcm), tanh_torque(p, w, Tcp, Tcm)
             energy_tanh(p, whole / 2.0**level, i0, w0, i, w, u, Tb, f0, f1, th1 - th, result)

@@ -1,0 +1,181 @@
+"""Many runs: the bits of single runs, and reducers against histories."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.errors import InputError
+from nonlinear import Probe, Reducers, Run, commands, loads, simulate, simulate_many
+from nonlinear._kernels import layout
+from nonlinear.batch import injection_place, put_ramp, put_sine, put_window, repeat_row, run_rows
+from nonlinear.parameters import design_row
+from nonlinear.reduced import whole_periods
+
+
+def mixed_runs() -> list[Run]:
+    designs = [load_design(n) for n in ("ilr33-amber", "emps", "ilr33-amber-multirate")]
+    table = commands.sampled([0.0, 0.1, 0.2], [0.0, 0.01, -0.01])
+    return [
+        Run(
+            design=designs[k % 3],
+            command=commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table,
+            duration_s=0.2 + 0.01 * k,
+            load_Nm=loads.proportional(3.0 * k, 1.0),
+            reducers=Reducers(extremes=True),
+        )
+        for k in range(12)
+    ]
+
+
+def test_bits_of_single_runs_for_any_number_of_threads() -> None:
+    runs = mixed_runs()
+    batches = [simulate_many(runs, threads=n) for n in (1, 2, 5)]
+    for batch in batches[1:]:
+        assert np.array_equal(batch.outs, batches[0].outs)
+    alone = np.vstack([simulate_many([run]).outs for run in reversed(runs)][::-1])
+    assert np.array_equal(alone, batches[0].outs)
+    for k, run in enumerate(runs):
+        single = simulate(run.design, run.command, run.duration_s, run.load_Nm)
+        assert single.final.motor_angle_rad == batches[0].outs[k, layout.OUT_ANGLE]
+        assert single.current_A.max() == batches[0].extreme("current_A")[1][k]
+        assert single.motor_speed_rad_s.min() == batches[0].extreme("motor_speed_rad_s")[0][k]
+        assert single.events == batches[0].events[k]
+
+
+def test_windows_against_the_history() -> None:
+    design = load_design("ilr33-amber")
+    frequency, ticks, cycles = whole_periods(37.0, design.controller.period_s)
+    probe = Probe(point="w_ref", injection=commands.sine(20.0, frequency))
+    bias = commands.ramp(0.1)
+    duration = (2 * ticks + 731) * design.controller.period_s
+    run = Run(
+        design=design,
+        command=commands.hold(),
+        bias=bias,
+        probes=(probe,),
+        duration_s=duration,
+        reducers=Reducers(window_ticks=ticks, cycles=cycles, harmonics=3),
+    )
+    batch = simulate_many([run])
+    history = simulate(design, commands.hold(), duration, bias=bias, probes=[probe])
+    for last in (0, 1):
+        part = slice(-(last + 1) * ticks, -last * ticks if last else None)
+        t = history.time_s[part]
+        for name, values in (
+            ("motor_speed_rad_s", history.motor_speed_rad_s),
+            ("probe_w_ref_before", history.probe_before),
+            ("probe_w_ref_after", history.probe_after),
+        ):
+            x = values[part]
+            assert batch.mean(name, last)[0] == pytest.approx(x.mean(), rel=1e-12)
+            assert batch.rms(name, last)[0] == pytest.approx(np.sqrt(np.mean(x**2)), rel=1e-12)
+            assert batch.span(name, last)[0][0] == x.min()
+            assert batch.span(name, last)[1][0] == x.max()
+            for harmonic in (1, 3):
+                e = np.exp(-2j * np.pi * frequency * harmonic * t)
+                expected = 2j * np.mean(x * e)
+                assert batch.phasor(name, harmonic, last)[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_step_figures_against_the_history() -> None:
+    design = load_design("ilr33-amber")
+    target = 0.01
+    run = Run(
+        design=design,
+        command=commands.step(target),
+        duration_s=0.2,
+        reducers=Reducers(step_target_rad=target),
+    )
+    step = simulate_many([run]).step
+    history = simulate(design, commands.step(target), 0.2)
+    y, t = history.output_angle_rad / target, history.time_s
+    rise = np.interp(0.9, y[: y.argmax()], t[: y.argmax()]) - np.interp(0.1, y[: y.argmax()], t[: y.argmax()])
+    assert step.rise_time_s[0] == pytest.approx(rise, rel=1e-9)
+    assert step.overshoot_percent[0] == pytest.approx(max(100.0 * (y.max() - 1.0), 0.0), abs=1e-9)
+    outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
+    assert step.settling_time_s[0] == pytest.approx(t[outside[-1] + 1])
+    assert step.final_ratio[0] == pytest.approx(y[-1], rel=1e-14)
+
+
+def test_rows_are_the_same_as_runs() -> None:
+    design = load_design("ilr33-amber")
+    row = design_row(design)
+    row[layout.TICKS] = 2000
+    rows = repeat_row(row, 3)
+    gains = np.array([0.1, 0.2, 0.3])
+    put_ramp(rows, layout.BIAS, 0.1)
+    put_window(rows, 500, 5)
+    place = injection_place("i_ref")
+    rows[:, place - layout.PROBE_SIGNAL] = 1.0
+    put_sine(rows, place, gains, 100.0)
+    batch = run_rows(rows)
+    runs = [
+        Run(
+            design=design,
+            command=commands.hold(),
+            bias=commands.ramp(0.1),
+            duration_s=0.2,
+            probes=(Probe(point="i_ref", injection=commands.sine(g, 100.0)),),
+            reducers=Reducers(window_ticks=500, cycles=5),
+        )
+        for g in gains
+    ]
+    assert np.array_equal(batch.outs, simulate_many(runs).outs)
+
+
+def test_refusals() -> None:
+    design = load_design("ilr33-amber")
+    with pytest.raises(InputError, match="at least one"):
+        simulate_many([])
+    long_window = Run(
+        design=design, command=commands.hold(), duration_s=0.1, reducers=Reducers(window_ticks=800)
+    )
+    with pytest.raises(InputError, match="must fit twice"):
+        simulate_many([long_window])
+    with pytest.raises(InputError, match="harmonics"):
+        Reducers(harmonics=40).write(np.zeros(layout.SIZE))
+
+
+PURE = """
+import json
+from dataclasses import replace
+from actuator_lti import load_design
+from nonlinear import Probe, commands, simulate
+design = load_design("ilr33-amber-multirate")
+friction = replace(design.friction, breakaway_ratio=1.2, dry_torque_reverse_Nm=0.003)
+design = replace(design, friction=replace(friction, law=LAW),
+                 encoder=replace(design.encoder, speed="difference", difference_samples=2),
+                 controller=replace(design.controller, computing_delay_s=1.3e-4))
+probe = Probe(point="i_ref", gain=1.1, delay_samples=1.4, injection=commands.chirp(0.3, 20.0, 400.0, 0.05))
+run = simulate(design, commands.triangle(1e-3, 40.0), TICKS * 1e-4, 5.0, probes=[probe], energy=True)
+print(json.dumps({"th": run.motor_angle_rad.tolist(), "i": run.current_A.tolist(), "events": run.events,
+                  "copper": run.energy.copper_loss_J, "flags": run.limit_flags.tolist()}))
+"""
+
+
+@pytest.mark.parametrize(("law", "ticks"), [("coulomb", 500), ("tanh", 60)])
+def test_compiled_against_pure_python(law: str, ticks: int) -> None:
+    code = PURE.replace("LAW", repr(law)).replace("TICKS", str(ticks))
+    results = []
+    for disabled in ("0", "1"):
+        out = subprocess.run(
+            [sys.executable, "-c", code],
+            env={**__import__("os").environ, "NUMBA_DISABLE_JIT": disabled},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        results.append(json.loads(out.stdout))
+    compiled, pure = results
+    assert compiled["events"] == pure["events"]
+    assert compiled["flags"] == pure["flags"]
+    if law == "coulomb":
+        assert compiled["events"] > 3
+    for name in ("th", "i", "copper"):
+        np.testing.assert_allclose(compiled[name], pure[name], rtol=1e-10, atol=1e-12)

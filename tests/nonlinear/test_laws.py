@@ -1,0 +1,133 @@
+"""Symmetry, scaling, and the smoothed friction law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Design
+from nonlinear import Probe, Trajectory, commands, simulate
+from nonlinear._kernels import layout
+from nonlinear.parameters import design_row
+from nonlinear.setup import Tables, put_signal
+from nonlinear.simulation import run_row
+
+
+def smooth(width: float = 1.0, **friction: float) -> Design:
+    design = load_design("ilr33-amber")
+    return replace(
+        design, friction=replace(design.friction, law="tanh", smoothing_speed_rad_s=width, **friction)
+    )
+
+
+@pytest.mark.parametrize("law", ["coulomb", "tanh"])
+def test_odd_symmetry(law: str) -> None:
+    design = load_design("ilr33-amber")
+    design = replace(design, friction=replace(design.friction, law=law))
+    runs = [simulate(design, commands.sine(a, 2.0), 0.7, 5.0) for a in (0.03, -0.03)]
+    for name in ("output_angle_rad", "motor_speed_rad_s", "current_A", "voltage_V"):
+        assert np.array_equal(getattr(runs[0], name), -getattr(runs[1], name)), name
+    assert runs[0].events == runs[1].events
+
+
+def test_scaling_of_torque_current_and_voltage() -> None:
+    """Twice R and L, half of every inertia and torque: the same motion with half the current."""
+    base = load_design("ilr33-amber")
+    c = 2.0  # currents and torques become 1/c, voltages and speeds stay
+    motor = replace(
+        base.motor,
+        resistance_ohm=base.motor.resistance_ohm * c,
+        inductance_H=base.motor.inductance_H * c,
+        rotor_inertia_kgm2=base.motor.rotor_inertia_kgm2 / c,
+    )
+    gears = tuple(
+        replace(
+            g,
+            input_inertia_kgm2=g.input_inertia_kgm2 / c,
+            output_inertia_kgm2=g.output_inertia_kgm2 / c,
+        )
+        for g in base.gears
+    )
+    friction = replace(
+        base.friction,
+        dry_torque_Nm=base.friction.dry_torque_Nm / c,
+        viscous_Nms_rad=base.friction.viscous_Nms_rad / c,
+        load_coefficient=base.friction.load_coefficient / c,
+    )
+    control = replace(
+        base.controller,
+        velocity=replace(base.controller.velocity, gain=base.controller.velocity.gain / c),
+        current=replace(base.controller.current, gain_V_A=base.controller.current.gain_V_A * c),
+    )
+    scaled = replace(
+        base,
+        motor=motor,
+        gears=gears,
+        load=replace(base.load, inertia_kgm2=base.load.inertia_kgm2 / c),
+        friction=friction,
+        controller=control,
+        limits=replace(base.limits, peak_current_A=base.limits.peak_current_A / c),
+    )
+    a, b = (simulate(d, commands.sine(0.05, 3.0), 0.8, 6.0) for d in (base, scaled))
+    assert a.limits["current"].active
+    np.testing.assert_allclose(b.current_A * c, a.current_A, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(b.motor_speed_rad_s, a.motor_speed_rad_s, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(b.voltage_V, a.voltage_V, rtol=0, atol=1e-9)
+
+
+def test_a_narrow_tanh_tends_to_coulomb() -> None:
+    command = commands.sine(0.01, 2.0)
+    exact = simulate(load_design("ilr33-amber"), command, 0.5, 8.0)
+    errors = []
+    for width in (4.0, 0.4, 0.04):
+        run = simulate(smooth(width), command, 0.5, 8.0)
+        errors.append(np.abs(run.output_angle_rad - exact.output_angle_rad).max())
+    assert errors[1] < errors[0] / 5.0
+    assert errors[2] < errors[1] / 5.0
+    assert errors[2] < 2e-7
+
+
+def fixed_level(level: int) -> Trajectory:
+    """A run with 2**level sub-steps in every tick."""
+    design = smooth(2.0)
+    row, tables = design_row(design), Tables()
+    row[layout.TICKS], row[layout.TANH_LEVEL] = 120, level
+    put_signal(row, layout.COMMAND, commands.sine(0.002, 100.0), tables)
+    return run_row(design, row, tables.joined())
+
+
+def test_fourth_order() -> None:
+    exact = fixed_level(7).motor_speed_rad_s
+    errors = [np.sqrt(np.mean((fixed_level(k).motor_speed_rad_s - exact) ** 2)) for k in (2, 3, 4)]
+    assert errors[-1] > 1e-9  # far from rounding
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    np.testing.assert_allclose(orders, 4.0, atol=0.15)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-8])
+def test_tanh_against_an_integrator(tolerance: float) -> None:
+    design = smooth(1.0, dry_torque_reverse_Nm=4e-3, offset_torque_Nm=3e-4)
+    ticks, Ts = 60, design.controller.period_s
+    u = 0.4 * np.sin(0.35 * np.arange(ticks))
+    probe = Probe(point="u", gain=0.0, injection=u)
+    run = simulate(design, commands.hold(), ticks * Ts, probes=[probe], tanh_tolerance=tolerance)
+    m, f, J = design.motor, design.friction, design.inertia_kgm2
+
+    def rate(_: float, x: np.ndarray, voltage: float) -> list[float]:
+        i, w, _th = x
+        dry = (f.dry_torque_Nm if w >= 0 else f.dry_torque_reverse_Nm) * np.tanh(w / f.smoothing_speed_rad_s)
+        torque = m.torque_constant_Nm_A * i - dry - f.viscous_Nms_rad * w - f.offset_torque_Nm
+        back = m.back_emf_constant_Vs_rad * w
+        return [(voltage - m.resistance_ohm * i - back) / m.inductance_H, torque / J, w]
+
+    x, held = np.zeros(3), np.concatenate(([0.0], u))
+    speeds = np.empty(ticks)
+    for k in range(ticks):
+        speeds[k] = x[1]
+        x = solve_ivp(rate, (0.0, Ts), x, "DOP853", args=(held[k],), rtol=1e-12, atol=1e-13).y[:, -1]
+    assert np.abs(speeds).max() > 10.0
+    assert np.abs(run.motor_speed_rad_s - speeds).max() < 10.0 * tolerance * f.smoothing_speed_rad_s + 1e-9

@@ -1,0 +1,155 @@
+"""Limits alone: the large-signal numbers H1 and H2, the sawtooth of the paper, and the anti-windup."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import acos, asin, degrees, inf, pi, radians
+
+import numpy as np
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.model import (
+    Controller,
+    Design,
+    Limits,
+    Motor,
+    PositionLoop,
+    Validation,
+    VelocityLoop,
+)
+from nonlinear import Reducers, Run, State, commands, simulate, simulate_many
+from nonlinear._kernels.control import pi as pi_law
+
+
+def ideal_drive(period_s: float, limits: Limits) -> Design:
+    """Inner loops without lag: a torque source whose velocity loop reaches its command in one tick."""
+    inertia = 1e-6
+    return Design(
+        name="ideal",
+        title="ideal inner loops",
+        motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
+        controller=Controller(
+            period_s=period_s,
+            computing_delay_s=0.0,
+            position=PositionLoop(gain=0.5 / period_s),
+            velocity=VelocityLoop(gain=inertia / period_s),
+        ),
+        limits=limits,
+        validation=Validation(full_deflection_rad=1.0),
+    )
+
+
+def test_h1_pure_rate_limit() -> None:
+    """10 deg at 5 Hz through 150 deg/s: triangle of 7.5 deg, fundamental 0.607927, lag 41.4096 deg."""
+    Ts, f, A, R = 2e-8, 5.0, radians(10.0), radians(150.0)
+    design = ideal_drive(Ts, Limits(voltage_V=inf, speed_rad_s=R))
+    period = round(1.0 / (f * Ts))
+    run = Run(
+        design=design,
+        # begun on the triangle, at its lower turning point
+        command=commands.sine(A, f, phase_rad=-asin(0.75)),
+        initial=State(motor_angle_rad=radians(-7.5), motor_speed_rad_s=-R, speed_command_rad_s=-R),
+        duration_s=2.0 / f,
+        reducers=Reducers(window_ticks=period),
+    )
+    result = simulate_many([run])
+    low, high = result.span("output_angle_rad")
+    response = result.phasor("output_angle_rad")[0] / result.phasor("reference_rad")[0]
+    assert degrees(high[0]) == pytest.approx(7.5, abs=5e-4)
+    assert degrees(low[0]) == pytest.approx(-7.5, abs=5e-4)
+    assert abs(response) == pytest.approx(0.607927, abs=5e-7)
+    # tick and hold put the turning point about one tick late
+    assert -degrees(np.angle(response)) - 360.0 * f * Ts == pytest.approx(degrees(acos(0.75)), abs=5e-5)
+    assert result.distortion("output_angle_rad")[0] == pytest.approx(0.121, abs=5e-4)
+    assert result.limit_fraction("speed")[0] > 0.999
+    assert f"{degrees(acos(0.75)):.4f}" == "41.4096"
+
+
+@pytest.mark.parametrize(("frequency", "reached"), [(2.3872, False), (2.3874, True)])
+def test_h1_onset(frequency: float, reached: bool) -> None:
+    Ts, A, R = 1e-6, radians(10.0), radians(150.0)
+    design = ideal_drive(Ts, Limits(voltage_V=inf, speed_rad_s=R))
+    start = min(2.0 * pi * frequency * A, R)
+    initial = State(motor_speed_rad_s=start, speed_command_rad_s=start)
+    run = simulate(design, commands.sine(A, frequency), 0.6 / frequency, initial=initial)
+    near_top = run.time_s > 0.25 / frequency  # the start itself stands at the limit
+    assert run.limit_active("speed")[near_top].any() == reached
+
+
+def test_h2_pure_acceleration_limit() -> None:
+    """20 000 deg/s2 at 20 Hz: parabola train of 1.5625 deg, fundamental 1.6126 deg."""
+    Ts, f, a = 1e-6, 20.0, radians(20_000.0)
+    design = ideal_drive(Ts, Limits(voltage_V=inf, acceleration_rad_s2=a))
+    start = -a / (4.0 * f)
+    run = Run(
+        design=design,
+        command=commands.sine(radians(1000.0), f),
+        initial=State(motor_speed_rad_s=start, speed_command_rad_s=start),
+        duration_s=2.0 / f,
+        reducers=Reducers(window_ticks=round(1.0 / (f * Ts))),
+    )
+    result = simulate_many([run])
+    low, high = result.span("output_angle_rad", last=1)
+    assert degrees(high[0] - low[0]) / 2.0 == pytest.approx(1.5625, abs=5e-4)
+    assert degrees(abs(result.phasor("output_angle_rad", last=1)[0])) == pytest.approx(1.6126, abs=5e-4)
+    assert result.distortion("output_angle_rad", last=1)[0] == pytest.approx(0.038, abs=1e-3)
+
+
+def test_h3_an_unsteady_point_shows() -> None:
+    design = load_design("ilr33-amber")
+    window = Reducers(window_ticks=1000)
+    runs = [
+        Run(design=design, command=commands.sine(0.002, 10.0), duration_s=t, reducers=window)
+        for t in (0.2, 2.0)
+    ]
+    unsteady = simulate_many(runs).unsteadiness("output_angle_rad")
+    assert unsteady[0] > 1e-3
+    assert unsteady[1] < 1e-6
+
+
+def test_sawtooth_of_the_paper() -> None:
+    """5 deg at 1 Hz asks for 31 deg/s, the drive gives 22.7: straight flanks at the speed limit."""
+    design = load_design("ilr33-amber")
+    run = simulate(design, commands.sine(radians(5.0), 1.0), 3.0)
+    flank = run.limit_active("speed")
+    assert 0.5 < run.limits["speed"].fraction < 0.9
+    speed = np.abs(run.motor_speed_rad_s[flank])
+    assert np.median(speed) == pytest.approx(942.5, rel=2e-3)
+    rate = degrees(np.median(speed)) / design.total_ratio
+    assert rate == pytest.approx(22.7, abs=0.05)
+
+
+def test_multirate_limit_holds_between_updates() -> None:
+    design = load_design("ilr33-amber-multirate")
+    run = simulate(design, commands.step(0.1), 0.1)
+    n = design.controller.position.every
+    change = np.diff(run.speed_command_rad_s)
+    allowed = design.limits.acceleration_rad_s2 * n * design.controller.period_s
+    assert np.abs(change).max() <= allowed * (1 + 1e-12)
+    assert not change[np.arange(change.size) % n != n - 1].any()
+
+
+@pytest.mark.parametrize(
+    ("e", "integral", "output", "kept", "acts"),
+    [
+        (1.0, 2.0, 4.5, 2.5, False),  # free: v = 2 e + I'
+        (1.0, 4.0, 5.0, 4.0, True),  # v = 6.5 beyond 5, same sign as e: the old I is kept
+        (1.0, -9.0, -5.0, -8.5, True),  # v = -6.5, e pulls back: I' is kept
+        (2.0, 0.8, 4.8, 0.8, True),  # v = 5.8 with I', 4.8 with the old I
+        (-1.0, -4.0, -5.0, -4.0, True),
+    ],
+)
+def test_conditional_integration(e: float, integral: float, output: float, kept: float, acts: bool) -> None:
+    """Kp = 2, Kp T/Tn = 0.5, limit 5 (model.md section 2)."""
+    assert pi_law(e, integral, 2.0, 0.5, 5.0) == (output, kept, acts)
+
+
+def test_voltage_saturation_leaves_no_windup() -> None:
+    """A step on 3 V of supply: saturated half of the way, no more overshoot than the braking costs."""
+    design = load_design("ilr33-amber")
+    run = simulate(replace(design, limits=replace(design.limits, voltage_V=3.0)), commands.step(0.1), 1.0)
+    assert run.limits["voltage"].fraction > 0.2
+    assert np.abs(run.voltage_V).max() <= 3.0
+    assert run.output_angle_rad.max() < 0.1 * 1.01
+    assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
