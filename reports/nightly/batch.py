@@ -41,7 +41,7 @@ class Batch:
         InputError
             If the disk does not take them.
         """
-        folders = sorted({path.parent for path in self._paths})
+        folders = sorted({path.parent for path in self._paths}) if os.name == "posix" else []
         for path in [*self._paths, *folders]:
             try:
                 handle = os.open(path, os.O_RDONLY)

@@ -59,9 +59,24 @@ def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     design = _design(payload)
     settings: Mapping[str, Any] = payload.get("settings", {})
     sections: list[dict[str, Any]] = []
+    if settings.get("validation"):
+        sections += _validation(design)
     if settings.get("monte_carlo"):
         sections += _tolerances(design, settings["monte_carlo"])
     return design_report(design, validation=sections)
+
+
+def _validation(design: Design) -> list[dict[str, Any]]:
+    """Put the linear predictions to the simulator; a design that cannot be tested says why."""
+    from analyses.validation import validate
+    from reports import document as doc
+    from reports.sections.validation import section
+
+    try:
+        return section(validate(design))
+    except InputError as error:
+        title = "Linear predictions against simulation"
+        return [doc.section("validation", title, [doc.text(f"Not tested: {error}")], status="warn")]
 
 
 def _tolerances(design: Design, plan: Mapping[str, int]) -> list[dict[str, Any]]:

@@ -11,6 +11,8 @@ from reports.nightly.text import one_line
 
 MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
+REQUIREMENTS = "verdicts"  # the section of the design's own requirements
+_NO_RESULTS = ("Where the time went",)  # tables that differ from run to run
 _INPUT_SECTIONS = ("parameters", "provenance")
 # Which way is better, by what the name holds; figures of no known direction change but do not regress.
 _LARGER = ("margin", "bandwidth", "minus3db", "minus90deg", "output_rate", "acceleration", "probability")
@@ -73,7 +75,7 @@ def _has_failed_verdict(part: Mapping[str, Any]) -> bool:
 def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
     """Return the requirements of a document, each once, in its order."""
     seen: set[str] = set()
-    for _, block in _blocks(document):
+    for section, block in _blocks(document):
         if block.get("kind") != "verdicts":
             continue
         for item in block.get("items", ()):
@@ -81,18 +83,17 @@ def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
             if name in seen:
                 continue
             seen.add(name)
-            yield _verdict(name, item)
+            yield _verdict(name, item, section == REQUIREMENTS)
 
 
-def _verdict(name: str, item: Mapping[str, Any]) -> Verdict:
+def _verdict(name: str, item: Mapping[str, Any], required: bool) -> Verdict:
+    """Make a verdict; one that the design does not require is ranked only where it fails."""
     distance = number(item.get("distance"))
     limit = number(item.get("limit"))
     if limit is None:
         limit = first_number(str(item.get("limit", "")))
     scale = abs(limit) if limit else 1.0
-    certain = (
-        item.get("unit") == "%" and limit == 100.0 and bool(item.get("passed"))
-    )  # cannot be more than met
+    ranked = distance is not None and (required or item.get("passed") is False)
     return Verdict(
         id=name,
         label=str(item.get("label", "") or name),
@@ -100,7 +101,7 @@ def _verdict(name: str, item: Mapping[str, Any]) -> Verdict:
         limit=_limit_text(item),
         unit=str(item.get("unit", "") or ""),
         distance=distance,
-        relative=None if distance is None or certain else distance / scale,
+        relative=distance / scale if ranked and distance is not None else None,
         passed=item.get("passed"),
         source=str(item.get("source", "") or ""),
         reason=str(item.get("reason", "") or ""),
@@ -167,6 +168,8 @@ def _of_block(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
 
 def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
     """Name each number by caption, row and column; a row by its texts in front of the first number."""
+    if block.get("caption") in _NO_RESULTS:
+        return
     columns, rows = block.get("columns", ()), block.get("rows", ())
     numeric = [c for c in columns if any(_is_number(r.get(c["key"])) for r in rows)]
     first = columns.index(numeric[0]) if numeric else 0
