@@ -34,6 +34,11 @@ MODULES: dict[str, str] = {
     "overlay_sweep": "reports.figures.overlay_sweep",
     "confirmation": "reports.figures.confirmation",
     "rest_sweep": "reports.figures.rest_sweep",
+    "map": "reports.figures.map",
+    "amplitude_bode": "reports.figures.amplitude_bode",
+    "sawtooth": "reports.figures.sawtooth",
+    "torque_speed": "reports.figures.torque_speed",
+    "hysteresis": "reports.figures.hysteresis",
 }
 
 

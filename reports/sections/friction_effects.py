@@ -1,0 +1,193 @@
+"""Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.large_signal import load_unit, output_unit
+
+if TYPE_CHECKING:
+    from analyses.friction_effects import FrictionEffects
+    from analyses.friction_effects.cycles import LimitCycles
+    from analyses.friction_effects.result import FrictionPoint
+
+
+def section(result: FrictionEffects) -> dict[str, Any]:
+    """Make the section from `analyses.friction_effects.friction_effects`."""
+    title = "What dry friction does at small signals"
+    if not result.points:
+        blocks = [doc.text(f"Not applicable: {result.reason}.")]
+        return doc.section("friction-effects", title, blocks)
+    scale, unit = output_unit(result.design)
+    fine, small = 1e3 * scale, {"°": "m°", "mm": "µm"}[unit]
+    load = load_unit(result.design)
+    items = [_cycle_verdict(point, fine, small, load) for point in result.points]
+    blocks = [doc.verdicts(items), _threshold_table(result, fine, small, load)]
+    figure = _figure(result, fine, small, load)
+    blocks += [figure] if figure else []
+    blocks += [_settling_table(result, fine, small, load)]
+    blocks.append(doc.text(_summary(result)))
+    intro = "Dry friction has no small-signal gain: below a threshold nothing moves, reversals lose motion."
+    failed = any(item["passed"] is False for item in items)
+    return doc.section("friction-effects", title, blocks, intro=intro, status="fail" if failed else "info")
+
+
+def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> dict[str, Any]:
+    """Say whether friction keeps the drive hunting, and whether that was foreseen."""
+    cycles, swing = point.cycles, point.cycles.hunting
+    foreseen = _foreseen_words(cycles, fine, small)
+    if swing is None:
+        found = f"none found after steps of {len(cycles.settlings)} sizes"
+    else:
+        kind = "limits keep" if swing.limited else "friction keeps"
+        size = fine * (swing.hunting_rad or 0.0)
+        found = f"{kind} it swinging by ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
+    agree = "as foreseen" if cycles.as_foreseen else "not as foreseen: the describing function is refuted"
+    return doc.verdict(
+        f"validation-hunting-{point.load_Nm:g}",
+        f"no limit cycle at {point.load_Nm:g} {load}",
+        value=0.0 if swing is None else fine * (swing.hunting_rad or 0.0),
+        limit=0.0,
+        unit=small,
+        distance=None,
+        passed=swing is None,
+        comparison="<=",
+        reason=f"{foreseen}; simulated: {found}; {agree}",
+    )
+
+
+def _foreseen_words(cycles: LimitCycles, fine: float, small: str) -> str:
+    """Say what the describing function foresees and what the simulator makes of it."""
+    if not cycles.confirmations:
+        return "describing function of the whole loop: none"
+    parts = []
+    for item in cycles.confirmations:
+        one = item.foreseen
+        kind = "stable" if one.stable else "unstable, the border of what friction keeps quiet"
+        seen = (
+            "refuted" if item.simulated_ratio is None else f"simulated at {item.simulated_ratio:.2f} of that"
+        )
+        hz = "" if item.simulated_hz is None else f", {item.simulated_hz:.4g} Hz"
+        size = fine * one.output_amplitude_rad
+        parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
+    return "describing function of the whole loop: " + "; ".join(parts)
+
+
+def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
+    """List thresholds and lost motion by load."""
+    columns = [
+        doc.column("load", "Load", load, format="sig:2"),
+        doc.column("dry", "Dry friction, motor", "mN m" if load == "N m" else "N", format="sig:3"),
+        doc.column("threshold", "Step that moves at once", small, format="sig:3"),
+        doc.column("simulated", "simulated", small, format="sig:3"),
+        doc.column("wait", "Wait at half of it", "ms", format="sig:3"),
+        doc.column("waited", "simulated", "ms", format="sig:3"),
+        doc.column("width", "Lost motion", small, format="sig:3"),
+        doc.column("predicted", "foreseen", small, format="sig:3"),
+        doc.column("largest", "Largest effect of friction", small, format="sig:3"),
+    ]
+    rows = [_threshold_row(point, fine, 1e3 if load == "N m" else 1.0) for point in result.points]
+    note = (
+        "Where the speed controller integrates, a step below the threshold moves the output after "
+        "Tn (A0/A − 1), and lost motion is made up: what friction does is largest just after a reversal."
+        if result.integrates
+        else "Nothing integrates: a step below the threshold never moves the output, and 2 Tc over the "
+        "stiffness is lost at every reversal."
+    )
+    return doc.table("Threshold of motion and lost motion", columns, rows, note)
+
+
+def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"load": point.load_Nm, "dry": torque_scale * point.dry_torque_Nm}
+    found, loop = point.threshold, point.hysteresis
+    if found is not None:
+        row["threshold"] = fine * found.static.forward_rad
+        row["simulated"] = None if found.simulated_rad is None else fine * found.simulated_rad
+        half = [w for w in found.waiting if abs(w.amplitude_rad / found.static.forward_rad - 0.5) < 0.01]
+        if half:
+            row["wait"] = 1e3 * half[0].predicted_s
+            row["waited"] = None if half[0].simulated_s is None else 1e3 * half[0].simulated_s
+    if loop is not None:
+        row["width"], row["largest"] = fine * max(loop.lost_motion_rad, 0.0), fine * loop.largest_rad
+        row["predicted"] = 0.0 if loop.predicted_rad is None else fine * loop.predicted_rad
+    return row
+
+
+def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
+    """List the standing error after steps."""
+    columns = [
+        doc.column("load", "Load", load, format="sig:2"),
+        doc.column("step", "Step", small, format="sig:3"),
+        doc.column("wait", "Waited", "s", format="sig:2"),
+        doc.column("error", "Error left", small, format="sig:2"),
+        doc.column("rest", "Rotor at rest", format="yesno"),
+        doc.column("hunting", "Hunting"),
+    ]
+    rows = []
+    for point in result.points:
+        for one in point.cycles.settlings:
+            swing = "no"
+            if one.hunting:
+                swing = f"±{fine * (one.hunting_rad or 0.0):.3g} {small}, {one.hunting_hz:.3g} Hz"
+                swing += " (limits act)" if one.limited else ""
+            error = fine * one.error_rad
+            rows.append(
+                {
+                    "load": point.load_Nm,
+                    "step": fine * one.amplitude_rad,
+                    "wait": one.wait_s,
+                    "error": error if abs(error) > 1e-6 * fine * one.amplitude_rad else 0.0,
+                    "rest": one.at_rest,
+                    "hunting": swing,
+                    "_status": "warn" if one.hunting else None,
+                }
+            )
+    note = "The last step at each load is 0.3 of the threshold; errors below 1e-6 of the step are shown as 0."
+    return doc.table("Standing error after a step", columns, rows, note)
+
+
+def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any] | None:
+    """Make the loops and the waiting times."""
+    loops, waits = [], []
+    for point in result.points:
+        label, loop, found = f"load {point.load_Nm:g} {load}", point.hysteresis, point.threshold
+        if loop is not None:
+            error = fine * (loop.output_rad - loop.command_rad)
+            command = rounded(fine * loop.command_rad)
+            loops.append({"label": label, "command": command, "error": rounded(error)})
+        if found is not None and found.waiting:
+            waits.append(
+                {
+                    "label": label,
+                    "amplitude": rounded([fine * w.amplitude_rad for w in found.waiting]),
+                    "predicted_ms": rounded([1e3 * w.predicted_s for w in found.waiting]),
+                    "simulated_ms": [
+                        None if w.simulated_s is None else 1e3 * w.simulated_s for w in found.waiting
+                    ],
+                }
+            )
+    if not loops:
+        return None
+    data = {"loops": loops, "waits": waits, "unit": small, "error_unit": small, "wait_unit": small}
+    caption = (
+        "Left: position error over a slow triangle at the command; without friction only the small lag stays."
+    )
+    if waits:
+        caption += " Right: a step below the threshold waits until the speed integral has grown to breakaway."
+    return doc.figure("hysteresis", data, caption=caption, alt=caption)
+
+
+def _summary(result: FrictionEffects) -> str:
+    """Say what becomes of the standing error."""
+    settlings = [one for point in result.points for one in point.cycles.settlings]
+    if any(one.hunting for one in settlings):
+        return "The standing error does not vanish: the drive hunts, as the table says."
+    if result.integrates:
+        return (
+            "The speed integral takes the standing error away: it creeps to zero and does not hunt. With "
+            "breakaway above sliding friction and a fast integral it may hunt, which a describing function "
+            "of dry friction cannot foresee, as a sinusoid spends no time at rest."
+        )
+    return "Nothing integrates, so an error of up to the threshold stays for good."

@@ -1,0 +1,288 @@
+"""Large signals: verdicts on the border, the map, the amplitude Bode, the sawtooth."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.limits import NAMES
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.large_signal import LargeSignals
+    from analyses.large_signal.bode import AmplitudeBode
+    from analyses.large_signal.border import BorderCheck
+    from analyses.large_signal.map import AmplitudeMap
+    from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
+
+
+def section(result: LargeSignals) -> dict[str, Any]:
+    """Make the section from `analyses.large_signal.large_signals`."""
+    design = result.design
+    scale, unit = output_unit(design)
+    items = [_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
+    blocks = [doc.verdicts(items), _map_figure(result, scale, unit)]
+    if result.border is not None and np.isfinite(result.border.predicted_rad).any():
+        blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
+    blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
+    blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
+    failed = any(item["passed"] is False for item in items)
+    intro = (
+        "Every cell of the map is a sine command, simulated until it settled. Below the lines the linear "
+        "model holds; above, the first limiter to be reached shapes the output."
+    )
+    return doc.section(
+        "large-signal", "Large signals", blocks, intro=intro, status="fail" if failed else "pass"
+    )
+
+
+def output_unit(design: Design) -> tuple[float, str]:
+    """Scale and unit of an output position: degrees, or millimetres on a linear axis."""
+    return (1e3, "mm") if design.axis == "linear" else (math.degrees(1.0), "°")
+
+
+def load_unit(design: Design) -> str:
+    """Unit of the load at the output."""
+    return "N" if design.axis == "linear" else "N m"
+
+
+def _border_verdict(border: BorderCheck | None) -> dict[str, Any]:
+    """Judge the simulated border against the smallest A_k."""
+    from analyses.large_signal.border import TOLERANCE
+
+    what = {"id": "validation-border", "label": "onset of saturation, simulated against linear, friction off"}
+    common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
+    if border is None:
+        return doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")
+    error = border.largest_error
+    if error is None:
+        reason = "no limit can be reached: the design has none"
+        return doc.verdict(**common, value=None, distance=None, passed=None, reason=reason)
+    same, count = sum(border.same_limiter), len(border.same_limiter)
+    reason = f"largest of {count} frequencies; the limiter foreseen is the one that acts at {same} of {count}"
+    distance = 100.0 * (TOLERANCE - error)
+    return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
+
+
+def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
+    """Judge the rate-limit formulas, or say why they do not apply."""
+    from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
+
+    gain = max((abs(run.gain_error) for run in found.runs), default=None)
+    lag = max((abs(run.lag_error_deg) for run in found.runs), default=None)
+    reason = found.reason
+    if found.runs and not found.applicable:
+        reason = (
+            f"formulas need fast loops and torque: Kv/w = {found.gain_over_frequency:.3g} (50 wanted), and "
+            f"the reversal takes {found.reversal_deg:.3g}° of the period (1° wanted); shown, not judged"
+        )
+    rows = (
+        ("gain", "fundamental of the sawtooth against 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
+        ("lag", "lag of the sawtooth against arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "°"),
+    )
+    return [
+        doc.verdict(
+            f"validation-sawtooth-{key}",
+            label,
+            value=None if error is None else scale * error,
+            limit=scale * limit,
+            unit=unit,
+            comparison="<=",
+            distance=None if error is None or not found.applicable else scale * (limit - error),
+            passed=None if found.passed is None or error is None else error <= limit,
+            reason=reason,
+        )
+        for key, label, error, limit, scale, unit in rows
+    ]
+
+
+def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
+    """Make the map with the linear onset lines and the simulated border."""
+    from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA, WAVEFORMS
+
+    found, design = result.map, result.design
+    points = [
+        {
+            "label": words,
+            "frequency_hz": rounded(check.frequency_hz),
+            "amplitude": rounded(scale * check.simulated_rad),
+        }
+        for words, check in (
+            ("simulated, friction off", result.border),
+            ("simulated, friction on", result.border_with_friction),
+        )
+        if check is not None and np.isfinite(check.simulated_rad).any()
+    ]
+    onset = [
+        {"name": name, "label": NAMES[name], "amplitude": rounded(scale * np.asarray(values), 4)}
+        for name, values in found.onset_rad.items()
+        if np.isfinite(values).any()
+    ]
+    full = design.validation.full_deflection_rad
+    data = {
+        "frequency_hz": rounded(found.frequency_hz),
+        "amplitude": rounded(scale * found.amplitude_rad),
+        "causes": list(CAUSES),
+        "waveforms": list(WAVEFORMS),
+        "cause": found.cause.tolist(),
+        "waveform": found.waveform.tolist(),
+        "onset": onset,
+        "points": points,
+        "marks": [{"amplitude": full * scale, "label": "full\ndeflection"}],
+        "unit": unit,
+    }
+    caption = (
+        f"{design.name}: what limits a sine command, by its amplitude and frequency, no load, with friction. "
+        f"{CAUSE_RULE} Waveform of the output: {CRITERIA}"
+    )
+    return doc.figure("map", data, caption=caption, alt=_map_words(found))
+
+
+def _map_words(found: AmplitudeMap) -> str:
+    """Say in words what the map shows."""
+    from analyses.large_signal.classify import CAUSES
+
+    shares = {name: found.share((name,)) for name in CAUSES}
+    parts = [f"{name} {share:.0%}" for name, share in shares.items() if share > 0.0]
+    return "Map of amplitude and frequency; share of the cells by what acts: " + ", ".join(parts)
+
+
+def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
+    """List the border frequency by frequency."""
+    border, shifted = result.border, result.border_with_friction
+    assert border is not None
+    columns = [
+        doc.column("hz", "Frequency", "Hz", format="sig:3"),
+        doc.column("predicted", "Smallest A_k", unit, format="sig:4"),
+        doc.column("simulated", "Simulated, friction off", unit, format="sig:4"),
+        doc.column("error", "Difference", "%", format="fix:3"),
+        doc.column("limiter", "Limiter foreseen"),
+        doc.column("acts", "acts"),
+    ]
+    if shifted is not None:
+        columns.append(doc.column("shift", "Shift by friction", "%", format="fix:2"))
+    rows = []
+    for k, hz in enumerate(border.frequency_hz):
+        row = {
+            "hz": hz,
+            "predicted": scale * border.predicted_rad[k],
+            "simulated": scale * border.simulated_rad[k],
+            "error": 100.0 * (border.ratio[k] - 1.0),
+            "limiter": NAMES.get(border.predicted_limiter[k], "none"),
+            "acts": NAMES.get(border.simulated_limiter[k], "none"),
+        }
+        if shifted is not None:
+            row["shift"] = 100.0 * (shifted.ratio[k] - 1.0)
+        rows.append(row)
+    note = "Friction shifts the border: it is shown, not judged."
+    return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
+
+
+def _bode_figure(found: AmplitudeBode, scale: float, unit: str, full: float) -> dict[str, Any]:
+    """Make the amplitude Bode."""
+    series = [
+        {
+            "label": f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})",
+            "gain_db": rounded(found.gain_db[k], 4),
+            "phase_deg": rounded(found.phase_deg[k], 4),
+        }
+        for k, (fraction, amplitude) in enumerate(zip(found.fractions, found.amplitude_rad, strict=True))
+    ]
+    data = {
+        "frequency_hz": rounded(found.frequency_hz),
+        "series": series,
+        "linear": {"gain_db": rounded(found.linear_db, 4), "phase_deg": rounded(found.linear_deg, 4)},
+        "against": {
+            "amplitude": rounded(scale * found.all_amplitude_rad),
+            "minus3db_hz": rounded(found.minus3db_hz),
+            "minus90deg_hz": rounded(found.minus90deg_hz),
+            "linear_minus3db_hz": found.linear_minus3db_hz,
+            "linear_minus90deg_hz": found.linear_minus90deg_hz,
+            "unit": unit,
+            "full": full * scale,
+        },
+    }
+    caption = (
+        "Fundamental of the output over the command at several amplitudes, simulated with friction and "
+        "limits at no load, and where gain and phase pass −3 dB (1/√2 of the command) and −90° at every "
+        "amplitude."
+    )
+    return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
+
+
+def _bode_table(found: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]:
+    """List both bandwidths at the design's amplitudes."""
+    columns = [
+        doc.column("fraction", "of full deflection", "%", format="sig:3"),
+        doc.column("amplitude", "Amplitude", unit, format="sig:3"),
+        doc.column("gain", "−3 dB", "Hz", format="sig:3"),
+        doc.column("phase", "−90°", "Hz", format="sig:3"),
+        doc.column("note", "Note"),
+    ]
+    rows = []
+    for fraction, amplitude in zip(found.fractions, found.amplitude_rad, strict=True):
+        k = int(np.argmin(np.abs(found.all_amplitude_rad - amplitude)))
+        below = bool(found.below_from_start[k])
+        rows.append(
+            {
+                "fraction": 100.0 * fraction,
+                "amplitude": scale * amplitude,
+                "gain": found.minus3db_hz[k],
+                "phase": found.minus90deg_hz[k],
+                "note": f"below −3 dB at {found.frequency_hz[0]:.3g} Hz already" if below else "",
+            }
+        )
+    rows.append(
+        {
+            "fraction": None,
+            "amplitude": None,
+            "gain": found.linear_minus3db_hz,
+            "phase": found.linear_minus90deg_hz,
+            "note": "linear loop, interpolated on the same grid",
+        }
+    )
+    return doc.table("Bandwidth against amplitude", columns, rows)
+
+
+def _sawtooth_blocks(found: Sawtooth, design: Design, scale: float, unit: str) -> list[dict[str, Any]]:
+    """Make the sawtooth, or say why there is none."""
+    if not found.runs:
+        return [doc.text(f"Sawtooth: not applicable, {found.reason}.")]
+    limit = scale * found.rate_limit_rad_s
+    data = {
+        "columns": [_sawtooth_column(run, found, scale, unit, load_unit(design)) for run in found.runs],
+        "rate_limit": limit,
+        "unit": unit,
+        "rate_unit": f"{unit}/s",
+    }
+    caption = (
+        f"A sine of {scale * found.amplitude_rad:.3g} {unit} at {found.frequency_hz:.3g} Hz, three times "
+        f"faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. In the boxes what "
+        "was simulated, in brackets what a pure rate limit would do: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
+    )
+    return [doc.figure("sawtooth", data, caption=caption, alt=caption)]
+
+
+def _sawtooth_column(run: SawtoothRun, found: Sawtooth, scale: float, unit: str, load: str) -> dict[str, Any]:
+    """Give the traces at one load."""
+    formula = run.formula
+    peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"
+    impure = f"distortion {100.0 * run.distortion:.1f} % (12.1 %)"
+    note = (
+        f"peak {scale * run.peak_rad:.3g} {unit} ({peak})   gain {run.gain:.3f} ({formula.gain:.3f})\n"
+        f"lag {run.lag_deg:.1f}° ({formula.lag_deg:.1f}°)   {impure}"
+    )
+    return {
+        "title": f"load {run.load_Nm:g} {load}",
+        "time_s": rounded(run.time_s),
+        "reference": rounded(scale * run.reference_rad, 4),
+        "output": rounded(scale * run.output_rad, 4),
+        "rate": rounded(scale * run.output_rate_rad_s, 4),
+        "command_rate": rounded(scale * run.speed_command_rad_s, 4),
+        "current": rounded(run.current_A, 4) if found.has_current else None,
+        "note": note,
+    }

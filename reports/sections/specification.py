@@ -1,0 +1,218 @@
+"""Figures for a specification sheet: rates, acceleration, current, duty, step times, torque and speed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.limits import NAMES
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.specification import Specification
+
+
+def section(result: Specification) -> dict[str, Any]:
+    """Make the section from `analyses.specification.specification`."""
+    blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
+    intro = "Closed form beside the simulator; output side unless a column says motor."
+    return doc.section("specification", "Actuator figures", blocks, intro=intro)
+
+
+def _finite(value: float | None, scale: float = 1.0) -> float | None:
+    return None if value is None or not math.isfinite(value) else scale * value
+
+
+def _capability_table(result: Specification) -> dict[str, Any]:
+    """List rate, acceleration, current and duty by load."""
+    scale, unit = output_unit(result.design)
+    columns = [
+        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+        doc.column("rate", "Rate", f"{unit}/s", format="sig:4"),
+        doc.column("rate_seen", "simulated", f"{unit}/s", format="sig:4"),
+        doc.column("by", "set by"),
+        doc.column("push", "Acceleration", f"{unit}/s²", format="sig:4"),
+        doc.column("push_seen", "simulated", f"{unit}/s²", format="sig:4"),
+    ]
+    electric = result.design.motor.has_electrical_dynamics
+    if electric:
+        columns += [
+            doc.column("current", "Motor current at that rate", "A", format="sig:3"),
+            doc.column("current_seen", "simulated", "A", format="sig:3"),
+            doc.column("ratio", "of continuous", "%", format="sig:3"),
+            doc.column("duty", "Duty", "%", format="sig:3"),
+        ]
+    rows = [
+        {
+            "load": one.figures.load_Nm,
+            "rate": _finite(one.figures.output_rate_rad_s, scale),
+            "rate_seen": _finite(one.simulated_rate_rad_s, scale),
+            "by": one.figures.rate_limit,
+            "push": _finite(one.figures.acceleration_rad_s2, scale),
+            "push_seen": _finite(one.simulated_acceleration_rad_s2, scale),
+            "current": one.figures.motor_current_A,
+            "current_seen": one.simulated_current_A,
+            "ratio": _finite(one.current_ratio, 100.0),
+            "duty": _finite(one.duty, 100.0),
+        }
+        for one in result.capabilities
+    ]
+    note = (
+        "Acceleration in closed form is that of the largest torque from rest; simulated, the mean over a "
+        "tenth of the run-up, where the current controller lags behind the rising back-EMF. Duty is the "
+        "share of the time that keeps the rms current at the continuous one."
+    )
+    return doc.table("Rate, acceleration and current at each load", columns, rows, note)
+
+
+def _planes(result: Specification) -> list[dict[str, Any]]:
+    """Make a torque-speed plane for each load."""
+    linear = result.design.axis == "linear"
+    fast, speed_label = (1.0, "speed, m/s") if linear else (60.0 / (2.0 * math.pi), "motor speed, rpm")
+    strong, torque_label = (1.0, "force, N") if linear else (1e3, "motor torque, mN m")
+    unit = load_unit(result.design)
+    blocks = []
+    for one in result.capabilities:
+        load = one.figures.load_Nm
+        moves = [move for move in result.manoeuvres if move.load_Nm == load]
+        paths = []
+        for move in moves:
+            fold = np.where(move.speed_rad_s < 0.0, -1.0, 1.0)
+            speed, torque = fast * fold * move.speed_rad_s, strong * fold * move.torque_Nm
+            # a reversal is a jump of the folded path: leave a gap there
+            torque = np.where(np.diff(fold, prepend=fold[0]) != 0.0, np.nan, torque)
+            paths.append(
+                {"label": _short(move.name), "speed": rounded(speed, 4), "torque": rounded(torque, 4)}
+            )
+        wanted = f"steady motion at {load:g} "
+        data = {
+            "bounds": [_curve(curve.name, curve, fast, strong) for curve in result.plane.bounds],
+            "demands": [
+                _curve(curve.name, curve, fast, strong)
+                for curve in result.plane.demands
+                if curve.name.startswith(wanted)
+            ],
+            "paths": paths,
+            "speed_label": speed_label,
+            "torque_label": torque_label,
+            "top": strong * _top(result, moves),
+            "fast": fast * _fastest(result, moves),
+        }
+        caption = (
+            f"Motor torque over motor speed at {load:g} {unit}: bounds, what steady motion needs, and the "
+            "paths of standard manoeuvres at full deflection. Torque below zero brakes; backward motion is "
+            "turned over."
+        )
+        blocks.append(doc.figure("torque_speed", data, caption=caption, alt=caption))
+    return blocks
+
+
+def _curve(label: str, curve: Any, fast: float, strong: float) -> dict[str, Any]:
+    return {
+        "label": label,
+        "speed": rounded(fast * curve.speed_rad_s, 4),
+        "torque": rounded(strong * curve.torque_Nm, 4),
+    }
+
+
+def _short(name: str) -> str:
+    """Break a long name for the legend."""
+    head, bracket, tail = name.partition(" (")
+    return head.replace(" of what", "\nof what").replace(" as fast", "\nas fast") + bracket + tail
+
+
+def _top(result: Specification, moves: list[Any]) -> float:
+    """Torque that the frame must show."""
+    level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
+    paths = [move.peak_torque_Nm for move in moves]
+    return float(max([*level, *paths], default=1.0))
+
+
+def _fastest(result: Specification, moves: list[Any]) -> float:
+    """Speed that the frame must show: the bounds in reach, and the paths."""
+    paths = [float(np.max(np.abs(move.speed_rad_s))) for move in moves]
+    upright = [float(c.speed_rad_s[0]) for c in result.plane.bounds if c.name == "speed limit"]
+    reach = max(paths, default=1.0)
+    crossing = [
+        float(c.speed_rad_s[-1]) for c in result.plane.bounds if c.name == "voltage limit" and not upright
+    ]
+    return 1.12 * max([reach, *upright, *[c for c in crossing if c < 4.0 * reach]])
+
+
+def _manoeuvre_table(result: Specification) -> dict[str, Any]:
+    """List currents and duty of the manoeuvres."""
+    electric = result.design.motor.has_electrical_dynamics
+    columns = [
+        doc.column("name", "Manoeuvre"),
+        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+    ]
+    if electric:
+        columns += [
+            doc.column("rms", "Current, rms", "A", format="sig:3"),
+            doc.column("peak", "peak", "A", format="sig:3"),
+            doc.column("duty", "Duty", "%", format="sig:3"),
+        ]
+    else:
+        columns += [
+            doc.column("rms_force", "Force, rms", "N", format="sig:3"),
+            doc.column("peak_force", "peak", "N", format="sig:3"),
+        ]
+    columns.append(doc.column("limits", "Limits that act"))
+    rows = [
+        {
+            "name": move.name,
+            "load": move.load_Nm,
+            "rms": move.rms_current_A,
+            "peak": move.peak_current_A,
+            "duty": _finite(move.duty, 100.0),
+            "rms_force": move.rms_torque_Nm,
+            "peak_force": move.peak_torque_Nm,
+            "limits": _limit_words(move.limits),
+        }
+        for move in result.manoeuvres
+    ]
+    return doc.table(f"Standard manoeuvres at {_full(result.design)}", columns, rows)
+
+
+def _full(design: Design) -> str:
+    scale, unit = output_unit(design)
+    return f"{scale * design.validation.full_deflection_rad:.3g} {unit}"
+
+
+def _limit_words(limits: dict[str, float]) -> str:
+    parts = [f"{NAMES.get(name, name)} {100.0 * share:.2g} %" for name, share in limits.items()]
+    return ", ".join(parts) or "none"
+
+
+def _step_table(result: Specification) -> dict[str, Any]:
+    """List step times from small to full deflection."""
+    scale, unit = output_unit(result.design)
+    columns = [
+        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+        doc.column("step", "Step", unit, format="sig:3"),
+        doc.column("fraction", "of full", "%", format="sig:2"),
+        doc.column("rise", "Rise 10–90 %", "ms", format="sig:3"),
+        doc.column("overshoot", "Overshoot", "%", format="fix:1"),
+        doc.column("settle", "Settled to 2 %", "ms", format="sig:3"),
+        doc.column("rate", "Peak rate", f"{unit}/s", format="sig:3"),
+        doc.column("limits", "Limits that act"),
+    ]
+    rows = [
+        {
+            "load": one.load_Nm,
+            "step": scale * one.amplitude_rad,
+            "fraction": 100.0 * one.fraction,
+            "rise": _finite(one.rise_time_s, 1e3),
+            "overshoot": one.overshoot_percent,
+            "settle": _finite(one.settling_time_s, 1e3),
+            "rate": scale * one.peak_rate_rad_s,
+            "limits": ", ".join(NAMES.get(name, name) for name in one.limits) or "none",
+        }
+        for one in result.steps
+    ]
+    return doc.table("Steps, small and large", columns, rows, "Simulated with friction and all limits.")
