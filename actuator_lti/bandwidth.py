@@ -33,11 +33,11 @@ class Bandwidth:
     Attributes
     ----------
     minus3db_rad_s : float or None
-        Where \\|T\\| first falls below ``level`` times its value at zero frequency; ``None`` if it never does.
+        Where |T| first falls below ``level`` times its value at zero frequency; ``None``: never.
     minus90deg_rad_s : float or None
         Where the unwrapped phase of T first falls below -90 deg against zero frequency.
     resonance_peak_db : float
-        Largest \\|T\\| over its value at zero frequency, dB (0: no resonance).
+        Largest |T| over its value at zero frequency, dB (0: no resonance).
     resonance_rad_s : float
         Where it is reached; 0 where there is no resonance.
     dc_gain : float

@@ -157,7 +157,9 @@ def _propagated(loop: RationalLoop, segments: list[tuple[float, int]]) -> tuple[
     M = _augmented(loop)
     state = np.zeros(loop.order + 1)
     state[-1] = 1.0
-    times, states, start = [np.zeros(1)], [state[:, None]], 0.0
+    times: list[Real] = [np.zeros(1)]
+    states: list[Real] = [state[:, None]]
+    start = 0.0
     for h, steps in segments:
         run = powers(expm(M * h), states[-1][:, -1], steps)
         times.append(start + h * np.arange(1, steps + 1))

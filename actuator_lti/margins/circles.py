@@ -1,12 +1,12 @@
 """Frequencies at which L meets a circle or the real axis, as eigenvalues (no grid, no polynomial).
 
 With L~(s) = L(-s) (sampled: L(1/z)) every circle about the real axis is the zero set on the border of
-stability of q(s) = a L L~ + b (L + L~) + e: (a, b, e) = (1, 0, -1) is \\|L\\| = 1, (1, 1, 1 - m^2) is
-\\|1 + L\\| = m; the real axis is L - L~ = 0. The zeros of q are the eigenvalues of a Hamiltonian matrix (Boyd,
-Balakrishnan, Kabamba 1989; Bruinsma, Steinbuch 1990), or of a pencil where q vanishes at infinity, and for a
-sampled loop of a symplectic pencil. All of these are brought to one plain eigenvalue problem by the real
-Moebius map sigma = 1/(s - s0), s = (z - 1)/(z + 1) for a sampled loop: s0 is chosen so that q(s0) is not zero,
-A may be singular (delays z^-q) and may have an eigenvalue at z = -1.
+stability of q(s) = a L L~ + b (L + L~) + e: (a, b, e) = (1, 0, -1) is |L| = 1, (1, 1, 1 - m^2)
+is |1 + L| = m; the real axis is L - L~ = 0. The zeros of q are the eigenvalues of a Hamiltonian matrix
+(Boyd, Balakrishnan, Kabamba 1989; Bruinsma, Steinbuch 1990), or of a pencil where q vanishes at infinity,
+and for a sampled loop of a symplectic pencil. All of these are brought to one plain eigenvalue problem by the
+real Moebius map sigma = 1/(s - s0), s = (z - 1)/(z + 1) for a sampled loop: s0 is chosen so that q(s0)
+is not zero, A may be singular (delays z^-q) and may have an eigenvalue at z = -1.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ def unwarped(w: Real, in_z: bool) -> Real:
 
 @dataclass(frozen=True)
 class ShiftedLoop:
-    """L(s) = l_plus - c_plus (sigma - W_plus)^-1 b_plus and L(-s) = l_minus + c_minus (sigma + W_minus)^-1 b_minus."""
+    """Both halves: L(s) = l_plus - c_plus (sigma - W_plus)^-1 b_plus, and
+    L(-s) = l_minus + c_minus (sigma + W_minus)^-1 b_minus.
+    """
 
     shift: float
     l_plus: float
@@ -176,7 +178,7 @@ def on_axis(zeros: Complex) -> Complex:
 def _shifts(loop: RationalLoop, poles: Complex) -> Real:
     r"""Shifts in order of merit: L(+-shift) not above one, far from the poles, near their mean frequency.
 
-    Where \|L(shift)\| were large, the one of \|L\| = 1 would be lost beside it in rounding.
+    Where |L(shift)| were large, the one of |L| = 1 would be lost beside it in rounding.
     """
     if loop.in_z:
         poles = (poles - 1.0) / np.where(poles == -1.0, 1e-300, poles + 1.0)

@@ -1,7 +1,7 @@
 """Poles of a system with delays: each delay as a transport line, by Chebyshev collocation.
 
 A delay tau is the line dq/dt = -(1/tau) dq/dx, 0 <= x <= 1, with the input at x = 0 and the output at x = 1.
-Differentiation at Chebyshev points makes it a state space whose eigenvalues with \\|s\\| tau well below the
+Differentiation at Chebyshev points makes it a state space whose eigenvalues with |s| tau well below the
 number of points are those of the exact delay to near machine precision (Breda, Maset, Vermiglio 2005).
 These poles are the second way to stability beside the Nyquist count; nothing else rests on them.
 """

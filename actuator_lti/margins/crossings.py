@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ class Crossings:
     Attributes
     ----------
     gain_x, gain_L, gain_touch : arrays
-        Where \\|L\\| = 1, L there, and whether it only touches.
+        Where |L| = 1, L there, and whether it only touches.
     real_x, real_L, real_touch : arrays
         The same for the real axis, positive side included.
     between_x, between_L : arrays
@@ -92,12 +93,12 @@ def find_crossings(
     x = np.concatenate((gain.samples, real.samples, typical_x))
     x.sort()
     L = loop.response(x)
-    gain_hit = _changes(np.abs(L) > 1.0)
-    real_hit = np.zeros(x.size - 1, dtype=bool) if real_zeros is None else _changes(L.imag > 0.0)
+    gain_changes = _changes(np.abs(L) > 1.0)
+    real_changes = np.zeros(x.size - 1, dtype=bool) if real_zeros is None else _changes(L.imag > 0.0)
     if border_x.size:
         at_pole = np.searchsorted(x, border_x) - 1
-        gain_hit[at_pole] = real_hit[at_pole] = False
-    gain_hit, real_hit = np.flatnonzero(gain_hit), np.flatnonzero(real_hit)
+        gain_changes[at_pole] = real_changes[at_pole] = False
+    gain_hit, real_hit = np.flatnonzero(gain_changes), np.flatnonzero(real_changes)
     both = np.concatenate((gain_hit, real_hit))
     k = gain_hit.size
     start = np.concatenate((_start(gain, x, gain_hit), _start(real, x, real_hit)))
@@ -139,7 +140,7 @@ def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
 def _candidates(zeros: Complex, border_x: Real, in_z: bool, floor_x: float) -> _Candidates:
     near = on_axis(zeros)
     if floor_x:
-        near = near[near.imag > warped(floor_x, in_z)]
+        near = near[near.imag > (math.tan(0.5 * floor_x) if in_z else floor_x)]
     w, off_axis = near.imag, np.abs(near.real) / near.imag
     if (
         w.size > 1 and (w[1:] - w[:-1] <= _SAME * w[1:]).any()
@@ -164,7 +165,7 @@ def _candidates(zeros: Complex, border_x: Real, in_z: bool, floor_x: float) -> _
 
 
 def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> tuple[Real, Complex]:
-    """Newton on log \\|L\\| (the first ``gains`` ones) or on the phase; every root stays in its bracket."""
+    """Newton on log |L| (the first ``gains`` ones) or on the phase; every root stays in its bracket."""
     if not x.size:
         return x, np.empty(0, dtype=complex)
     failed = np.zeros(x.size, dtype=bool)
@@ -186,7 +187,7 @@ def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> t
         failed |= ~small
     value = L - slope * step
     for k in np.flatnonzero(failed):
-        x[k] = _bracketed(loop, float(low[k]), float(high[k]), k < gains)
+        x[k] = _bracketed(loop, float(low[k]), float(high[k]), bool(k < gains))
         value[k] = loop.response(x[k : k + 1])[0]
     return x, value
 
@@ -211,11 +212,11 @@ def _with_touches(
     flat = np.zeros(x.size, dtype=bool)
     if not found.possible_touch.any():
         return x, L, flat
-    known = np.zeros(found.count, dtype=bool)
+    known: Mask = np.zeros(found.count, dtype=bool)
     if x.size:
         nearest = np.clip(np.searchsorted(x, found.x), 1, max(x.size - 1, 1))
         pair = np.stack((x[nearest - 1], x[np.minimum(nearest, x.size - 1)]))
-        known = (np.abs(pair - found.x) <= 1e-6 * found.x).any(axis=0)
+        known = np.asarray((np.abs(pair - found.x) <= 1e-6 * found.x).any(axis=0))
     open_question = found.possible_touch & ~known
     if not open_question.any():
         return x, L, flat

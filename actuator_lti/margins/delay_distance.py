@@ -83,14 +83,19 @@ def _end_values(setting: Setting) -> tuple[list[float], Complex]:
 
 
 def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
-    distance = criterion.distance(found.L)
-    if criterion is MODULUS:
-        return distance - R
+    """What the criterion cannot fall below inside each interval: by the disk about L, or by its gain."""
     size = np.abs(found.L)
-    if criterion is PEAK:
-        return 1.0 / (size + R)
-    if criterion is COMPLEMENTARY:
-        return np.where(size > R, distance - R / (size * (size - R)), -np.inf)
-    away = np.abs(1.0 - found.L)
+    least, most = np.maximum(size - found.spread, 0.0), size + found.spread
+    distance, away = criterion.distance(found.L), np.abs(1.0 - found.L)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
+        if criterion is PEAK:
+            return 1.0 / most
+        if criterion is COMPLEMENTARY:
+            by_disk = np.where(size > R, distance - R / (size * (size - R)), -np.inf)
+            return np.maximum(by_disk, np.maximum(1.0 / most - 1.0, 1.0 - 1.0 / least))
+        by_gain = np.maximum(1.0 - most, least - 1.0)
+        if criterion is MODULUS:
+            return np.maximum(distance - R, by_gain)
+        by_disk = np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
+        by_gain = np.maximum(2.0 * (1.0 - most) / (1.0 + most), 2.0 * (least - 1.0) / (least + 1.0))
+        return np.maximum(by_disk, by_gain)

@@ -62,7 +62,7 @@ class Cells:
     L, slope : arrays, complex
         The loop (series delay included) and its derivative by x.
     spread : array
-        Bound of \\|L0 - L0(x)\\| over the interval, L0 the loop without the series delay; inf where there is none.
+        Bound of |L0 - L0(x)| over the interval, L0 the loop without the series delay; inf: no bound.
     """
 
     x: Real
@@ -158,7 +158,7 @@ def _matrix(form: DelayForm, points: Complex) -> tuple[Complex, Complex]:
 
 
 def characteristic(form: DelayForm, s: complex) -> tuple[Complex, Complex, Complex, Complex]:
-    """Characteristic matrix F(s), dF/ds, and the row and column of L = D11 + row F^-1 column, at one point."""
+    """At one point: F(s), dF/ds, and the row and column of L = D11 + row F^-1 column."""
     F, lag = _matrix(form, np.array([s]))
     n, q = form.B1.size, form.delays.size
     slope = np.zeros_like(F[0])

@@ -91,7 +91,7 @@ def _order_atdc_value(form: DelayForm, low: float, most: int) -> tuple[float, in
 
 
 def _tail(form: DelayForm, start: float) -> float:
-    """A frequency from which on \\|L\\| < FLOOR: with abs(F^-1) <= (w - |A|, ...)^-1 an M-matrix."""
+    """A frequency from which on |L| < FLOOR: with abs(F^-1) <= (w - |A|, ...)^-1 an M-matrix."""
     n, q = form.B1.size, form.delays.size
     if form.D11 and not form.series_s:
         raise InputError("a loop with delays and direct feed-through: its gain does not fall off")
@@ -120,7 +120,7 @@ def _tail(form: DelayForm, start: float) -> float:
             return w
         w *= 2.0
     raise InputError(
-        "the gain of the loop does not fall off towards high frequency (direct feed-through through a delay): "
+        "the gain of the loop does not fall off towards high frequency (feed-through behind a delay): "
         "its closed loop is of neutral type, for which no margins are given"
     )
 

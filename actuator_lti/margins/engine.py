@@ -20,7 +20,7 @@ _MOST_SAMPLES = 100
 def stability_margins(
     system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None
 ) -> StabilityMargins:
-    r"""Find all margins of a loop L closed by negative unit feedback.
+    """Find all margins of a loop L closed by negative unit feedback.
 
     Rational loops need no grid: crossovers are eigenvalues (Boyd, Balakrishnan, Kabamba 1989), each held by a
     change of sign and polished by Newton. With delays, inside or in series, intervals are split until a bound
@@ -36,7 +36,8 @@ def stability_margins(
         as 1 s. Measured data give bounds between neighbouring points and no verdict.
     delay_s : float, optional
         Exact extra delay in series, s. In a sampled loop whole samples become states; a fraction of a sample
-        is the factor exp(-j w delay) up to the Nyquist frequency, and the verdict is that of the Nyquist curve.
+        is the factor exp(-j w delay) up to the Nyquist frequency; the verdict is then that of
+        the Nyquist curve alone.
     band_rad_s : tuple of float, optional
         Where margins are listed. Default: everywhere; under a delay, whose phase crossovers never end, up to
         where the gain stays below -40 dB (``.band_rad_s`` of the result). The verdict, the modulus and the
@@ -51,9 +52,9 @@ def stability_margins(
     ------
     InputError
         Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a pole on the border of stability
-        cancelled by a zero, a direct feed-through behind a delay of 1 or more (neutral type), data too coarse.
+        cancelled by a zero, a direct feed-through behind a delay (neutral type), data too coarse.
     NumericalError
-        \|L\| is one at every frequency, or a search was not settled to its accuracy.
+        |L| is one at every frequency, or a search was not settled to its accuracy.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Smallest distance of the curve to -1, plain (modulus margin) or by the balanced disk, over the whole axis."""
+"""Smallest distance of the curve to -1 over the whole axis: modulus margin, balanced disk margin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FAR = 1e300  # stands for L at a pole on the end of the axis: T = 1, disk distan
 
 @dataclass(frozen=True)
 class Criterion:
-    """A distance \\|G(L)\\| that is to be smallest, and the circle on which it has a given value."""
+    """A distance |G(L)| that is to be smallest, and the circle on which it has a given value."""
 
     distance: Callable[[Complex], Real]
     derivatives: Callable[[complex], tuple[complex, complex, complex]]
@@ -72,7 +72,7 @@ DISK = Criterion(_disk_distance, _disk_derivatives, _disk_circle)
 def smallest(
     loop: RationalLoop, circles: Circles, criterion: Criterion, x: Real, L: Complex, top: float
 ) -> tuple[float, float]:
-    """Smallest value of a criterion over the axis and where: a local search that an eigenvalue problem confirms.
+    """Smallest value of a criterion over the axis and where: a local search, confirmed by eigenvalues.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
 
 from actuator_lti.errors import InputError
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+Real = NDArray[np.floating[Any]]
+Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 _AT_MINUS_ONE = 1e-13
 
@@ -141,7 +141,7 @@ def rational_loop(system: Any, warp: bool = False) -> RationalLoop:
     system : StateSpace or TransferFunction
         One input, one output.
     warp : bool
-        Hold a sampled transfer function in the s-plane of s = (z - 1)/(z + 1), where it has no pole at z = -1.
+        Hold a sampled transfer function in the s-plane of s = (z - 1)/(z + 1), unless it has a pole at -1.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def rational_loop(system: Any, warp: bool = False) -> RationalLoop:
 def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -> RationalLoop:
     """Balance a state space; shapes (n, n), (n,), (n,)."""
     n = b.size
-    whole = np.empty((n + 1, n + 1))
+    whole: Real = np.empty((n + 1, n + 1))
     whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = A, b, c, d
     if not np.isfinite(whole).all():
         raise InputError("the loop holds a value that is not finite")

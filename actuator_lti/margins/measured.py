@@ -84,8 +84,8 @@ def _refuse_coarse(omega: Real, L: Complex) -> None:
     if bad.size:
         k = int(bad[0])
         raise InputError(
-            f"measured data are too coarse between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s: {turn[k]:.1f} deg "
-            f"and {step[k]:.1f} dB from point to point (allowed: {LARGEST_TURN_DEG:g} deg, "
+            f"measured data are too coarse between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s: "
+            f"{turn[k]:.1f} deg and {step[k]:.1f} dB from point to point (allowed: {LARGEST_TURN_DEG:g} deg, "
             f"{LARGEST_STEP_DB:g} dB), a crossing in between could not be bounded; measure more points there"
         )
 
@@ -93,7 +93,8 @@ def _refuse_coarse(omega: Real, L: Complex) -> None:
 def _gain_margins(omega: Real, L: Complex) -> tuple[GainMargin, ...]:
     angle = np.angle(-L)
     out = []
-    for k in np.flatnonzero((angle[1:] * angle[:-1] <= 0.0) & (np.abs(angle[1:] - angle[:-1]) < math.pi)):
+    near = (angle[1:] * angle[:-1] <= 0.0) & (np.abs(angle[1:] - angle[:-1]) < math.pi)
+    for k in np.flatnonzero(near).tolist():
         if angle[k] == 0.0 and k > 0:
             continue  # counted with the interval before
         t = float(angle[k] / (angle[k] - angle[k + 1])) if angle[k] != angle[k + 1] else 0.0
@@ -107,7 +108,7 @@ def _gain_margins(omega: Real, L: Complex) -> tuple[GainMargin, ...]:
 def _phase_margins(omega: Real, L: Complex) -> tuple[PhaseMargin, ...]:
     gain = np.log(np.abs(L))
     out = []
-    for k in np.flatnonzero(gain[1:] * gain[:-1] <= 0.0):
+    for k in np.flatnonzero(gain[1:] * gain[:-1] <= 0.0).tolist():
         if (gain[k] == 0.0 and k > 0) or gain[k] == gain[k + 1]:
             continue
         t = float(gain[k] / (gain[k] - gain[k + 1]))

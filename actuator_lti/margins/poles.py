@@ -84,13 +84,14 @@ def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     values = eigenvalues(A)
     if not values.size:
         return SortedPoles(values, 0, ())
-    distance = np.abs(values) - 1.0 if in_z else values.real
+    distance: Real = np.abs(values) - 1.0 if in_z else values.real
     scale = max(float(np.abs(A).max()), _EPS) if not in_z else 1.0
     suspicious = np.abs(distance) <= _SUSPICIOUS * scale
     if not suspicious.any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)), ())
     at_dc = (values == 1.0) if in_z else (values == 0.0)
-    radius, cloud = np.zeros(values.size), 0.0
+    radius: Real = np.zeros(values.size)
+    cloud = 0.0
     if (at_dc == suspicious).all():
         on_border = at_dc
     else:

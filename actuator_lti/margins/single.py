@@ -114,7 +114,7 @@ class DiskMargin:
     Attributes
     ----------
     alpha : float
-        The smallest of \\|2 (1 + L)/(1 - L)\\|.
+        The smallest of |2 (1 + L)/(1 - L)|.
     frequency_rad_s : float
         Where it is reached.
     """

@@ -19,7 +19,7 @@ _NARROWEST = 1e-12
 
 
 def reach(form: DelayForm, found: Cells) -> Real:
-    """Bound of \\|L - L(x)\\| inside each interval, the series delay included."""
+    """Bound of |L - L(x)| inside each interval, the series delay included."""
     return found.spread + np.abs(found.L) * np.minimum(found.half * form.series, 2.0)
 
 

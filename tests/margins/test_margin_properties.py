@@ -49,7 +49,7 @@ def loops(draw: st.DrawFn, sampled: bool | None = None) -> control.TransferFunct
 
 
 def closed_loop_at(loop: control.TransferFunction, factor: complex, delay_s: float, omega: float) -> float:
-    """\\|1 + factor L exp(-s delay)\\| on the border, relative to the size of its terms; 40 digits."""
+    """|1 + factor L exp(-s delay)| on the border, relative to the size of its terms; 40 digits."""
     with mp.workdps(40):
         w = mpf(omega)
         point = mp.expj(w * PERIOD_S) if loop.dt else mpc(0, w)
