@@ -46,7 +46,7 @@ def coherent(
     --------
     >>> found = coherent([333.0, 2.0], 1e-4, base_ticks=2)
     >>> found.ticks.tolist(), found.cycles.tolist()
-    ([840, 5000], [28, 1])
+    ([810, 5000], [27, 1])
     """
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     period = base_ticks * tick_s

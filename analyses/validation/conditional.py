@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite, pi, sqrt
+from math import asin, isfinite, pi, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -126,7 +126,7 @@ def saturation_gain(ratio: float) -> float:
     """
     if ratio <= 1.0:
         return 1.0
-    return 2.0 / pi * (np.arcsin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
+    return 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
 
 
 def saturation_ratio(gain: float) -> float:

@@ -46,6 +46,7 @@ Progress = Callable[[int, int], None]
 HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
+NEAR = (0.9, 0.95, 1.0, 1.05)
 BELOW = 20.0  # the sweep begins so far below the lowest figure
 
 
@@ -253,6 +254,8 @@ class _Work:
             top = 0.8 * HIGHEST / (self.loops.present["position"].period_s or 1.0)
             high = min(2.0 * max(marks, default=top), top)
             asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
+            near = np.outer(marks, NEAR).ravel()  # the figures read from the sweep lie about there
+            asked = np.sort(np.concatenate([asked, near[near < top]]))
             dry = design.friction.dry_Nm(0.0) > 0.0
             amplitude = free_amplitude(design, self.loops, asked, part)
             sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)

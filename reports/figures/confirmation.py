@@ -53,7 +53,7 @@ def _released(ax: Axes, data: dict[str, Any]) -> None:
     """Border over linear border for small, medium and large deviations."""
     for k, item in enumerate(data["released"]):
         x = [j + 0.06 * (k - len(data["released"]) / 2) for j in range(len(item["sizes"]))]
-        look = {"color": style.SERIES[k % 7], "markersize": 5.5}
+        look: dict[str, Any] = {"color": style.SERIES[k % 7], "markersize": 5.5}
         ax.plot(x, style.gaps(item["without"]), marker="o", label=item["label"], linewidth=1.2, **look)
         ax.plot(
             x, style.gaps(item["with_friction"]), marker="s", markerfacecolor="none", linewidth=1.2,

@@ -45,7 +45,7 @@ def _overlay(ax: Axes, data: dict[str, Any], panel: dict[str, Any], unit: str) -
     """Draw the linear line and the measured points."""
     f = data["frequency_hz"]
     ax.plot(f, style.gaps(panel[f"linear_{unit}"]), color=style.BLUE, label="linear loop")
-    look = {"marker": "o", "markersize": 3.6, "linestyle": "none", "markerfacecolor": "none"}
+    look: dict[str, Any] = {"marker": "o", "markersize": 3.6, "linestyle": "none", "markerfacecolor": "none"}
     ax.plot(
         f, style.gaps(panel[f"measured_{unit}"]), color=style.ORANGE, label="measured by injection", **look
     )

@@ -51,7 +51,7 @@ def _others(validation: Validation) -> list[dict[str, Any]]:
 
 def summary(validation: Validation) -> dict[str, Any]:
     """Make the section of verdicts with the ledger."""
-    blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation))]
+    blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation), what="checks")]
     failed = [row for row in validation.ledger if row.passed is False]
     if failed:
         blocks.append(ledger_table(failed, "Predictions that fail"))
@@ -107,21 +107,6 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
                 "mm" if validation.design.axis == "linear" else "deg",
                 not conditional.found,
                 reason,
-            )
-        )
-    border = None if validation.large_signals is None else validation.large_signals.border
-    if border is not None and border.passed is not None:
-        error = border.largest_error
-        items.append(
-            _verdict(
-                "onset",
-                "Onset of saturation against the smallest A_k, largest difference",
-                None if error is None else 100.0 * error,
-                1.0,
-                "<=",
-                "%",
-                border.passed,
-                "",
             )
         )
     return items

@@ -1,0 +1,126 @@
+"""Margins confirmed in time: equal to the linear ones to 0.1 % where no limit acts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from analyses.validation.borders import Search, find_borders
+from analyses.validation.confirm import (
+    Confirmation,
+    confirm_margins,
+    instrument_delay,
+    point_questions,
+    stage_questions,
+)
+from analyses.validation.release import release_margins
+from analyses.validation.rig import rig
+from analyses.validation.sweep import settling_ticks_of
+
+
+def confirmed(name: str) -> tuple[Confirmation, ...]:
+    design = load_design(name)
+    loops = assemble_loops(design)
+    questions, settle = [], {}
+    for stage, loop in loops.present.items():
+        setup = rig(design, stage)
+        settle[stage] = settling_ticks_of(loop.closed_loop, setup.hold_ticks, name)
+        questions += stage_questions(setup, loop, stability_margins(loop.open_loop), settle[stage])
+    points = {point: rig(design, point) for point in loops.break_points if point != "output"}
+    questions += point_questions(points, loops, settle["position"])
+    return confirm_margins(questions)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("ilr33-amber", 16), ("ilr33-amber-multirate", 16), ("ctms-motor-position", 6), ("emps", 11)],
+)
+def test_every_margin_is_found_in_time(name: str, count: int) -> None:
+    found = confirmed(name)
+    assert len(found) == count
+    for item in found:
+        where = f"{item.loop} {item.kind}"
+        assert item.passed, where
+        if item.predicted is None:
+            assert item.border.value is None, where
+        else:
+            assert item.difference is not None
+            assert abs(item.difference) < 1e-3, where
+            assert item.border.frequency_hz == pytest.approx(item.predicted_hz, rel=0.1), where
+
+
+def test_margins_of_the_baseline_are_the_known_ones() -> None:
+    """Against an independent computation of this drive (its J is 1 % larger), not against our own loops."""
+    found = {(item.loop, item.kind): item for item in confirmed("ilr33-amber")}
+    known_db = {"current": 9.4, "velocity": 23.3, "position": 27.1}
+    for loop, db in known_db.items():
+        border = found[loop, "gain up"].border
+        assert border.value is not None
+        assert 20.0 * np.log10(border.value) == pytest.approx(db, abs=0.3)
+
+
+def test_a_wrong_prediction_fails() -> None:
+    item = next(item for item in confirmed("ctms-motor-position") if item.kind == "gain up")
+    assert item.predicted is not None
+    wrong = Confirmation(
+        loop=item.loop,
+        point=item.point,
+        kind=item.kind,
+        predicted=1.002 * item.predicted,
+        predicted_hz=item.predicted_hz,
+        instrument=None,
+        border=item.border,
+        period_s=item.period_s,
+    )
+    assert item.passed
+    assert not wrong.passed
+
+
+def test_a_wrong_idea_of_the_frequency_does_not_move_the_border() -> None:
+    """Windows fitted to a frequency that is off by 4 % cost accuracy, not the answer."""
+    setup = rig(load_design("ilr33-amber"), "velocity")
+    right, wrong = find_borders([Search(setup, "gain up", f, 1500) for f in (997.3, 1040.0)])
+    assert right.value is not None
+    assert wrong.value == pytest.approx(right.value, rel=5e-3)
+
+
+def test_the_instruments_delay_is_accounted_for() -> None:
+    """A pure integrator: the border with an interpolated delay against the exact one (case E1 of the set)."""
+    import control
+
+    loop = control.tf([0.5], [1, -1], 1e-3)
+    margin = stability_margins(loop).delay_margin
+    assert margin.samples == pytest.approx(2.60827, abs=1e-5)
+    best = instrument_delay(loop, margin.samples, margin.frequency_rad_s * 1e-3)
+    assert best == pytest.approx(margin.samples, rel=1e-3)
+    assert best != margin.samples
+    whole = instrument_delay(loop, 3.0, margin.frequency_rad_s * 1e-3)
+    assert whole == pytest.approx(best, rel=1e-9)
+
+
+def test_amplitude_and_friction_move_the_border() -> None:
+    """From rest: without friction the inner loops keep their margins, dry friction adds to them, and the
+    acceleration limit takes from that of the position loop (ilr33-amber)."""
+    design = load_design("ilr33-amber")
+    loops = assemble_loops(design)
+    setups = {name: rig(design, name) for name in loops.present}
+    settle = {
+        name: settling_ticks_of(loop.closed_loop, setups[name].hold_ticks, "")
+        for name, loop in loops.present.items()
+    }
+    found = release_margins(setups, confirmed("ilr33-amber"), settle)
+    assert len(found) == 36
+    by = {(item.loop, item.kind, item.size, item.friction_on): item for item in found}
+    for loop in ("current", "velocity"):
+        for kind in ("gain up", "delay"):
+            for size in ("small", "medium", "large"):
+                free, rubbing = (by[loop, kind, size, on] for on in (False, True))
+                assert free.border.value == pytest.approx(free.linear, rel=0.05)
+                assert rubbing.border.value >= 0.99 * free.border.value
+    position = by["position", "gain up", "large", False]
+    assert position.border.value < 0.5 * position.linear
+    assert (
+        by["velocity", "delay", "small", True].border.value
+        > 1.1 * by["velocity", "delay", "small", True].linear
+    )

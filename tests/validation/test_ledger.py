@@ -1,0 +1,173 @@
+"""The ledger: nothing dropped, failures counted, reasons given; the command and its exit status."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from actuator_lti import InputError, load_design
+from analyses.validation import QUICK, Settings, Validation, validate
+from analyses.validation.ledger import Entry, entry, not_judged
+from analyses.validation.riding import ride, riding_at
+from reports.cli.main import main
+from reports.sections.validation import section
+
+CONDITIONAL = Path(__file__).with_name("conditional.toml")
+OWN = Settings(large_signals=False, friction_effects=False, specification=False)
+EACH = {
+    "bandwidth",
+    "bandwidth_90deg",
+    "resonance_peak",
+    "phase_margin",
+    "gain_margin_up",
+    "gain_margin_down",
+    "delay_margin",
+    "sensitivity_peak",
+    "complementary_peak",
+    "rise_time",
+    "overshoot",
+    "settling_time",
+}
+
+
+@pytest.fixture(scope="module", params=["ilr33-amber", "ilr33-amber-multirate"])
+def found(request: pytest.FixtureRequest) -> Validation:
+    return validate(load_design(request.param), OWN)
+
+
+def rows(found: Validation, loop: str, quantity: str) -> list[Entry]:
+    return [row for row in found.ledger if row.loop == loop and row.quantity == quantity]
+
+
+def test_every_prediction_of_every_loop_is_there_and_holds(found: Validation) -> None:
+    for loop in ("current", "velocity", "position"):
+        judged = {row.quantity for row in found.ledger if row.loop == loop and row.passed is not None}
+        assert judged >= EACH, loop
+    assert found.failed == ()
+    assert found.passed
+
+
+def test_figures_are_met_far_within_their_tolerances(found: Validation) -> None:
+    """The simulator is the sampled loop while nothing acts: frequencies 1e-5, dB 1e-3, samples the same."""
+    for row in found.ledger:
+        if row.passed is None or row.difference is None:
+            continue
+        if row.unit == "Hz":
+            assert abs(row.difference) < 1e-5 * row.predicted, row
+        elif row.unit in ("dB", "deg") and "margin_" not in row.quantity:
+            assert abs(row.difference) < 1e-3, row
+        elif row.unit == "s" and "margin" not in row.quantity:
+            assert abs(row.difference) < 1e-9, row
+
+
+def test_what_cannot_hold_is_shown_with_the_reason(found: Validation) -> None:
+    shown = [row for row in found.ledger if row.passed is None]
+    assert shown
+    assert all(row.reason for row in shown)
+    steps = [row for row in shown if row.quantity == "rise_time"]
+    assert len(steps) == len(load_design("ilr33-amber").validation.amplitude_fractions)
+    assert all("speed limit" in row.reason and "dry friction" in row.reason for row in steps)
+    assert all(row.measured > row.predicted for row in steps)
+
+
+def test_from_rest_dry_friction_costs_bandwidth(found: Validation) -> None:
+    (at_rest,) = (row for row in rows(found, "position", "bandwidth") if row.passed is None)
+    assert "dry friction" in at_rest.reason
+    assert at_rest.measured < 0.99 * at_rest.predicted
+
+
+def test_break_points_are_swept_with_all_loops_closed(found: Validation) -> None:
+    assert set(found.points) == {"u", "i_ref"}
+    for point in found.points.values():
+        assert point.sweep.valid.all()
+        assert point.open_errors.worst_gain_db < 1e-4
+
+
+def test_without_friction_and_limits_steps_from_rest_are_judged() -> None:
+    """A drive without dry friction, a step that no limit touches: the prediction has to hold there too."""
+    design = load_design("ctms-motor-position")
+    small = replace(design.validation, amplitude_fractions=(0.05, 1.0))
+    result = validate(replace(design, validation=small), OWN)
+    rest = [row for row in result.ledger if row.condition.startswith("from rest, step")]
+    assert [row.passed for row in rest] == [True] * 6
+    assert result.passed
+
+
+def test_a_failure_is_a_failure() -> None:
+    assert entry("position", "bandwidth", "Hz", 10.0, 10.02, 0.01).passed is False
+    assert entry("position", "bandwidth", "Hz", 10.0, 10.005, 0.01).passed is True
+    assert entry("position", "bandwidth", "Hz", 10.0, None, 0.01).passed is False
+    assert entry("position", "gain_margin", "dB", None, 3.0, 0.01).passed is False
+    assert entry("position", "gain_margin", "dB", float("inf"), None, 0.01).passed is True
+    assert not_judged("position", "overshoot", "%", 1.0, 2.0, "a limit").passed is None
+
+
+def test_a_failed_entry_fails_the_validation(found: Validation) -> None:
+    bad = entry("position", "bandwidth", "Hz", 10.0, 10.02, 0.01)
+    worse = replace(found, ledger=(*found.ledger, bad))
+    assert worse.failed == (bad,)
+    assert not worse.passed
+
+
+def test_an_unstable_loop_is_reported_not_raised() -> None:
+    design = load_design("ilr33-amber")
+    loud = replace(design.controller, velocity=replace(design.controller.velocity, gain=3.0))
+    result = validate(replace(design, controller=loud), OWN)
+    assert not result.passed
+    bad = [row for row in result.ledger if row.quantity == "stability"]
+    assert {row.loop for row in bad} >= {"velocity"}
+    assert all("not stable" in row.reason for row in bad)
+
+
+def test_ride_leaves_room_everywhere() -> None:
+    design = load_design("ilr33-amber")
+    limits, found = design.limits, ride(design)
+    assert 0.2 * limits.speed_rad_s < found.speed_rad_s <= 0.4 * limits.speed_rad_s
+    assert found.voltage_V <= 0.4 * limits.voltage_V
+    assert found.current_A <= 0.4 * limits.peak_current_A
+    at_speed = riding_at(design, 100.0)
+    friction = design.friction
+    assert at_speed.current_A * 5.9e-3 == pytest.approx(
+        friction.dry_Nm(0.0) + 100.0 * friction.viscous(), rel=1e-12
+    )
+
+
+def test_a_drive_that_cannot_ride_is_refused() -> None:
+    design = load_design("ilr33-amber")
+    stuck = replace(design, friction=replace(design.friction, dry_torque_Nm=0.1))
+    with pytest.raises(InputError, match="no steady motion"):
+        validate(stuck, QUICK)
+
+
+def test_sections_put_the_verdicts_first(found: Validation) -> None:
+    made = section(found)
+    assert made[0]["id"] == "validation"
+    assert made[0]["blocks"][0]["kind"] == "verdicts"
+    assert all(item["passed"] for item in made[0]["blocks"][0]["items"])
+    figures = [block["figure"] for part in made for block in part["blocks"] if block["kind"] == "figure"]
+    assert figures.count("overlay_sweep") == 3
+    assert {"rest_sweep", "confirmation"} <= set(figures)
+    json.dumps(made, allow_nan=False)
+
+
+def test_command_passes_and_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "ctms-motor-position", "--quick", "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["kind"] == "validation"
+    assert made["verdict"]["passed"] is True
+
+
+def test_command_fails_on_the_conditional_design(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert main(["validate", str(CONDITIONAL), "--quick", "--quiet"]) == 1
+    out = capsys.readouterr().out
+    assert "do not settle" in out
+    assert "FAIL" in out
+    assert not list(tmp_path.iterdir())
+
+
+def test_command_refuses_an_unknown_design(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "no-such-drive"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
