@@ -26,7 +26,8 @@ def design_report(
     ----------
     design : Design
     validation : sequence of section, optional
-        Sections of the validator, put after those of the loops; their verdicts count.
+        Sections of the validator (or others), put after those of the loops, the verdicts of the validator
+        before them; their verdicts count.
     progress : callable, optional
         Called with (steps done, steps in all).
 
@@ -48,9 +49,13 @@ def design_report(
     survey = survey_loops(design, progress)
     verdicts = evaluate_requirements(design, survey.figures)
     origin, head = provenance(design_hash(design)), design_head(design)
+    requirements, *loops = loop_sections(survey, verdicts)
+    first = [part for part in validation if part["id"] == "validation"]
     sections = [
-        *loop_sections(survey, verdicts),
-        *validation,
+        requirements,
+        *first,
+        *loops,
+        *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design)),
     ]
     return doc.document(

@@ -19,6 +19,11 @@ from actuator_lti.errors import InputError
 SCHEMA = "actuator-lti/report"
 VERSION = 1
 STATUSES = ("pass", "fail", "warn", "info")
+WORDS = {
+    "requirements": ("requirements", "met", "not met"),
+    "checks": ("checks by simulation", "passed", "failed"),
+    "odds": ("requirements under tolerances", "met", "not met"),
+}
 BLOCK_KEYS: dict[str, tuple[str, ...]] = {
     "table": ("caption", "columns", "rows"),
     "figure": ("figure", "data", "caption", "alt"),
@@ -155,9 +160,9 @@ def verdict(
     )
 
 
-def verdicts(items: Iterable[Mapping[str, Any]]) -> Block:
-    """Make a list of verdicts."""
-    return {"kind": "verdicts", "items": [plain(item) for item in items]}
+def verdicts(items: Iterable[Mapping[str, Any]], what: str = "requirements") -> Block:
+    """Make a list of verdicts; ``what`` is a key of `WORDS`."""
+    return {"kind": "verdicts", "items": [plain(item) for item in items], "what": what}
 
 
 def details(title: str, blocks: Sequence[Block]) -> Block:
@@ -198,15 +203,43 @@ def document(
 
 
 def summary(sections: Sequence[Section]) -> dict[str, Any]:
-    """Count the verdicts: passed only if none failed; those not judged are counted apart."""
-    outcomes = [item["passed"] for part in sections for block in walk(part) for item in _verdict_items(block)]
-    failed = sum(outcome is False for outcome in outcomes)
+    """Count the verdicts, of each kind too: passed if none failed; those not judged are counted apart."""
+    outcomes: dict[str, list[bool | None]] = {}
+    for part in sections:
+        for block in walk(part):
+            if block["kind"] == "verdicts":
+                kind = outcomes.setdefault(block.get("what", "requirements"), [])
+                kind += [item["passed"] for item in block["items"]]
+    whole = _counts([outcome for kind in outcomes.values() for outcome in kind])
+    parts = {what: _counts(kind) for what, kind in outcomes.items()}
+    return {"passed": whole["failed"] == 0, **whole, "parts": parts}
+
+
+def _counts(outcomes: Sequence[bool | None]) -> dict[str, int]:
     return {
-        "passed": failed == 0,
-        "failed": failed,
+        "failed": sum(outcome is False for outcome in outcomes),
         "not_judged": sum(outcome is None for outcome in outcomes),
         "total": len(outcomes),
     }
+
+
+def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
+    """Say a document's verdict in words, a line for each kind.
+
+    Examples
+    --------
+    >>> verdict_words({"parts": {"requirements": {"failed": 1, "not_judged": 0, "total": 12}}})
+    ['1 of 12 requirements not met']
+    """
+    parts = verdict.get("parts") or {"requirements": verdict}
+    return [_words(what, counts) for what, counts in parts.items() if counts["total"]]
+
+
+def _words(what: str, counts: Mapping[str, int]) -> str:
+    name, good, bad = WORDS.get(what, (what, "passed", "failed"))
+    total, failed, unjudged = counts["total"], counts["failed"], counts["not_judged"]
+    words = f"{failed} of {total} {name} {bad}" if failed else f"{total - unjudged} of {total} {name} {good}"
+    return words + (f", {unjudged} not judged" if unjudged else "")
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:
@@ -282,11 +315,6 @@ def _check_blocks(part: Mapping[str, Any], origin: str | None) -> None:
         missing = [key for key in BLOCK_KEYS[kind] if key not in block]
         if missing:
             raise InputError(f"section {part['id']!r}: a {kind} lacks {', '.join(missing)}", where=origin)
-
-
-def _verdict_items(block: Block) -> Sequence[Mapping[str, Any]]:
-    """Give the verdicts of a block, if it holds any."""
-    return block["items"] if block["kind"] == "verdicts" else ()
 
 
 def _compact(value: Any) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from reports.document import figures
+from reports.document import figures, verdict_words
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
 
@@ -66,6 +66,7 @@ def render(template: str, **context: Any) -> str:
             stylesheet=Markup(asset("style.css")),
             script=Markup(asset("page.js")),
             security_policy=security_policy(asset("page.js")),
+            verdict_words=verdict_words,
             unique=lambda letter: f"{letter}{next(counter)}",
             **context,
         )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Annotated
 
 import typer
@@ -55,10 +54,7 @@ def about(
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:
     """Add a command: the function of its name, or the typer application `app` where it has sub-commands."""
-    module_name = f"reports.cli.{command}"
-    if find_spec(module_name) is None:  # during construction only
-        return
-    module = import_module(module_name)
+    module = import_module(f"reports.cli.{command}")
     group = getattr(module, "app", None)
     if isinstance(group, typer.Typer):
         app.add_typer(group, name=command, rich_help_panel=panel)

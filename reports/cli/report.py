@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,9 @@ from reports.cli.options import (
     QuietOption,
 )
 
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
 ProcessesOption = Annotated[
     int, typer.Option("--processes", min=1, max=64, metavar="N", help="Processes that draw the figures.")
 ]
@@ -25,12 +28,17 @@ IncludeOption = Annotated[
         "--include", metavar="JSON", help="Add the sections that identify or correlate wrote (repeatable)."
     ),
 ]
+ValidationOption = Annotated[
+    bool,
+    typer.Option("--validation/--no-validation", help="Check every linear prediction by simulation, too."),
+]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
     out: OutOption = DEFAULT_OUT,
+    validation: ValidationOption = True,
     processes: ProcessesOption = 2,
     pdf: PdfOption = False,
     include: IncludeOption = None,
@@ -47,10 +55,12 @@ def report(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
-    from reports.document import dumps, load
+    from reports.document import dumps, load, verdict_words
 
     drive = load_design(design)
     added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]
+    if validation:
+        added = [*_validated(drive, quiet), *added]
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
         made = design_report(drive, added, progress=computing)
     with progress("drawing figures", quiet=quiet) as drawing:
@@ -62,17 +72,19 @@ def report(
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
-        print_line(f"{_summary(made['verdict'])}\n" + "\n".join(map(str, written)))
+        words = verdict_words(made["verdict"]) or ["no requirement in the design file"]
+        print_line("\n".join([*words, *map(str, written)]))
     leave_with(made["verdict"]["passed"] and not _unstable(made))
 
 
-def _summary(verdict: dict[str, int]) -> str:
-    """Say in one line how the requirements came out."""
-    if not verdict["total"]:
-        return "no requirement in the design file"
-    judged = verdict["total"] - verdict["not_judged"]
-    met = f"{judged - verdict['failed']} of {verdict['total']} requirements met"
-    return met + (f", {verdict['not_judged']} not judged" if verdict["not_judged"] else "")
+def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
+    """Put the linear predictions to the simulator, and give the sections about it."""
+    from analyses.validation import validate
+    from reports.cli.progress import progress
+    from reports.sections.validation import section
+
+    with progress(f"validating {drive.name}", quiet=quiet) as validating:
+        return section(validate(drive, progress=validating))
 
 
 def _unstable(made: dict[str, object]) -> bool:

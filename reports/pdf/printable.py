@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.document import figures
+from reports.document import figures, verdict_words
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.nightly.text import visible
@@ -59,15 +59,7 @@ def clean(value: object, limit: int = MAX_CELL) -> str:
 
 
 def _overall(verdict: Mapping[str, Any]) -> str:
-    total, failed, open_ = verdict["total"], verdict["failed"], verdict.get("not_judged", 0)
-    if not total:
-        return "No requirement is stated"
-    text = (
-        f"{failed} of {total} requirements not met"
-        if failed
-        else f"{total - open_} of {total} requirements met"
-    )
-    return text + (f", {open_} not judged" if open_ else "")
+    return "; ".join(verdict_words(verdict)) or "No requirement is stated"
 
 
 def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[str]]:

@@ -24,7 +24,7 @@ def section(result: FrictionEffects) -> dict[str, Any]:
     fine, small = 1e3 * scale, {"°": "m°", "mm": "µm"}[unit]
     load = load_unit(result.design)
     items = [_cycle_verdict(point, fine, small, load) for point in result.points]
-    blocks = [doc.verdicts(items), _threshold_table(result, fine, small, load)]
+    blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
     figure = _figure(result, fine, small, load)
     blocks += [figure] if figure else []
     blocks += [_settling_table(result, fine, small, load)]

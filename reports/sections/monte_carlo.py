@@ -56,7 +56,7 @@ def section(
         Probability to be met with 95 % confidence; without it every sample and the worst case must pass.
     """
     items = [_verdict(odds, _case(result, odds), at_least) for odds in result.odds if odds.id != "all"]
-    blocks: list[dict[str, Any]] = [doc.verdicts(items)] if items else []
+    blocks: list[dict[str, Any]] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
         blocks += _figures(result)

@@ -37,7 +37,19 @@ def made(**changes: Any) -> dict[str, Any]:
 
 
 def test_verdicts_are_counted_wherever_they_stand() -> None:
-    assert made()["verdict"] == {"passed": False, "failed": 1, "not_judged": 1, "total": 3}
+    counts = {"failed": 1, "not_judged": 1, "total": 3}
+    assert made()["verdict"] == {"passed": False, **counts, "parts": {"requirements": counts}}
+
+
+def test_checks_and_requirements_are_told_apart() -> None:
+    check = doc.verdict("d", "D", value=1.0, limit=2.0, unit="", distance=1.0, passed=True)
+    parts = [*made()["sections"], doc.section("two", "Two", [doc.verdicts([check], what="checks")])]
+    found = doc.summary(parts)
+    assert (found["failed"], found["total"]) == (1, 4)
+    assert doc.verdict_words(found) == [
+        "1 of 3 requirements not met, 1 not judged",
+        "1 of 1 checks by simulation passed",
+    ]
 
 
 def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
