@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from analyses.large_signal.classify import WAVEFORMS
 from analyses.large_signal.map import AmplitudeMap
 
 MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
@@ -25,7 +26,7 @@ class AmplitudeBode:
         Of full deflection.
     amplitude_rad : ndarray, shape (k,)
     gain_db, phase_deg : ndarray, shape (k, f)
-        Of the fundamental; -inf and NaN where nothing moves.
+        Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle.
     linear_db, linear_deg : ndarray, shape (f,)
     all_amplitude_rad : ndarray, shape (a,)
         Every amplitude of the map.
@@ -58,7 +59,9 @@ def amplitude_bode(design: Design, found: AmplitudeMap) -> AmplitudeBode:
     full = design.validation.full_deflection_rad
     fractions = tuple(sorted(design.validation.amplitude_fractions))
     places = [int(np.argmin(np.abs(found.amplitude_rad - fraction * full))) for fraction in fractions]
-    gain, phase, hz = found.gain_db, found.phase_deg, found.frequency_hz
+    hz, unsteady = found.frequency_hz, found.waveform == WAVEFORMS.index("not steady")
+    gain = np.where(unsteady, np.nan, found.gain_db)
+    phase = np.where(unsteady, np.nan, found.phase_deg)
     linear_db = 20.0 * np.log10(np.abs(found.linear))
     linear_deg = np.degrees(np.unwrap(np.angle(found.linear)))
     first_3 = np.array([_crossing(hz, row, MINUS_3DB) for row in gain])

@@ -128,12 +128,13 @@ def _manoeuvre(
     count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
     torque = motor_torque_Nm(design, run)[-count:]
     current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
-    thin = slice(None, None, max(1, count // POINTS))
+    speed = run.motor_speed_rad_s[-count:]
+    thin = _thinned(speed, torque)
     rms = None if current is None else float(np.sqrt(np.mean(current**2)))
     return Manoeuvre(
         name=name,
         load_Nm=load_Nm,
-        speed_rad_s=run.motor_speed_rad_s[-count:][thin],
+        speed_rad_s=speed[thin],
         torque_Nm=torque[thin],
         rms_current_A=rms,
         peak_current_A=None if current is None else float(current.max()),
@@ -143,6 +144,15 @@ def _manoeuvre(
         limits={key: use.fraction for key, use in run.limits.items() if use.active},
         periodic=period is not None,
     )
+
+
+def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
+    spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
+    way = np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1]))
+    way = np.concatenate([[0.0], way])
+    places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
+    return np.unique(np.minimum(places, len(way) - 1))
 
 
 def motor_torque_Nm(design: Design, run: Trajectory) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from reports.figures import style
 
@@ -51,6 +51,7 @@ def _waits(ax: Axes, data: dict[str, Any]) -> None:
     ax.set_xscale("log")
     ax.set_yscale("log")
     for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(style.plain_decade))
         axis.set_minor_formatter(FuncFormatter(lambda _value, _position: ""))
     ax.set_title("Wait before a small step moves the output")

@@ -71,6 +71,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     style.log_frequency(ax, "command frequency, Hz")
     ax.yaxis.set_major_formatter(FuncFormatter(style.plain_decade))
     ax.set_ylabel(f"command amplitude, {data['unit']}")
+    ax.set_title("What limits a sine command, by amplitude and frequency")
     ax.grid(visible=False)
     ax.set_xlim(xe[0], xe[-1])
     ax.set_ylim(ye[0], ye[-1])

@@ -23,8 +23,11 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     axes = fig.subplots(rows, len(columns), sharex=True, sharey="row", squeeze=False)
     for k, column in enumerate(columns):
         _column(axes[:, k], column, data, first=k == 0)
-    room = 1.45 * max(abs(v) for column in columns for v in column["reference"])
-    axes[0, 0].set_ylim(-room, room)
+    reach = max(abs(v) for column in columns for v in column["reference"])
+    axes[0, 0].set_ylim(-1.6 * reach, 1.95 * reach)
+    fig.suptitle(
+        "Sawtooth: a sine faster than the rate limit", x=0.01, ha="left", fontsize=9.5, weight="bold"
+    )
     words: dict[str, Any] = {"loc": "lower right", "ncols": 2, "columnspacing": 1.2}
     axes[0, 0].legend(**words)
     axes[1, 0].legend(**words)
@@ -51,7 +54,7 @@ def _column(axes: Any, column: dict[str, Any], data: dict[str, Any], *, first: b
     if first:
         position.set_ylabel(f"position, {data['unit']}")
         rate.set_ylabel(f"rate, {data['rate_unit']}")
-        low = -1.02 * data["rate_limit"]
+        low = -1.06 * data["rate_limit"]
         rate.text(time[0], low, "rate limit", color=style.RED, fontsize=8.5, va="top")
     if len(axes) > 2:
         axes[2].plot(time, column["current"], color=style.ORANGE)

@@ -1,6 +1,6 @@
 """The torque-speed plane of the motor: bounds, what steady motion needs, and paths of manoeuvres.
 
-Data: ``bounds``, ``demands``, ``paths`` of ``label``, ``speed``, ``torque``; ``speed_label``,
+Data: ``title``; ``bounds``, ``demands``, ``paths`` of ``label``, ``speed``, ``torque``; ``speed_label``,
 ``torque_label``; ``top`` (torque up to which the frame reaches), ``fast`` (speed likewise).
 Motion backwards is turned by half a turn, so that torque below zero brakes.
 """
@@ -41,6 +41,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
             demand["speed"], demand["torque"], color=style.INK, linewidth=1.4, linestyle=(0, (2, 1.5)),
             marker="os^D"[k % 4], markersize=4.0, markevery=8, label=demand["label"],
         )  # fmt: skip
+    ax.set_title(data["title"])
     ax.set_xlabel(data["speed_label"])
     ax.set_ylabel(data["torque_label"])
     fig.legend(loc="outside right upper")

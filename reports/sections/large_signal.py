@@ -22,10 +22,13 @@ if TYPE_CHECKING:
 
 def section(result: LargeSignals) -> dict[str, Any]:
     """Make the section from `analyses.large_signal.large_signals`."""
+    from analyses.large_signal.classify import CAUSE_RULE, CRITERIA
+
     design = result.design
     scale, unit = output_unit(design)
     items = [_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
-    blocks = [doc.verdicts(items), _map_figure(result, scale, unit)]
+    rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
+    blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
     if result.border is not None and np.isfinite(result.border.predicted_rad).any():
         blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
@@ -102,7 +105,7 @@ def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
 
 def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
     """Make the map with the linear onset lines and the simulated border."""
-    from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA, WAVEFORMS
+    from analyses.large_signal.classify import CAUSES, WAVEFORMS
 
     found, design = result.map, result.design
     points = [
@@ -136,8 +139,9 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
         "unit": unit,
     }
     caption = (
-        f"{design.name}: what limits a sine command, by its amplitude and frequency, no load, with friction. "
-        f"{CAUSE_RULE} Waveform of the output: {CRITERIA}"
+        f"{design.name}: what limits a sine command, at no load, with friction. Colour: what acts longest; "
+        "marks: waveform of the output; lines: amplitude at which the linear loop reaches each limit; "
+        "diamonds and triangles on them: where the simulator first does."
     )
     return doc.figure("map", data, caption=caption, alt=_map_words(found))
 
@@ -261,8 +265,9 @@ def _sawtooth_blocks(found: Sawtooth, design: Design, scale: float, unit: str) -
     }
     caption = (
         f"A sine of {scale * found.amplitude_rad:.3g} {unit} at {found.frequency_hz:.3g} Hz, three times "
-        f"faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. In the boxes what "
-        "was simulated, in brackets what a pure rate limit would do: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
+        f"faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. In the boxes "
+        "what was simulated, in brackets what a pure rate limit would do: peak πR/2w, gain 4/(πx), lag "
+        "arccos(π/2x)."
     )
     return [doc.figure("sawtooth", data, caption=caption, alt=caption)]
 
@@ -273,8 +278,8 @@ def _sawtooth_column(run: SawtoothRun, found: Sawtooth, scale: float, unit: str,
     peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"
     impure = f"distortion {100.0 * run.distortion:.1f} % (12.1 %)"
     note = (
-        f"peak {scale * run.peak_rad:.3g} {unit} ({peak})   gain {run.gain:.3f} ({formula.gain:.3f})\n"
-        f"lag {run.lag_deg:.1f}° ({formula.lag_deg:.1f}°)   {impure}"
+        f"peak {scale * run.peak_rad:.3g} {unit} ({peak}) · gain {run.gain:.3f} ({formula.gain:.3f})\n"
+        f"lag {run.lag_deg:.1f}° ({formula.lag_deg:.1f}°) · {impure}"
     )
     return {
         "title": f"load {run.load_Nm:g} {load}",

@@ -98,6 +98,7 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
                 if curve.name.startswith(wanted)
             ],
             "paths": paths,
+            "title": f"Torque and speed of the motor, load {load:g} {unit}",
             "speed_label": speed_label,
             "torque_label": torque_label,
             "top": strong * _top(result, moves),
