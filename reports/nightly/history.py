@@ -1,7 +1,7 @@
 """The history: every figure of every night, in one SQLite file in write-ahead mode.
 
-The numbers of a result are one block of float64 in the order of its layout (the list of its figures); a
-result that has not changed since is stored once and referred to, its layout and inputs as well.  A night
+The numbers of a result are one block of float64 in the order of its layout (the list of its figures).
+Numbers, layouts and inputs that are the same as before are stored once and referred to.  A night
 is written in one transaction: it is there whole, or not at all.
 """
 
@@ -147,9 +147,10 @@ class History:
         body = canonical(result.inputs or {})
         inputs = self._id("inputs", "sha", {"sha": sha256(body), "body": zlib.compress(body.encode())})
         values = np.array([np.nan if f.value is None else f.value for f in result.figures], dtype="<f8")
+        digest = bytes.fromhex(sha256(f"{layout}:".encode() + values.tobytes()))[:16]
+        vector = self._id("vectors", "sha", {"sha": digest, "layout": layout, "numbers": values.tobytes()})
         cursor = self.connection.execute(
-            "INSERT INTO snapshots(key, layout, input, numbers) VALUES (?, ?, ?, ?)",
-            (result.key, layout, inputs, values.tobytes()),
+            "INSERT INTO snapshots(key, vector, input) VALUES (?, ?, ?)", (result.key, vector, inputs)
         )
         return int(cursor.lastrowid or 0)
 
@@ -271,7 +272,8 @@ class History:
         if snapshot is None:
             return {}
         layout, numbers = self.connection.execute(
-            "SELECT layout, numbers FROM snapshots WHERE id = ?", (snapshot,)
+            "SELECT v.layout, v.numbers FROM snapshots s JOIN vectors v ON v.id = s.vector WHERE s.id = ?",
+            (snapshot,),
         ).fetchone()
         known = self.figure_table()
         values = np.frombuffer(numbers, dtype="<f8")
@@ -320,7 +322,9 @@ class History:
             part = snapshots[start : start + 500]
             marks = ",".join("?" * len(part))
             yield from self.connection.execute(
-                f"SELECT id, layout, numbers FROM snapshots WHERE id IN ({marks})", part
+                "SELECT s.id, v.layout, v.numbers FROM snapshots s JOIN vectors v ON v.id = s.vector"
+                f" WHERE s.id IN ({marks})",
+                part,
             ).fetchall()
 
 

@@ -12,6 +12,7 @@ from reports.nightly.figures import Figure
 from reports.nightly.text import one_line
 
 RELATIVE = 1e-3
+FLOOR = 1e-9  # below it a figure is rounding, whatever its unit
 ABSOLUTE = {"dB": 0.01, "deg": 0.05, "%": 0.05, "samples": 0.01, "s": 1e-7}
 MAX_RULES = 200
 
@@ -42,7 +43,7 @@ class Tolerances:
         for rule in self.rules:
             if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
                 return rule.value(size)
-        return max(ABSOLUTE.get(figure.unit, 0.0), RELATIVE * abs(size))
+        return max(ABSOLUTE.get(figure.unit, FLOOR), RELATIVE * abs(size))
 
 
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:

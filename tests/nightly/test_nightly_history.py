@@ -55,6 +55,17 @@ def test_an_unchanged_result_is_stored_once(tmp_path) -> None:
         assert history.inputs(history.results(name="a")[0].snapshot)["parameters"] == {"p": "1"}
 
 
+def test_the_same_numbers_from_other_code_are_stored_once(tmp_path) -> None:
+    with open_history(tmp_path / "h.sqlite") as history:
+        for day in (1, 2, 3):
+            history.finish_run(start(history, day), "x", [result(key=f"k{day}")])
+        counts = [
+            history.connection.execute(f"SELECT count(*) FROM {t}").fetchone()[0]
+            for t in ("snapshots", "vectors")
+        ]
+        assert counts == [3, 1]
+
+
 def test_a_matrix_follows_figures_that_come_and_go(tmp_path) -> None:
     with open_history(tmp_path / "h.sqlite") as history:
         for day, values in enumerate([{"x": 1.0}, {"x": 2.0, "y": 5.0}, {"y": 6.0}], start=1):
