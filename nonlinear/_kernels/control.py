@@ -50,12 +50,10 @@ def measured_speed(p, th, w, angles, place, filtered, period):  # type: ignore[n
 
 
 @scalar
-def count_limits(flags, k, in_window, out):  # type: ignore[no-untyped-def]
-    """Count the ticks in which each limiter acts, in all and in the last window, and note the first."""
+def note_limits(flags, new, k, in_window, out):  # type: ignore[no-untyped-def]
+    """Note the tick of each limiter that acts for the first time, and count the ticks in the last window."""
     for j in range(4):
-        if flags & (1 << j):
-            out[layout.OUT_LIMIT_TICKS + j] += 1.0
-            if in_window:
-                out[layout.OUT_WINDOW_LIMITS + j] += 1.0
-            if out[layout.OUT_LIMIT_FIRST + j] < 0.0:
-                out[layout.OUT_LIMIT_FIRST + j] = k
+        if new & (1 << j):
+            out[layout.OUT_LIMIT_FIRST + j] = k
+        if in_window and flags & (1 << j):
+            out[layout.OUT_WINDOW_LIMITS + j] += 1.0

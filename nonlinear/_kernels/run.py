@@ -8,7 +8,7 @@ import numpy as np
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import kernel
-from nonlinear._kernels.control import clamp, count_limits, measured_angle, measured_speed, pi
+from nonlinear._kernels.control import clamp, measured_angle, measured_speed, note_limits, pi
 from nonlinear._kernels.probes import memory_size, probe
 from nonlinear._kernels.reduce import clear, extremes, step_figures, window
 from nonlinear._kernels.segment import CONSTANTS, DECAY, LENGTH, RINGING, SMOOTH, prepare, segment, slip_step
@@ -65,7 +65,9 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
     # a segment is looked at closely where energies are asked for or w' may turn twice
     close = ringing or p[layout.WITH_ENERGY] > 0.0
     Cv_p, Cv_m = p[layout.VISCOUS], p[layout.VISCOUS_REVERSE]
-    Tcp, Tcm, Tb = p[layout.DRY], p[layout.DRY_REVERSE], 0.0
+    dry = CM * abs(p[layout.LOAD])
+    Tcp, Tcm, Tb = p[layout.DRY] + dry, p[layout.DRY_REVERSE] + dry, back * p[layout.LOAD] - offset
+    varying = load_slope != 0.0 or load_length > 0 or torque_length > 0
     breakaway = p[layout.BREAKAWAY]
     locked_gain = 0.0 if p[layout.SOURCE] > 0.0 else 1.0 / p[layout.RESISTANCE]
 
@@ -104,6 +106,7 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
     into_window, which = -(ticks - 2 * length), 1
     y_last = 0.0
     total_events, max_events, stick_ticks = 0, 0, 0
+    acting_w, acting_a, acting_i, acting_u, seen = 0, 0, 0, 0, 0
     status, k = layout.OK, 0
 
     while k < ticks:
@@ -173,14 +176,18 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
         # -- what is kept ---------------------------------------------------------------------------
         flags = flag_w | flag_a | flag_i | flag_u
         if flags:
-            count_limits(flags, k, k >= ticks - length, out)
+            acting_w, acting_a = acting_w + (flag_w > 0), acting_a + (flag_a > 0)
+            acting_i, acting_u = acting_i + (flag_i > 0), acting_u + (flag_u > 0)
+            if (flags & ~seen) != 0 or k >= ticks - length:
+                note_limits(flags, flags & ~seen, k, k >= ticks - length, out)
+                seen |= flags
         if s == 0.0:
             stick_ticks += 1
             if k >= ticks - length:
                 out[layout.OUT_WINDOW_STICK] += 1.0
             flags |= layout.FLAG_STICK
         if recording:
-            if since_record == 0:
+            if since_record == 0 and row >= 0:  # the second spares the compiler its checks
                 since_record = every
                 history[0, row] = ref
                 history[1, row] = th / N
@@ -237,15 +244,15 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
         u_first = queue[place]
         next_place = place + 1 if place + 1 < queue_size else 0
         u_second = queue[next_place]
-        M = p[layout.LOAD] + load_slope * th
-        if load_length > 0:
-            M += tables[int(p[layout.LOAD_TABLE]) + min(k, load_length - 1)]
-        if CM != 0.0:
+        if varying:
+            M = p[layout.LOAD] + load_slope * th
+            if load_length > 0:
+                M += tables[int(p[layout.LOAD_TABLE]) + min(k, load_length - 1)]
             dry = CM * abs(M)
             Tcp, Tcm = p[layout.DRY] + dry, p[layout.DRY_REVERSE] + dry
-        Tb = back * M - offset
-        if torque_length > 0:
-            Tb += tables[int(p[layout.TORQUE_TABLE]) + min(k, torque_length - 1)]
+            Tb = back * M - offset
+            if torque_length > 0:
+                Tb += tables[int(p[layout.TORQUE_TABLE]) + min(k, torque_length - 1)]
         events = 0
         for part in range(0 if split else 1, 2):
             held = u_first if part == 0 else u_second
@@ -286,7 +293,7 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
         k += 1
         if status != layout.OK:
             break
-        if not (abs(w) < FINITE and abs(i) < FINITE and abs(th) < FINITE):
+        if not (abs(w) < FINITE):  # the other states pass through w
             status = layout.NOT_FINITE
             break
         if (k & 0xFFFF) == 0:
@@ -295,6 +302,8 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
                 status = layout.CANCELLED
                 break
 
+    limit = layout.OUT_LIMIT_TICKS
+    out[limit], out[limit + 1], out[limit + 2], out[limit + 3] = acting_w, acting_a, acting_i, acting_u
     shared[0] = k
     out[layout.OUT_TICKS], out[layout.OUT_EVENTS] = k, total_events
     out[layout.OUT_MAX_EVENTS], out[layout.OUT_STICK_TICKS] = max_events, stick_ticks
