@@ -77,7 +77,7 @@ class Search:
     def rows(self, values: Floats) -> Floats:
         """One run a value."""
         window = coherent(
-            self.frequency_hz, self.setup.design.controller.period_s, self.setup.base_ticks, CYCLES
+            self.frequency_hz, self.setup.design.controller.period_s, self.setup.base_ticks, self.cycles
         )
         rows = np.array([self.row(float(value)) for value in values])
         rows[:, at.TICKS] = self.settle_ticks + 2 * window.ticks[0]
@@ -124,7 +124,7 @@ class Search:
         """First values to try, outwards from the nominal drive."""
         if self.kind == "delay":
             return np.geomspace(SHORTEST_DELAY_SAMPLES, LONGEST_DELAY_SAMPLES, 2 * VALUES)
-        steps = np.geomspace(1.0 + 1e-3, self.reach, 2 * VALUES)
+        steps = np.geomspace(1.0 + 1e-3, self.reach, 2 * VALUES if self.smooth else VALUES)
         return steps if self.kind == "gain up" else 1.0 / steps
 
     def frequency(self, result: BatchResult) -> Floats:

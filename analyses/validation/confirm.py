@@ -200,7 +200,7 @@ def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
     if kind == "gain up":
         return Search(setup, kind, 0.0625 / setup.period_s, wait, reach=100.0, smooth=False)
     hertz = 3.0 / (max(wait, 100) * setup.design.controller.period_s)
-    return Search(setup, kind, hertz, 3 * wait, reach=10.0, cycles=12, smooth=False)
+    return Search(setup, kind, hertz, 2 * wait, reach=10.0, cycles=6, smooth=False)
 
 
 def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:
