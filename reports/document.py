@@ -15,15 +15,11 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import InputError
+from reports.verdict_summary import summary
 
 SCHEMA = "actuator-lti/report"
 VERSION = 1
 STATUSES = ("pass", "fail", "warn", "info")
-WORDS = {
-    "requirements": ("requirements", "met", "not met"),
-    "checks": ("checks by simulation", "passed", "failed"),
-    "odds": ("requirements under tolerances", "met", "not met"),
-}
 BLOCK_KEYS: dict[str, tuple[str, ...]] = {
     "table": ("caption", "columns", "rows"),
     "figure": ("figure", "data", "caption", "alt"),
@@ -161,7 +157,7 @@ def verdict(
 
 
 def verdicts(items: Iterable[Mapping[str, Any]], what: str = "requirements") -> Block:
-    """Make a list of verdicts; ``what`` is a key of `WORDS`."""
+    """Make a list of verdicts; ``what`` is a key of `reports.verdict_summary.WORDS`."""
     return {"kind": "verdicts", "items": [plain(item) for item in items], "what": what}
 
 
@@ -195,51 +191,11 @@ def document(
         "subtitle": subtitle,
         "design": plain(design),
         "provenance": plain(provenance),
-        "verdict": summary(sections),
+        "verdict": summary(block for part in sections for block in walk(part)),
         "sections": list(sections),
     }
     check(made)
     return made
-
-
-def summary(sections: Sequence[Section]) -> dict[str, Any]:
-    """Count the verdicts, of each kind too: passed if none failed; those not judged are counted apart."""
-    outcomes: dict[str, list[bool | None]] = {}
-    for part in sections:
-        for block in walk(part):
-            if block["kind"] == "verdicts":
-                kind = outcomes.setdefault(block.get("what", "requirements"), [])
-                kind += [item["passed"] for item in block["items"]]
-    whole = _counts([outcome for kind in outcomes.values() for outcome in kind])
-    parts = {what: _counts(kind) for what, kind in outcomes.items()}
-    return {"passed": whole["failed"] == 0, **whole, "parts": parts}
-
-
-def _counts(outcomes: Sequence[bool | None]) -> dict[str, int]:
-    return {
-        "failed": sum(outcome is False for outcome in outcomes),
-        "not_judged": sum(outcome is None for outcome in outcomes),
-        "total": len(outcomes),
-    }
-
-
-def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
-    """Say a document's verdict in words, a line for each kind.
-
-    Examples
-    --------
-    >>> verdict_words({"parts": {"requirements": {"failed": 1, "not_judged": 0, "total": 12}}})
-    ['1 of 12 requirements not met']
-    """
-    parts = verdict.get("parts") or {"requirements": verdict}
-    return [_words(what, counts) for what, counts in parts.items() if counts["total"]]
-
-
-def _words(what: str, counts: Mapping[str, int]) -> str:
-    name, good, bad = WORDS.get(what, (what, "passed", "failed"))
-    total, failed, unjudged = counts["total"], counts["failed"], counts["not_judged"]
-    words = f"{failed} of {total} {name} {bad}" if failed else f"{total - unjudged} of {total} {name} {good}"
-    return words + (f", {unjudged} not judged" if unjudged else "")
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:

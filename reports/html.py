@@ -18,9 +18,10 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from reports.document import figures, verdict_words
+from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
+from reports.verdict_summary import verdict_lines
 
 SMALLEST, LARGEST = 0.92, 1.35  # pixels for a point of a figure: text stays between 8 and 12 pixels
 KICKERS = {"report": "Loop analysis report"}
@@ -66,7 +67,7 @@ def render(template: str, **context: Any) -> str:
             stylesheet=Markup(asset("style.css")),
             script=Markup(asset("page.js")),
             security_policy=security_policy(asset("page.js")),
-            verdict_words=verdict_words,
+            verdict_lines=verdict_lines,
             unique=lambda letter: f"{letter}{next(counter)}",
             **context,
         )

@@ -88,7 +88,7 @@ def verdict_table(block: Mapping[str, Any]) -> Table:
         status, word = WORDS[item["passed"]]
         word += f" ({item['reason']})" if item["reason"] else ""
         limit = f"{item['comparison']} {show(item['limit'])}"
-        cells = [show(item["value"], "sig:4"), limit, show_signed(item["distance"]), item["unit"]]
+        cells = [show(item["value"]), limit, show_signed(item["distance"]), item["unit"]]
         made.add_row(Text(item["label"]), Text(word, style=COLOURS[status]), *map(Text, cells))
     return made
 

@@ -55,7 +55,8 @@ def report(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
-    from reports.document import dumps, load, verdict_words
+    from reports.document import dumps, load
+    from reports.verdict_summary import verdict_words
 
     drive = load_design(design)
     added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]

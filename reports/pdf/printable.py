@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.document import figures, verdict_words
+from reports.document import figures, verdict_lines, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.nightly.text import visible
 from reports.numbers import show
+from reports.verdict_summary import verdict_words
 
 MAX_CELL = 600
 MAX_TEXT = 20_000
@@ -33,13 +34,10 @@ def printable(made: Mapping[str, Any]) -> dict[str, Any]:
         "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
         "title": clean(made.get("title"), MAX_TITLE),
         "subtitle": clean(made.get("subtitle"), 1200),
-        "passed": bool(made["verdict"]["passed"]),
-        "overall": _overall(made["verdict"]),
+        "overall": [[clean(words, 200), good] for words, good in verdict_lines(made["verdict"])],
         "facts": _facts(design, origin),
         "revision": clean(design.get("revision"), 60),
-        "verdicts": [
-            _verdict(item) for block in _walk(made) if block["kind"] == "verdicts" for item in block["items"]
-        ],
+        "verdicts": [_verdict(item) for item in _required(made)],
         "sections": [_section(part, drawings) for part in made["sections"]],
     }
 
@@ -58,10 +56,6 @@ def clean(value: object, limit: int = MAX_CELL) -> str:
     return _LONG_WORD.sub(lambda m: "\u200b".join(re.findall(r".{1,12}", m.group())), text)
 
 
-def _overall(verdict: Mapping[str, Any]) -> str:
-    return "; ".join(verdict_words(verdict)) or "No requirement is stated"
-
-
 def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[str]]:
     rows = [
         ("Design", design.get("name")),
@@ -74,11 +68,12 @@ def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[st
     return [[label, clean(value, 200)] for label, value in rows if value]
 
 
-def _walk(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
-    from reports.document import walk
-
+def _required(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
+    """Give the verdicts on the design's own requirements: what is signed."""
     for part in made["sections"]:
-        yield from walk(part)
+        for block in walk(part):
+            if block["kind"] == "verdicts" and block.get("what", "requirements") == "requirements":
+                yield from block["items"]
 
 
 def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:

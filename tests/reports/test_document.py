@@ -11,6 +11,7 @@ import pytest
 from actuator_lti.errors import InputError
 from reports import document as doc
 from reports.numbers import fixed, show, significant
+from reports.verdict_summary import summary, verdict_words
 
 
 def made(**changes: Any) -> dict[str, Any]:
@@ -44,9 +45,9 @@ def test_verdicts_are_counted_wherever_they_stand() -> None:
 def test_checks_and_requirements_are_told_apart() -> None:
     check = doc.verdict("d", "D", value=1.0, limit=2.0, unit="", distance=1.0, passed=True)
     parts = [*made()["sections"], doc.section("two", "Two", [doc.verdicts([check], what="checks")])]
-    found = doc.summary(parts)
+    found = summary(block for part in parts for block in doc.walk(part))
     assert (found["failed"], found["total"]) == (1, 4)
-    assert doc.verdict_words(found) == [
+    assert verdict_words(found) == [
         "1 of 3 requirements not met, 1 not judged",
         "1 of 1 checks by simulation passed",
     ]

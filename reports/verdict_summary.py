@@ -1,0 +1,56 @@
+"""The verdict of a whole document: how many of each kind passed, in numbers and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+WORDS = {
+    "requirements": ("requirements", "met", "not met"),
+    "checks": ("checks by simulation", "passed", "failed"),
+    "odds": ("requirements under tolerances", "met", "not met"),
+}
+
+
+def summary(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """Count the verdicts, of each kind too: passed if none failed; those not judged are counted apart."""
+    outcomes: dict[str, list[bool | None]] = {}
+    for block in blocks:
+        if block["kind"] == "verdicts":
+            kind = outcomes.setdefault(block.get("what", "requirements"), [])
+            kind += [item["passed"] for item in block["items"]]
+    whole = _counts([outcome for kind in outcomes.values() for outcome in kind])
+    parts = {what: _counts(kind) for what, kind in outcomes.items()}
+    return {"passed": whole["failed"] == 0, **whole, "parts": parts}
+
+
+def _counts(outcomes: Sequence[bool | None]) -> dict[str, int]:
+    return {
+        "failed": sum(outcome is False for outcome in outcomes),
+        "not_judged": sum(outcome is None for outcome in outcomes),
+        "total": len(outcomes),
+    }
+
+
+def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
+    """Say a document's verdict in words, a line for each kind.
+
+    Examples
+    --------
+    >>> verdict_words({"parts": {"requirements": {"failed": 1, "not_judged": 0, "total": 12}}})
+    ['1 of 12 requirements not met']
+    """
+    return [words for words, _ in verdict_lines(verdict)]
+
+
+def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, bool]]:
+    """Say a document's verdict in words, with whether it is good, for each kind of verdict."""
+    parts = verdict.get("parts") or {"requirements": verdict}
+    return [(_words(what, n), not n["failed"]) for what, n in parts.items() if n["total"]]
+
+
+def _words(what: str, counts: Mapping[str, int]) -> str:
+    name, good, bad = WORDS.get(what, (what, "passed", "failed"))
+    total, failed, unjudged = counts["total"], counts["failed"], counts["not_judged"]
+    words = f"{failed} of {total} {name} {bad}" if failed else f"{total - unjudged} of {total} {name} {good}"
+    return words + (f", {unjudged} not judged" if unjudged else "")
