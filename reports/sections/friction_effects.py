@@ -171,11 +171,11 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict
     if not loops:
         return None
     data = {"loops": loops, "waits": waits, "unit": small, "error_unit": small, "wait_unit": small}
-    caption = (
-        "Left: position error over a slow triangle at the command; without friction only the small lag stays."
-    )
+    caption = "Position error over a slow triangle at the command; without friction only the small lag stays."
     if waits:
-        caption += " Right: a step below the threshold waits until the speed integral has grown to breakaway."
+        caption += (
+            " Beside it: a step below the threshold waits until the speed integral has grown to breakaway."
+        )
     return doc.figure("hysteresis", data, caption=caption, alt=caption)
 
 

@@ -213,7 +213,7 @@ def _bode_figure(found: AmplitudeBode, scale: float, unit: str, full: float) -> 
     caption = (
         "Fundamental of the output over the command at several amplitudes, simulated with friction and "
         "limits at no load, and where gain and phase pass −3 dB (1/√2 of the command) and −90° at every "
-        "amplitude."
+        "amplitude. Gaps: not settled."
     )
     return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
 

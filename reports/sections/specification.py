@@ -98,15 +98,15 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
                 if curve.name.startswith(wanted)
             ],
             "paths": paths,
-            "title": f"Torque and speed of the motor, load {load:g} {unit}",
+            "title": f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}",
             "speed_label": speed_label,
             "torque_label": torque_label,
             "top": strong * _top(result, moves),
             "fast": fast * _fastest(result, moves),
         }
         caption = (
-            f"Motor torque over motor speed at {load:g} {unit}: bounds, what steady motion needs, and the "
-            "paths of standard manoeuvres at full deflection. Torque below zero brakes; backward motion is "
+            f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
+            "motion needs, and the paths of standard manoeuvres at full deflection. Torque below zero brakes; backward motion is "
             "turned over."
         )
         blocks.append(doc.figure("torque_speed", data, caption=caption, alt=caption))

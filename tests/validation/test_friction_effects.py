@@ -1,0 +1,139 @@
+"""Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
+from analyses.friction_effects import friction_effects
+from analyses.friction_effects.cycles import limit_cycles, settle
+from analyses.friction_effects.static import static_threshold
+
+
+@pytest.fixture(scope="module")
+def amber() -> Design:
+    return load_design("ilr33-amber")
+
+
+def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
+    """EMPS: (Fc -+ offset)/(gtau kv kp), forward and backward; the simulator agrees to its grid of 0.2 %."""
+    design = load_design("emps")
+    found = friction_effects(design).points[0].threshold
+    assert found is not None
+    stiffness = 35.15065 * 243.45 * 160.18
+    assert found.static.forward_rad == pytest.approx((20.3935 - 3.1648) / stiffness, rel=1e-12)
+    assert found.static.backward_rad == pytest.approx((20.3935 + 3.1648) / stiffness, rel=1e-12)
+    assert found.simulated_rad == pytest.approx(found.static.forward_rad, rel=1.1 * found.resolution)
+
+
+def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
+    design = load_design("emps")
+    point = friction_effects(design).points[0]
+    loop = point.hysteresis
+    assert loop is not None
+    assert loop.predicted_rad == pytest.approx(2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), rel=1e-12)
+    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-6)
+    threshold = static_threshold(design)
+    for one in point.cycles.settlings:
+        assert one.at_rest
+        assert 0.0 < abs(one.error_rad) <= max(threshold.forward_rad, threshold.backward_rad)
+
+
+def test_a_small_step_waits_for_the_integral(amber: Design) -> None:
+    """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N)."""
+    for point in friction_effects(amber).points:
+        found = point.threshold
+        assert found is not None
+        expected = point.dry_torque_Nm / (5.9e-3 * 0.12 * 120.0 * 2376.0)
+        assert found.static.forward_rad == pytest.approx(expected, rel=1e-12)
+        for wait in found.waiting:
+            assert wait.simulated_s is not None
+            assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
+
+
+def test_breakaway_above_friction_counts_in_the_threshold(amber: Design) -> None:
+    higher = with_values(amber, {"friction.breakaway_ratio": 1.5})
+    assert static_threshold(higher).forward_rad == pytest.approx(1.5 * static_threshold(amber).forward_rad)
+
+
+def test_the_integral_takes_lost_motion_and_error_away(amber: Design) -> None:
+    for point in friction_effects(amber).points:
+        loop = point.hysteresis
+        assert loop is not None
+        assert abs(loop.lost_motion_rad) < 1e-9 * loop.amplitude_rad
+        assert loop.largest_rad > 0.5 * static_threshold(amber, point.load_Nm).forward_rad
+        for one in point.cycles.settlings:
+            assert abs(one.error_rad) < 1e-6 * one.amplitude_rad
+
+
+@pytest.mark.parametrize(
+    ("breakaway", "hunts"),
+    [(1.0, False), (1.5, True)],
+)
+def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway: float, hunts: bool) -> None:
+    """A fast speed integral and high Kv: it hunts once breakaway exceeds sliding friction, else not.
+
+    A describing function of dry friction foresees none either way; the simulator refutes it.
+    """
+    values = {
+        "friction.breakaway_ratio": breakaway,
+        "control.velocity.integral_time": 3e-3,
+        "control.position.gain": 250.0,
+    }
+    design = with_values(amber, values)
+    threshold = static_threshold(design).forward_rad
+    found = limit_cycles(design, 0.0, 0.05 * design.validation.full_deflection_rad, threshold)
+    assert found.confirmations == ()
+    assert (found.hunting is not None) == hunts
+    assert found.as_foreseen == (not hunts)
+    if found.hunting is not None:
+        assert not found.hunting.limited
+        assert found.hunting.hunting_hz == pytest.approx(9.59, rel=0.01)
+        assert found.hunting.hunting_rad == pytest.approx(0.0991 * threshold, rel=0.02)
+        # the same from any start: it is a cycle, not a slow decay
+        again = settle(design, 0.0, 3.0 * threshold)
+        assert again.hunting_rad == pytest.approx(found.hunting.hunting_rad, rel=0.01)
+
+
+@pytest.mark.parametrize("load", [0.0, 8.0])
+def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(
+    amber: Design, load: float
+) -> None:
+    """Speed gain beyond its margin: small motion dies out, large grows; border to 15 %, frequency to 8 %."""
+    design = with_values(amber, {"control.velocity.gain": 3.0})
+    found = limit_cycles(design, load, 1e-4)
+    assert len(found.confirmations) == 1
+    item = found.confirmations[0]
+    assert not item.foreseen.stable
+    assert item.confirmed
+    assert item.simulated_ratio == pytest.approx(1.0, rel=0.15)
+    assert item.simulated_hz == pytest.approx(item.foreseen.frequency_hz, rel=0.08)
+
+
+def test_the_foreseen_amplitude_grows_with_friction(amber: Design) -> None:
+    """The slope 4 Tc/(pi W) at the border is the same, so W goes with Tc."""
+    design = with_values(amber, {"control.velocity.gain": 3.0})
+    small, large = (
+        limit_cycles(design, load, 1e-4).confirmations[0].foreseen.speed_amplitude_rad_s
+        for load in (0.0, 8.0)
+    )
+    friction = design.friction
+    assert large / small == pytest.approx(friction.dry_Nm(8.0) / friction.dry_Nm(0.0), rel=1e-9)
+
+
+def test_not_applicable_without_dry_friction() -> None:
+    found = friction_effects(load_design("ctms-motor-position"))
+    assert found.points == ()
+    assert "no dry friction" in found.reason
+
+
+def test_too_weak_to_move() -> None:
+    design = load_design("ilr33-amber")
+    weak = replace(design, limits=replace(design.limits, peak_current_A=0.3))
+    assert static_threshold(weak).forward_rad == math.inf
+    assert friction_effects(weak).points[0].threshold is None

@@ -1,0 +1,187 @@
+"""The map of large signals: its border against A_k(w), what acts, and what the output looks like."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design, onset
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
+from analyses.friction_effects.static import static_threshold
+from analyses.large_signal.border import check_border
+from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
+from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
+from analyses.large_signal.map import AmplitudeMap, amplitude_map
+from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones_run import run_tones
+
+SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
+
+
+@pytest.fixture(scope="module")
+def amber() -> Design:
+    return load_design("ilr33-amber")
+
+
+@pytest.fixture(scope="module")
+def amber_map(amber: Design) -> AmplitudeMap:
+    return amplitude_map(amber, assemble_loops(amber), counts=(17, 16))
+
+
+@pytest.mark.parametrize("hz", [0.3, 7.77, 100.0, 389.0])
+def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
+    design = load_design("ilr33-amber-multirate")
+    found, every = tone(hz, design), design.controller.position.every
+    updates = found.ticks // every
+    assert found.ticks == updates * every
+    assert math.gcd(found.cycles, updates) == 1
+    assert updates >= LEAST_UPDATES
+    assert found.cycles / (found.ticks * design.controller.period_s) == pytest.approx(
+        found.frequency_hz, rel=1e-12
+    )
+    assert found.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
+
+
+def test_amplitudes_hold_those_that_the_design_asks_for(amber: Design) -> None:
+    values = amplitudes(amber, 25, 1e-5)
+    full = amber.validation.full_deflection_rad
+    assert len(values) == 25
+    assert np.all(np.diff(values) > 0.0)
+    for fraction in amber.validation.amplitude_fractions:
+        assert np.min(np.abs(values - fraction * full)) == 0.0
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_onset_of_saturation_is_the_smallest_a_k(name: str) -> None:
+    """Within 1 % at 14 frequencies, friction off, and the limiter foreseen is the one that acts."""
+    design = load_design(name)
+    border = check_border(design, assemble_loops(design))
+    assert border is not None
+    assert len(border.frequency_hz) >= 12
+    assert border.resolution < 1e-3
+    assert border.largest_error is not None
+    assert border.largest_error < 0.002, border.ratio
+    assert all(border.same_limiter)
+    assert border.passed
+
+
+@pytest.mark.parametrize(
+    ("values", "limiter"),
+    [
+        ({"limits.acceleration": 2e3}, "acceleration"),
+        ({"limits.voltage": 0.4, "limits.speed": 60.0}, "voltage"),
+    ],
+)
+def test_other_limiters_have_their_turn(amber: Design, values: dict[str, float], limiter: str) -> None:
+    design = with_values(amber, values)
+    border = check_border(design, assemble_loops(design))
+    assert border is not None
+    assert limiter in border.simulated_limiter
+    assert border.passed
+
+
+def test_the_border_check_can_fail(amber: Design) -> None:
+    """Judged by the loops of another drive the border lies elsewhere."""
+    other = assemble_loops(with_values(amber, {"limits.peak_current": 11.6, "limits.speed": 912.0}))
+    border = check_border(amber, other)
+    assert border is not None
+    assert border.largest_error == pytest.approx(0.034, abs=0.004)
+    assert not border.passed
+
+
+def test_friction_shifts_the_border(amber: Design) -> None:
+    border = check_border(amber, assemble_loops(amber), friction_on=True)
+    assert border is not None
+    assert 0.01 < np.max(np.abs(border.ratio - 1.0)) < 0.1
+    # at low frequency it is the speed command that limits, which friction hardly changes
+    assert abs(border.ratio[0] - 1.0) < 0.005
+
+
+def test_without_friction_the_linear_response_holds_below_the_border(amber: Design) -> None:
+    loops = assemble_loops(amber)
+    tones = tuple(tone(f, amber) for f in (1.0, 8.0, 30.0, 120.0))
+    omega = np.array([t.omega_rad_s for t in tones])
+    start, border = linear_steady_state(loops, omega), onset(loops, omega)
+    which = np.arange(4)
+    for share, everything in ((0.95, True), (1.1, False)):
+        amplitude = share * border.amplitude_rad
+        begin = np.minimum(amplitude, 0.9 * border.amplitude_rad)
+        result = run_tones(amber, tones, which, amplitude, start, begin, friction_on=False)
+        linear = result.phasor("output_angle_rad") / amplitude / start.output
+        names = [CAUSES[k] for k in causes(result, start.output, amplitude)]
+        if everything:
+            np.testing.assert_allclose(linear, 1.0, atol=1e-7)
+            assert names == ["none"] * 4
+        else:
+            assert names == list(border.active)
+
+
+def test_the_linear_response_is_that_of_the_loops(amber: Design) -> None:
+    loops = assemble_loops(amber)
+    omega = 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
+    system = loops.reference_to_output
+    expected = system(np.exp(1j * omega * system.dt))
+    np.testing.assert_allclose(linear_steady_state(loops, omega).output, expected, rtol=1e-9)
+
+
+def test_what_the_map_shows(amber: Design, amber_map: AmplitudeMap) -> None:
+    cause, waveform = amber_map.cause, amber_map.waveform
+    assert CAUSES[cause[-1, 0]] == "speed"
+    assert WAVEFORMS[waveform[-1, 0]] == "triangle"
+    assert CAUSES[cause[0, 0]] == "stiction"
+    assert WAVEFORMS[waveform[0, 0]] == "stick-slip"
+    middle = len(amber_map.amplitude_rad) // 2
+    assert CAUSES[cause[middle, 0]] == "none"
+    assert WAVEFORMS[waveform[middle, 0]] == "sine"
+    assert abs(amber_map.gain_change_db[middle, 0]) < 0.1
+    assert abs(amber_map.phase_change_deg[middle, 0]) < 2.0
+    assert amber_map.share(("speed", "current", "acceleration")) > 0.3
+    assert "parabola" in {WAVEFORMS[k] for k in waveform.ravel()}
+
+
+def test_limits_act_above_the_lowest_line_only(amber_map: AmplitudeMap) -> None:
+    lowest = np.min(list(amber_map.onset_rad.values()), axis=0)
+    x = amber_map.amplitude_rad[:, None] / lowest[None, :]
+    limited = amber_map.limiter_fraction.max(axis=2) > 0.0
+    assert not limited[x < 0.9].any()
+    assert limited[x > 1.1].all()
+
+
+def test_a_command_below_the_threshold_moves_nothing() -> None:
+    design = load_design("emps")
+    loops, tones = assemble_loops(design), (tone(5.0, design),)
+    start = linear_steady_state(loops, np.array([tones[0].omega_rad_s]))
+    small = np.array([0.5 * static_threshold(design).smallest_rad])
+    result = run_tones(design, tones, np.array([0]), small, start, 0.0 * small)
+    assert WAVEFORMS[waveforms(result)[0]] == "no motion"
+    assert CAUSES[causes(result, start.output, small)[0]] == "stiction"
+
+
+def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
+    limits = replace(
+        amber.limits,
+        voltage_V=math.inf,
+        speed_rad_s=math.inf,
+        acceleration_rad_s2=math.inf,
+        peak_current_A=math.inf,
+    )
+    design = replace(amber, limits=limits)
+    loops = assemble_loops(design)
+    border = check_border(design, loops, count=3)
+    assert border is not None
+    assert border.largest_error is None
+    assert border.passed
+    found = amplitude_map(design, loops, counts=(6, 4))
+    assert found.share(("speed", "acceleration", "current", "voltage")) == 0.0
+
+
+def test_an_unstable_loop_has_no_border_and_still_a_map(amber: Design) -> None:
+    design = with_values(amber, {"control.position.gain": 6000.0})
+    loops = assemble_loops(design)
+    assert check_border(design, loops, count=3) is None
+    found = amplitude_map(design, loops, counts=(6, 4))
+    assert np.isfinite(found.response).all()

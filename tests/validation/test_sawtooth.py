@@ -1,0 +1,99 @@
+"""The sawtooth and the formulas of rate and acceleration limits."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from analyses.large_signal.formulas import (
+    FULL_TRIANGLE,
+    TRIANGLE_CREST,
+    TRIANGLE_DISTORTION,
+    acceleration_limited,
+    clamped_onset_amplitude,
+    onset_frequency_rad_s,
+    rate_limited,
+)
+from analyses.large_signal.sawtooth import sawtooth
+
+
+def test_h1_rate_limit() -> None:
+    """cases.md H1: 10 deg, 5 Hz, 150 deg/s."""
+    found = rate_limited(10.0, 2.0 * math.pi * 5.0, 150.0)
+    assert onset_frequency_rad_s(10.0, 150.0) / (2.0 * math.pi) == pytest.approx(2.3873, abs=5e-5)
+    assert found.regime == "triangle"
+    assert found.peak == pytest.approx(7.5)
+    assert found.gain == pytest.approx(0.607927, abs=5e-7)
+    assert 20.0 * math.log10(found.gain) == pytest.approx(-4.3230, abs=5e-5)
+    assert found.lag_deg == pytest.approx(41.4096, abs=5e-5)
+
+
+def test_h2_acceleration_limit() -> None:
+    """cases.md H2: 20 000 deg/s2 at 20 Hz."""
+    found = acceleration_limited(20_000.0, 20.0)
+    assert found.peak == pytest.approx(1.5625)
+    assert found.fundamental == pytest.approx(1.6126, abs=5e-5)
+
+
+def test_the_regimes_join() -> None:
+    """The accepted fit meets both ends to its own accuracy of about a percent and a degree."""
+    assert pytest.approx(1.8621, abs=5e-5) == FULL_TRIANGLE
+    low, high = rate_limited(1.0001, 1.0, 1.0), rate_limited(FULL_TRIANGLE - 1e-9, 1.0, 1.0)
+    full = rate_limited(FULL_TRIANGLE + 1e-9, 1.0, 1.0)
+    assert (low.regime, high.regime, full.regime) == ("between", "between", "triangle")
+    assert low.gain == pytest.approx(1.0, abs=0.01)
+    assert low.lag_deg == pytest.approx(0.0, abs=1.0)
+    assert high.gain == pytest.approx(full.gain, rel=0.01)
+    assert high.lag_deg == pytest.approx(full.lag_deg, abs=1.0)
+    assert rate_limited(0.5, 1.0, 1.0).gain == 1.0
+
+
+def test_clamped_onset() -> None:
+    assert clamped_onset_amplitude(120.0, 1.0, 120.0) == pytest.approx(math.sqrt(2.0) / 120.0)
+
+
+@pytest.mark.parametrize("x", [2.2, 3.0, 6.0])
+def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
+    """A tenth of the speed limit, so that a tenth of the frequency gives the same x: gain 1 %, lag 1 deg."""
+    design = with_values(load_design("ilr33-amber"), {"limits.speed": 94.25})
+    rate = 94.25 / design.total_ratio
+    hz = x * rate / (2.0 * math.pi * design.validation.full_deflection_rad)
+    found = sawtooth(design, frequency_hz=hz)
+    assert found.applicable
+    assert found.passed
+    assert [run.load_Nm for run in found.runs] == [0.0, 8.0]
+    for run in found.runs:
+        assert run.formula.x == pytest.approx(x, rel=1e-3)
+        assert abs(run.gain_error) < 0.01
+        assert abs(run.lag_error_deg) < 1.0
+        assert run.peak_rad == pytest.approx(run.formula.peak, rel=0.01)
+        assert run.distortion == pytest.approx(TRIANGLE_DISTORTION, abs=0.002)
+        assert run.crest == pytest.approx(TRIANGLE_CREST, rel=0.005)
+
+
+def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
+    """At 10 deg the gain is met, the lag comes 8 deg later: 27 ms of reversal, said and not judged."""
+    found = sawtooth(load_design("ilr33-amber"))
+    assert not found.applicable
+    assert found.passed is None
+    assert found.reversal_deg > 10.0
+    for run in found.runs:
+        assert abs(run.gain_error) < 0.01
+        assert 5.0 < run.lag_error_deg < found.reversal_deg
+
+
+@pytest.mark.parametrize(
+    ("name", "word"), [("emps", "no speed limit"), ("ctms-motor-position", "no speed limit")]
+)
+def test_not_applicable_with_a_reason(name: str, word: str) -> None:
+    found = sawtooth(load_design(name))
+    assert found.runs == ()
+    assert word in found.reason
+
+
+def test_a_load_that_keeps_the_drive_from_its_speed_limit() -> None:
+    design = with_values(load_design("ilr33-amber"), {"limits.voltage": 5.6})
+    assert "not every load" in sawtooth(design).reason

@@ -1,0 +1,127 @@
+"""Actuator figures: closed form against the simulator, step times, duty, and the sections of the page."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from analyses.friction_effects import friction_effects
+from analyses.large_signal import large_signals
+from analyses.specification import Specification, specification
+from analyses.specification.manoeuvres import thermal_duty
+from reports import document as doc
+from reports.figures.registry import draw_svg
+from reports.sections import friction_effects as friction_section
+from reports.sections import large_signal as large_section
+from reports.sections import specification as specification_section
+
+SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
+
+
+@pytest.fixture(scope="module")
+def amber() -> Specification:
+    return specification(load_design("ilr33-amber"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_simulated_rate_is_that_of_the_closed_form(name: str) -> None:
+    for one in specification(load_design(name)).capabilities:
+        assert one.simulated_rate_rad_s == pytest.approx(one.figures.output_rate_rad_s, rel=1e-6)
+        assert one.simulated_acceleration_rad_s2 is not None
+        assert 0.7 < one.simulated_acceleration_rad_s2 / one.figures.acceleration_rad_s2 <= 1.0 + 1e-9
+        if one.figures.motor_current_A is not None:
+            assert one.simulated_current_A == pytest.approx(one.figures.motor_current_A, rel=1e-6)
+
+
+def test_current_at_top_speed_and_8_Nm(amber: Specification) -> None:
+    """(C0 + CM 8 + Cv 942.5)/kM = 3.037 A, three quarters of the continuous current."""
+    loaded = amber.capabilities[1]
+    assert loaded.figures.load_Nm == 8.0
+    assert loaded.simulated_current_A == pytest.approx((2.25e-3 + 8 * 1.34e-3 + 942.5 * 5.25e-6) / 5.9e-3)
+    assert loaded.current_ratio == pytest.approx(loaded.simulated_current_A / 4.0)
+    assert loaded.duty == 1.0
+
+
+def test_thermal_duty() -> None:
+    design = load_design("ilr33-amber")
+    assert thermal_duty(design, 12.0) == pytest.approx(1.0 / 9.0)
+    assert thermal_duty(design, 2.0) == 1.0
+    assert thermal_duty(load_design("emps"), None) is None
+
+
+def test_a_sine_within_the_limits_needs_the_current_of_its_friction() -> None:
+    """Slow sine: dry friction is a square wave, viscous a sine in phase: rms of their sum by hand."""
+    design = load_design("ilr33-amber")
+    move = next(m for m in specification(design).manoeuvres if m.load_Nm == 8.0 and "70 %" in m.name)
+    dry = (2.25e-3 + 8 * 1.34e-3) / 5.9e-3
+    viscous = 5.25e-6 * 0.7 * 942.5 / 5.9e-3
+    by_hand = math.sqrt(dry**2 + viscous**2 / 2.0 + 4.0 / math.pi * dry * viscous)
+    assert move.rms_current_A == pytest.approx(by_hand, rel=0.01)
+
+
+def test_step_times(amber: Specification) -> None:
+    """A small step takes the linear time; a large one the rate limit: 0.8 A/R from 10 to 90 %."""
+    for load in (0.0, 8.0):
+        steps = [one for one in amber.steps if one.load_Nm == load]
+        rises = [one.rise_time_s or 0.0 for one in steps]
+        assert rises == sorted(rises)
+        large = steps[-1]
+        assert large.fraction == 1.0
+        assert large.rise_time_s == pytest.approx(0.8 * large.amplitude_rad / (942.5 / 2376.0), rel=2e-3)
+        assert "speed" in large.limits
+        assert "speed" not in steps[0].limits
+        assert all(one.settling_time_s is not None for one in steps)
+
+
+def test_the_plane_is_bounded_by_the_limits(amber: Specification) -> None:
+    bounds = {curve.name: curve for curve in amber.plane.bounds}
+    assert set(bounds) == {"voltage limit", "peak current", "continuous current", "speed limit"}
+    assert bounds["peak current"].torque_Nm[0] == pytest.approx(12.0 * 5.9e-3)
+    assert bounds["voltage limit"].speed_rad_s[-1] == pytest.approx(12.0 / 5.9e-3)
+    for move in amber.manoeuvres:
+        assert move.peak_torque_Nm <= 12.0 * 5.9e-3 * (1.0 + 1e-6)
+
+
+def test_a_drive_that_cannot_move_says_so() -> None:
+    weak = with_values(
+        load_design("ilr33-amber"), {"limits.peak_current": 2.0, "limits.continuous_current": 2.0}
+    )
+    found = specification(weak).capabilities
+    assert found[1].figures.output_rate_rad_s == 0.0
+    assert found[1].simulated_rate_rad_s is None
+    assert found[0].simulated_rate_rad_s == pytest.approx(found[0].figures.output_rate_rad_s, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
+    design = load_design(name)
+    sections = [
+        large_section.section(large_signals(design, counts=(10, 8))),
+        friction_section.section(friction_effects(design)),
+        specification_section.section(specification(design)),
+    ]
+    made = doc.document(title="t", subtitle="", design={}, provenance={}, sections=sections)
+    again = doc.loads(doc.dumps(made))
+    assert again["verdict"]["failed"] == 0
+    names = [block["figure"] for block in doc.figures(again)]
+    assert {"map", "amplitude_bode", "torque_speed"} <= set(names)
+    assert ("sawtooth" in names) == name.startswith("ilr33")
+    for block in doc.figures(again):
+        svg = draw_svg(block["figure"], block["data"])
+        assert svg.startswith("<svg")
+        assert "nan" not in svg.lower().replace("nano", "")
+
+
+def test_a_hunting_drive_fails_its_verdict() -> None:
+    values = {
+        "friction.breakaway_ratio": 1.5,
+        "control.velocity.integral_time": 3e-3,
+        "control.position.gain": 250.0,
+    }
+    made = friction_section.section(friction_effects(with_values(load_design("ilr33-amber"), values)))
+    assert made["status"] == "fail"
+    items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
+    assert any(item["passed"] is False and "refuted" in item["reason"] for item in items)
