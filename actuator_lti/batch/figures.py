@@ -91,6 +91,10 @@ class LinearFigures:
         """Whether the closed loop is stable, bool, shape (count,)."""
         return self._column(loop, 0) == 1.0
 
+    def pole_radius(self, loop: str) -> np.ndarray:
+        """Largest modulus of a closed-loop pole, shape (count,)."""
+        return self._column(loop, 14).copy()
+
     def gain_crossovers(self, loop: str) -> Crossovers:
         """Frequencies where |L| = 1, with phase margins in deg."""
         from ._figures import FIRST_GAIN

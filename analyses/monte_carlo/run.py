@@ -181,7 +181,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
         quick = replace(task, step=None, time_figures=timed)
         case = worst_case(quick, tally.requirement, np.array([sample for _, sample, _ in tally.worst]))
         name = f"worst-{place + 1:02d}-{slug(tally.requirement.id)}"
-        changed = with_values(task.design, case.parameters)
+        changed = with_values(task.design, case.parameters, check=False)
         titled = replace(
             changed,
             name=f"{slug(task.design.name)}-{name}",

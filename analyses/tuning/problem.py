@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import DRIVE_QUANTITIES, Population, linear_figures
-from actuator_lti.batch._figures import RADIUS
-from actuator_lti.batch.figures import LOOP_NAMES, QUANTITIES
+from actuator_lti.batch import DRIVE_QUANTITIES, QUANTITIES, Population, linear_figures
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import judge
 from analyses.sampling import Factor
@@ -97,7 +95,7 @@ class Problem:
         columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in QUANTITIES}
         columns |= {f"{loop}.stable": linear.stable(loop).astype(float) for loop in linear.loops}
         out = np.empty((population.count, len(self.requirements)))
-        radius = np.nanmax(linear.raw[:, [LOOP_NAMES.index(n) for n in linear.loops], RADIUS], axis=1)
+        radius = np.max([linear.pole_radius(loop) for loop in linear.loops], axis=0)
         for k, requirement in enumerate(self.requirements):
             found = judge(requirement, self.design, columns).distance / size_of(requirement)
             out[:, k] = np.where(np.isneginf(found), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), found)

@@ -12,9 +12,10 @@ from analyses.monte_carlo.judging import label
 from analyses.tuning.checking import nonlinear_checks
 from analyses.tuning.objects import neighbours, object_of, step_of_gain
 from analyses.tuning.problem import Problem, limit_of, loop_requirements, problem_of, size_of
+from analyses.tuning.program import RESERVE
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.rules import RuleGains, rule_gains
-from analyses.tuning.solve import RESERVE, Solution, solve
+from analyses.tuning.solve import Solution, solve
 from analyses.tuning.trade_off import trade_off
 
 if TYPE_CHECKING:

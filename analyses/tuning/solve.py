@@ -9,17 +9,14 @@ reserve those nearest to the rules are taken: margins beyond it are not worth a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from analyses.tuning.problem import Problem
+from analyses.tuning.program import RESERVE, TIE, maximise
 
-_STEP = 1e-4  # of ln(gain), central differences
-_TIE = 2e-3  # what a deviation from the rules by a factor e costs
 ROUNDS = 6
-RESERVE = 0.3  # relative distance to a limit that is enough
 
 
 @dataclass(frozen=True)
@@ -77,7 +74,7 @@ def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
 def _best_of(candidates: list[np.ndarray], problem: Problem, working: np.ndarray) -> np.ndarray:
     gains = np.array(candidates)
     away = np.sum(np.log(gains / problem.start) ** 2, axis=1)
-    slack = np.minimum(problem.distances(gains, working).min(axis=(1, 2)), RESERVE) - _TIE * away
+    slack = np.minimum(problem.distances(gains, working).min(axis=(1, 2)), RESERVE) - TIE * away
     return gains[int(np.argmax(slack))]
 
 
@@ -105,72 +102,3 @@ def _climb(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarr
         return problem.distances(np.exp(x), working).reshape(len(x), -1)
 
     return maximise(problem, start, limits)
-
-
-def maximise(
-    problem: Problem,
-    start: np.ndarray,
-    limits: Callable[[np.ndarray], np.ndarray],
-    free: Callable[[np.ndarray], np.ndarray] | None = None,
-    iterations: int = 80,
-) -> np.ndarray:
-    """Maximise the smallest of some functions subject to others being positive.
-
-    Parameters
-    ----------
-    limits : callable
-        ``(candidates, gains as logarithms) -> (candidates, functions)``. Without ``free`` their smallest is
-        maximised; with it they are constraints.
-    free : callable, optional
-        Functions whose smallest is maximised instead.
-    """
-    from scipy.optimize import minimize
-
-    rule, size = np.log(problem.start), len(start)
-    low, high = np.log(problem.lower), np.log(problem.upper)
-    kept: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-
-    def both(x: np.ndarray) -> np.ndarray:
-        goal = limits(x) if free is None else free(x)
-        return goal if free is None else np.concatenate([goal, limits(x)], axis=1)
-
-    aims = limits(np.log(start)[None, :]).shape[1] if free is None else free(np.log(start)[None, :]).shape[1]
-
-    def model(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        key = x.tobytes()
-        if key not in kept:
-            moves = np.vstack([np.zeros(size), _STEP * np.eye(size), -_STEP * np.eye(size)])
-            values = both(x[None, :] + moves)
-            slope = (values[1 : size + 1] - values[size + 1 :]) / (2 * _STEP)
-            kept.clear()
-            kept[key] = (values[0], slope.T)
-        return kept[key]
-
-    def constraint(y: np.ndarray) -> np.ndarray:
-        values = model(y[:size])[0].copy()
-        values[:aims] -= y[size]
-        return values
-
-    def constraint_slope(y: np.ndarray) -> np.ndarray:
-        slope = model(y[:size])[1]
-        last = np.zeros((len(slope), 1))
-        last[:aims] = -1.0
-        return np.hstack([slope, last])
-
-    def cost(y: np.ndarray) -> float:
-        return float(-y[size] + _TIE * np.sum((y[:size] - rule) ** 2))
-
-    def cost_slope(y: np.ndarray) -> np.ndarray:
-        return np.concatenate([2 * _TIE * (y[:size] - rule), [-1.0]])
-
-    x0 = np.clip(np.log(start), low, high)
-    first = float(model(x0)[0][:aims].min())
-    if free is None:
-        first = min(first, RESERVE)
-    done = minimize(
-        cost, np.append(x0, first), jac=cost_slope, method="SLSQP",
-        bounds=[*zip(low, high, strict=True), (None, RESERVE if free is None else None)],
-        constraints={"type": "ineq", "fun": constraint, "jac": constraint_slope},
-        options={"maxiter": iterations, "ftol": 1e-9},
-    )  # fmt: skip
-    return np.exp(np.clip(done.x[:size], low, high))

@@ -6,8 +6,8 @@ import numpy as np
 
 from analyses.monte_carlo.judging import loops_of
 from analyses.tuning.problem import Problem
+from analyses.tuning.program import maximise
 from analyses.tuning.result import TradeOffPoint
-from analyses.tuning.solve import maximise
 
 POINTS = 6
 _SPAN = (0.6, 1.6)

@@ -10,6 +10,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from reports.figures import style
 
@@ -36,6 +37,7 @@ def _histogram(ax: Axes, panel: dict[str, Any]) -> None:
         ax.stairs(counts, edges, fill=True, color=style.SKY, alpha=0.45, linewidth=0)
         ax.stairs(counts, edges, color=style.BLUE, linewidth=1.2)
         ax.set_ylim(0, 1.15 * max(counts))
+    ax.xaxis.set_major_locator(MaxNLocator(4))
 
 
 def _marks(ax: Axes, panel: dict[str, Any]) -> None:

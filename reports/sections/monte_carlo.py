@@ -187,6 +187,8 @@ def _panels(result: MonteCarloResult, odds: Odds) -> list[dict[str, Any]]:
     panels = []
     for name in odds.columns:
         column = result.columns[name]
+        if len(column.counts) < 2:
+            continue  # the same in every sample: nothing to draw
         alone = len(odds.columns) == 1
         panels.append({
             "label": _words(name), "unit": "" if column.unit == "1" else column.unit,
@@ -195,7 +197,7 @@ def _panels(result: MonteCarloResult, odds: Odds) -> list[dict[str, Any]]:
             "worst": finite(case.value) if case is not None and alone else None,
             "minimum": odds.minimum, "maximum": odds.maximum,
         })  # fmt: skip
-    return [panel for panel in panels if panel["counts"]]
+    return panels
 
 
 def _worst_table(result: MonteCarloResult) -> dict[str, Any]:

@@ -31,7 +31,7 @@ from analyses.tuning import (
     tune,
 )
 from analyses.tuning.problem import loop_requirements, problem_of
-from analyses.tuning.solve import maximise
+from analyses.tuning.program import maximise
 from analyses.tuning.wishes import read_requirement
 
 PERIOD, DELAY = 1e-3, 3e-3

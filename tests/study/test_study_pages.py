@@ -1,0 +1,50 @@
+"""The pages of studies in a real browser: no error, no request, every figure seen, on desktop and phone."""
+
+import shutil
+
+import pytest
+from typer.testing import CliRunner
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+COMMANDS = {
+    "montecarlo": ("montecarlo", "--samples", "200", "--no-worst"),
+    "compare": ("compare", "ilr33-amber", "--set", "gear.worm.ratio=40", "--set", "friction.law=tanh"),
+    "tune": ("tune", "--require", "position.bandwidth>=40 Hz"),
+}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no Chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as running:
+        started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_pages_of_studies_stand_alone_and_show_every_figure(browser, name, tmp_path):
+    from reports.cli.app import build
+
+    done = CliRunner().invoke(build(), [*COMMANDS[name], "--out", str(tmp_path), "--quiet"])
+    assert done.exit_code in (0, 1), done.output
+    file = tmp_path / f"{name}.html"
+    for size in ({"width": 1360, "height": 900}, {"width": 390, "height": 844}):
+        page = browser.new_context(offline=True, viewport=size).new_page()
+        trouble = []
+        page.on("console", lambda message, seen=trouble: seen.append(message.text))
+        page.on("pageerror", lambda error, seen=trouble: seen.append(str(error)))
+        page.on("request", lambda request, seen=trouble: seen.append(request.url))
+        page.goto(file.as_uri())
+        assert trouble == [file.as_uri()]
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+        drawn = page.locator("figure svg")
+        assert drawn.count() == file.read_text(encoding="utf-8").count("<svg") > 0
+        for k in range(drawn.count()):
+            box = drawn.nth(k).bounding_box()
+            assert box is not None
+            assert box["width"] > 250
+            assert drawn.nth(k).locator("path").count() > 5
