@@ -75,8 +75,8 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     ax.grid(visible=False)
     ax.set_xlim(xe[0], xe[-1])
     ax.set_ylim(ye[0], ye[-1])
-    first = fig.legend(handles=lines, loc="outside right upper", title="first reached, linear loop")
-    first._legend_box.align = "left"
+    words: dict[str, Any] = {"title": "first reached, linear loop", "alignment": "left"}
+    fig.legend(handles=lines, loc="outside right upper", **words)
     if handles:
         ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.11), ncols=len(handles),
@@ -107,7 +107,7 @@ def _regions(ax: Axes, names: list[str], cause: np.ndarray, xe: np.ndarray, ye: 
             boxes.setdefault(names[value], []).append(corners)
     for name, polygons in boxes.items():
         if name in COLOURS:
-            look = {"facecolor": COLOURS[name], "alpha": 0.28, "linewidth": 0.0}
+            look: dict[str, Any] = {"facecolor": COLOURS[name], "alpha": 0.28, "linewidth": 0.0}
             ax.add_collection(PolyCollection(polygons, antialiased=False, **look))
 
 
@@ -153,7 +153,7 @@ def _names(ax: Axes, names: list[str], cause: np.ndarray, x: np.ndarray, y: np.n
         rows, columns = np.nonzero(cause == k)
         if len(rows) < 8:
             continue
-        depth = np.array([_depth(cause == k, r, c) for r, c in zip(rows, columns, strict=True)])
+        depth = np.array([_depth(cause == k, int(r), int(c)) for r, c in zip(rows, columns, strict=True)])
         best = int(np.argmax(depth))
         words: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 7, "fontweight": "bold"}
         ax.text(x[columns[best]], y[rows[best]], WORDS.get(name, name), bbox=style.label_box(), **words)

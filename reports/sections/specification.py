@@ -106,8 +106,8 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
         }
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
-            "motion needs, and the paths of standard manoeuvres at full deflection. Torque below zero brakes; backward motion is "
-            "turned over."
+            "motion needs, and the paths of standard manoeuvres at full deflection. Torque below zero brakes; "
+            "backward motion is turned over."
         )
         blocks.append(doc.figure("torque_speed", data, caption=caption, alt=caption))
     return blocks
