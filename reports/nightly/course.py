@@ -46,7 +46,7 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
     order = sorted(range(len(chosen)), key=lambda j: chosen[j][1].kind != "requirement")
     for column in order:
         figure = chosen[column][1]
-        if figure.kind == "requirement" or (figure.better and figure.kind == "figure"):
+        if figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure"):
             writer.add(figure, values[:, column])
     return writer.course
 

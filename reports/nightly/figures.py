@@ -8,10 +8,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from reports.nightly.text import one_line
+from reports.verdict_summary import verdict_words
 
 MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
-REQUIREMENTS = "verdicts"  # the section of the design's own requirements
+REQUIREMENTS = "requirements"  # verdicts on the design's own requirements; others are checks and odds
 _NO_RESULTS = ("Where the time went",)  # tables that differ from run to run
 _INPUT_SECTIONS = ("parameters", "provenance")
 # Which way is better, by what the name holds; figures of no known direction change but do not regress.
@@ -44,6 +45,7 @@ class Verdict:
     passed: bool | None
     source: str = ""
     reason: str = ""
+    what: str = REQUIREMENTS
 
 
 def digest(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -56,6 +58,7 @@ def digest(document: Mapping[str, Any]) -> dict[str, Any]:
         "revision": str(design.get("revision", "") or ""),
         "verdicts": [asdict(v) for v in verdicts],
         "figures": [asdict(f) for f in figures[:MAX_FIGURES]],
+        "words": verdict_words(document["verdict"]) if verdicts else [],
         "failed": sum(v.passed is False for v in verdicts),
         "total": len(verdicts),
         "failed_sections": [
@@ -75,7 +78,7 @@ def _has_failed_verdict(part: Mapping[str, Any]) -> bool:
 def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
     """Return the requirements of a document, each once, in its order."""
     seen: set[str] = set()
-    for section, block in _blocks(document):
+    for _, block in _blocks(document):
         if block.get("kind") != "verdicts":
             continue
         for item in block.get("items", ()):
@@ -83,17 +86,17 @@ def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
             if name in seen:
                 continue
             seen.add(name)
-            yield _verdict(name, item, section == REQUIREMENTS)
+            yield _verdict(name, item, str(block.get("what", REQUIREMENTS)))
 
 
-def _verdict(name: str, item: Mapping[str, Any], required: bool) -> Verdict:
+def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
     """Make a verdict; one that the design does not require is ranked only where it fails."""
     distance = number(item.get("distance"))
     limit = number(item.get("limit"))
     if limit is None:
         limit = first_number(str(item.get("limit", "")))
     scale = abs(limit) if limit else 1.0
-    ranked = distance is not None and (required or item.get("passed") is False)
+    ranked = distance is not None and (what == REQUIREMENTS or item.get("passed") is False)
     return Verdict(
         id=name,
         label=str(item.get("label", "") or name),
@@ -105,6 +108,7 @@ def _verdict(name: str, item: Mapping[str, Any], required: bool) -> Verdict:
         passed=item.get("passed"),
         source=str(item.get("source", "") or ""),
         reason=str(item.get("reason", "") or ""),
+        what=what,
     )
 
 
@@ -121,7 +125,8 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
     """Return every number of verdicts, facts and tables; the inputs (parameters, provenance) are none."""
     seen: set[str] = set()
     for verdict in verdicts_of(document):
-        yield Figure(name=f"{verdict.id}: value", value=verdict.value, unit=verdict.unit, kind="requirement")
+        kind = "requirement" if verdict.what == REQUIREMENTS else "check"
+        yield Figure(name=f"{verdict.id}: value", value=verdict.value, unit=verdict.unit, kind=kind)
         yield Figure(
             name=f"{verdict.id}: distance",
             value=verdict.distance,

@@ -72,6 +72,11 @@ class DesignView:
         return tuple(self.meta.get("files", ()))
 
     @property
+    def words(self) -> tuple[str, ...]:
+        """Verdict of its report, a line for each kind."""
+        return tuple(self.meta.get("words", ()))
+
+    @property
     def failed_sections(self) -> tuple[str, ...]:
         """Titles of the sections of its report that do not pass."""
         return tuple(self.meta.get("failed_sections", ()))

@@ -6,12 +6,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.document import figures, verdict_lines, walk
+from reports.document import figures, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.nightly.text import visible
 from reports.numbers import show
-from reports.verdict_summary import verdict_words
+from reports.verdict_summary import verdict_lines
 
 MAX_CELL = 600
 MAX_TEXT = 20_000
