@@ -106,7 +106,7 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
         }
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
-            "motion needs, and the paths of standard manoeuvres at full deflection. Torque below zero brakes; "
+            "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "
             "backward motion is turned over."
         )
         blocks.append(doc.figure("torque_speed", data, caption=caption, alt=caption))

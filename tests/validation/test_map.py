@@ -73,7 +73,7 @@ def test_onset_of_saturation_is_the_smallest_a_k(name: str) -> None:
     ("values", "limiter"),
     [
         ({"limits.acceleration": 2e3}, "acceleration"),
-        ({"limits.voltage": 0.4, "limits.speed": math.inf}, "voltage"),
+        ({"limits.voltage": 0.4, "limits.speed": 1e6}, "voltage"),
     ],
 )
 def test_other_limiters_have_their_turn(amber: Design, values: dict[str, float], limiter: str) -> None:
