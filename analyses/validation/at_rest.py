@@ -15,7 +15,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.validation.coherent import coherent
-from analyses.validation.sweep import linear_response
+from analyses.validation.response import linear_response
 from nonlinear._kernels import layout as at
 from nonlinear.batch import put_sine, repeat_row, run_rows
 from nonlinear.parameters import design_row

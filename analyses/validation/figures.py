@@ -13,8 +13,9 @@ from math import pi, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig
-from analyses.validation.sweep import Sweep, stepped_sine
+from analyses.validation.sweep import stepped_sine
 from nonlinear._kernels import layout as at
 from nonlinear.batch import injection_place
 from nonlinear.simulation import run_row

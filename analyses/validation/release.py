@@ -21,6 +21,7 @@ from analyses.validation.confirm import Confirmation
 from analyses.validation.riding import Ride
 from analyses.validation.rig import Rig
 from nonlinear._kernels import layout as at
+from nonlinear.batch import run_rows
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -89,6 +90,8 @@ class AmplitudeMargin:
     border : Border
         ``value`` 1 with both ends of the bracket 1: the nominal drive oscillates already.
     period_s : float
+    limiter : str
+        Limit that acts longest while the oscillation lasts, just past the border; empty where none does.
     """
 
     loop: str
@@ -99,6 +102,7 @@ class AmplitudeMargin:
     linear: float
     border: Border
     period_s: float
+    limiter: str = ""
 
 
 def full_range(design: Design) -> dict[str, float]:
@@ -169,9 +173,27 @@ def release_margins(
             linear=float(item.predicted or 0.0),
             border=border,
             period_s=item.period_s,
+            limiter=limiter,
         )
-        for (item, size, friction), border in zip(cases, borders, strict=True)
+        for (item, size, friction), border, limiter in zip(
+            cases, borders, _limiters(searches, borders, threads), strict=True
+        )
     )
+
+
+def _limiters(searches: Sequence[Release], borders: Sequence[Border], threads: int | None) -> list[str]:
+    """What limits the oscillation just past each border."""
+    names = [""] * len(searches)
+    known = [k for k, border in enumerate(borders) if border.value is not None]
+    if not known:
+        return names
+    rows = np.concatenate([searches[k].rows(np.array([borders[k].bracket[1]])) for k in known])
+    result = run_rows(rows, threads=threads)
+    shares = np.array([result.window_limit_fraction(name) for name in at.LIMITERS])
+    for k, share in zip(known, shares.T, strict=True):
+        if share.max() > 0.0:
+            names[k] = at.LIMITERS[int(np.argmax(share))]
+    return names
 
 
 def _has_friction(design: Design) -> bool:

@@ -18,7 +18,7 @@ from analyses.validation.figures import Measured
 from analyses.validation.from_rest import RestSteps
 from analyses.validation.ledger import Entry
 from analyses.validation.release import AmplitudeMargin
-from analyses.validation.sweep import Sweep, SweepErrors
+from analyses.validation.response import Sweep, SweepErrors
 from analyses.validation.tones import ToneSweep
 
 if TYPE_CHECKING:

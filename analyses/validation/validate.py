@@ -27,15 +27,11 @@ from analyses.validation.figures import measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
 from analyses.validation.ledger import Entry, loop_entries, point_entries
 from analyses.validation.release import AmplitudeMargin, release_margins
+from analyses.validation.response import linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
 from analyses.validation.rig import Rig, points_of, rig
 from analyses.validation.settings import Settings
-from analyses.validation.sweep import (
-    linear_response,
-    settling_ticks_of,
-    stepped_sine,
-    sweep_errors,
-)
+from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tones import tone_sweep
 
 if TYPE_CHECKING:

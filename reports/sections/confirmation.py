@@ -27,6 +27,7 @@ def sections(validation: Validation) -> list[dict[str, Any]]:
         return []
     blocks = [_figure(items, validation.amplitude_margins), _table(items)]
     if validation.amplitude_margins:
+        blocks += [doc.text(words) for words in _remarks(validation.amplitude_margins)]
         blocks.append(_released(validation.amplitude_margins))
     intro = (
         "Gain is raised and lowered, and delay added, in the simulator until an oscillation no longer dies "
@@ -54,6 +55,24 @@ def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) 
         "and large deviations, limits on, with dry friction and without."
     )
     return doc.figure("confirmation", data, caption=caption, alt=caption)
+
+
+def _remarks(released: Sequence[AmplitudeMargin]) -> list[str]:
+    """Say where a limit takes more than a tenth of a margin, worst case of each loop and kind."""
+    worst: dict[tuple[str, str], AmplitudeMargin] = {}
+    for item in released:
+        value, known = item.border.value, worst.get((item.loop, item.kind))
+        if value is None or value > 0.9 * item.linear:
+            continue
+        if known is None or value < (known.border.value or value):
+            worst[item.loop, item.kind] = item
+    return [
+        f"The {item.loop} loop oscillates lastingly already from {_text(item.border.value or 0.0, item)} on "
+        f"({SHORT[item.kind]}; linear {_text(item.linear, item)}) when let go from "
+        f"{100.0 * item.part:.0f} % of its full range"
+        + (f": the {item.limiter} limit acts." if item.limiter else ".")
+        for item in worst.values()
+    ]
 
 
 def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
@@ -122,6 +141,7 @@ def _released(items: Sequence[AmplitudeMargin]) -> dict[str, Any]:
         doc.column("linear", "Linear margin", format="sig:4"),
         doc.column("border", "Oscillations last from", format="sig:3"),
         doc.column("unit", "Unit"),
+        doc.column("limiter", "Limit acting"),
         doc.column("remark", ""),
     ]
     return doc.details(
@@ -134,7 +154,7 @@ def _released_row(item: AmplitudeMargin) -> dict[str, Any]:
     value, delay = item.border.value, item.kind == "delay"
     remark = ""
     if value is None:
-        remark = "no lasting oscillation up to " + _text(max(item.border.bracket), item, delay)
+        remark = "no lasting oscillation up to " + _text(max(item.border.bracket), item)
     elif item.border.bracket == (1.0, 1.0) and not delay:
         remark = "the nominal drive oscillates"
     return {
@@ -145,6 +165,7 @@ def _released_row(item: AmplitudeMargin) -> dict[str, Any]:
         "linear": _shown(item.linear, item, delay),
         "border": None if value is None else _shown(value, item, delay),
         "unit": "ms" if delay else "dB",
+        "limiter": item.limiter,
         "remark": remark,
     }
 
@@ -153,5 +174,6 @@ def _shown(value: float, item: AmplitudeMargin, delay: bool) -> float:
     return 1e3 * value * item.period_s if delay else 20.0 * math.log10(value)
 
 
-def _text(value: float, item: AmplitudeMargin, delay: bool) -> str:
+def _text(value: float, item: AmplitudeMargin) -> str:
+    delay = item.kind == "delay"
     return f"{_shown(value, item, delay):.3g} {'ms' if delay else 'dB'}"

@@ -101,7 +101,7 @@ def test_the_instruments_delay_is_accounted_for() -> None:
 
 def test_amplitude_and_friction_move_the_border() -> None:
     """From rest: without friction the inner loops keep their margins, dry friction adds to them, and the
-    acceleration limit takes from that of the position loop (ilr33-amber)."""
+    current limit, which bounds the acceleration, takes from that of the position loop (ilr33-amber)."""
     design = load_design("ilr33-amber")
     loops = assemble_loops(design)
     setups = {name: rig(design, name) for name in loops.present}
@@ -120,6 +120,7 @@ def test_amplitude_and_friction_move_the_border() -> None:
                 assert rubbing.border.value >= 0.99 * free.border.value
     position = by["position", "gain up", "large", False]
     assert position.border.value < 0.5 * position.linear
+    assert position.limiter == "current"  # peak current bounds the acceleration
     assert (
         by["velocity", "delay", "small", True].border.value
         > 1.1 * by["velocity", "delay", "small", True].linear

@@ -11,9 +11,10 @@ from actuator_lti import InputError, assemble_loops, load_design
 from analyses.validation import sweep as module
 from analyses.validation.at_rest import free_amplitude, sweep_from_rest
 from analyses.validation.coherent import coherent, hold_factor
+from analyses.validation.response import sweep_errors
 from analyses.validation.riding import riding_at
 from analyses.validation.rig import Rig, rig
-from analyses.validation.sweep import frequency_response, stepped_sine, sweep_errors
+from analyses.validation.sweep import frequency_response, stepped_sine
 from analyses.validation.tones import multisine_response
 
 DESIGNS = ("ilr33-amber", "ilr33-amber-multirate")
