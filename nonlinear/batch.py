@@ -189,11 +189,11 @@ def _run_span(
     rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray
 ) -> None:
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    from nonlinear._kernels.run import run
+    from nonlinear._kernels.call import call
 
     history, flags, shared = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(2)
     for r in range(start, stop):
-        statuses[r] = run(rows[r], tables, history, flags, outs[r], shared)
+        statuses[r] = call(rows[r], tables, history, flags, outs[r], shared)
 
 
 def available_threads() -> int:

@@ -165,13 +165,13 @@ def _call(
     row: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None
 ) -> int:
     """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
-    from nonlinear._kernels.run import run
+    from nonlinear._kernels.call import call
 
     shared = np.zeros(2)
     if progress is None:
-        return int(run(row, tables, history, flags, out, shared))
+        return call(row, tables, history, flags, out, shared)
     result: list[int] = []
-    thread = Thread(target=lambda: result.append(int(run(row, tables, history, flags, out, shared))))
+    thread = Thread(target=lambda: result.append(call(row, tables, history, flags, out, shared)))
     thread.start()
     total = int(row[at.TICKS])
     try:

@@ -11,9 +11,9 @@ from nonlinear._kernels.compiled import kernel
 from nonlinear._kernels.control import clamp, measured_angle, measured_speed, note_limits, pi
 from nonlinear._kernels.probes import memory_size, probe
 from nonlinear._kernels.reduce import clear, extremes, step_figures, window
-from nonlinear._kernels.segment import CONSTANTS, DECAY, LENGTH, RINGING, SMOOTH, prepare, segment, slip_step
+from nonlinear._kernels.segment import DECAY, LENGTH, RINGING, SMOOTH, segment, slip_step
 from nonlinear._kernels.signals import signal
-from nonlinear._kernels.smooth import LEVEL, LEVELS, prepare_tanh, tanh_segment
+from nonlinear._kernels.smooth import tanh_segment
 
 FINITE = 1e15
 PROBE_U = layout.PROBES + layout.POINT_VOLTAGE * layout.PROBE_SIZE
@@ -23,9 +23,10 @@ PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 
 
 @kernel
-def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
+def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
     """Run the drive described by the row ``p``; returns a status number of ``layout``.
 
+    ``c`` holds the constants of `segment.prepare`, ``table`` those of `smooth.prepare_tanh` (or nothing).
     ``history`` is (columns, rows) or empty; ``flag_history`` (rows,); ``out`` a row of results;
     ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops the run.
     """
@@ -56,12 +57,7 @@ def run(p, tables, history, flag_history, out, shared):  # type: ignore[no-untyp
     reducing = length > 0 or with_extremes
     biased = p[layout.BIAS] > 0.0
 
-    c = np.zeros(CONSTANTS)
-    prepare(p, c)
     smooth, ringing, split = c[SMOOTH] > 0.0, c[RINGING] > 0.0, c[LENGTH] > 0.0
-    table = np.zeros(2 * LEVELS * LEVEL if tanh_law else 0)
-    if tanh_law:
-        prepare_tanh(p, c, table)
     # a segment is looked at closely where energies are asked for or w' may turn twice
     close = ringing or p[layout.WITH_ENERGY] > 0.0
     Cv_p, Cv_m = p[layout.VISCOUS], p[layout.VISCOUS_REVERSE]
