@@ -46,8 +46,8 @@ def test_every_margin_is_found_in_time(name: str, count: int) -> None:
             assert item.border.value is None, where
         else:
             assert item.difference is not None
-            assert abs(item.difference) < 1e-3, where
-            assert item.border.frequency_hz == pytest.approx(item.predicted_hz, rel=0.1), where
+            assert abs(item.difference) < 1e-4, where  # ten times closer than asked for
+            assert item.border.frequency_hz == pytest.approx(item.predicted_hz, rel=0.02), where
 
 
 def test_margins_of_the_baseline_are_the_known_ones() -> None:

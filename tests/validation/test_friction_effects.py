@@ -90,7 +90,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway
     found = limit_cycles(design, 0.0, 0.05 * design.validation.full_deflection_rad, threshold)
     assert found.confirmations == ()
     assert (found.hunting is not None) == hunts
-    assert found.as_foreseen == (not hunts)
+    assert found.described == (not hunts)
     if found.hunting is not None:
         assert not found.hunting.limited
         assert found.hunting.hunting_hz == pytest.approx(9.59, rel=0.01)
@@ -124,6 +124,33 @@ def test_the_foreseen_amplitude_grows_with_friction(amber: Design) -> None:
     )
     friction = design.friction
     assert large / small == pytest.approx(friction.dry_Nm(8.0) / friction.dry_Nm(0.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("integral_time", [15e-3, 3e-3])
+@pytest.mark.parametrize("gain", [60.0, 120.0, 250.0])
+def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float) -> None:
+    """Breakaway 1.5: amplitude within 6 %, frequency within 3 %; also where larger steps slide to rest."""
+    values = {
+        "friction.breakaway_ratio": 1.5,
+        "control.velocity.integral_time": integral_time,
+        "control.position.gain": gain,
+    }
+    cycles = friction_effects(with_values(amber, values)).points[0].cycles
+    assert cycles.stick_slip is not None
+    assert cycles.stick_slip.stable
+    assert cycles.as_foreseen
+    swing = cycles.settlings[-1]
+    assert swing.hunting
+    assert swing.hunting_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
+    assert swing.hunting_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
+
+
+def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design) -> None:
+    for point in friction_effects(amber).points:
+        assert point.cycles.stick_slip is None
+        assert point.cycles.as_foreseen
+    emps = with_values(load_design("emps"), {"friction.breakaway_ratio": 2.0})
+    assert friction_effects(emps).points[0].cycles.stick_slip is None
 
 
 def test_not_applicable_without_dry_friction() -> None:
