@@ -10,6 +10,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from analyses.drive_figures import drive_figures
 from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
+from analyses.friction_effects.stick_slip import StickSlipCycle
 from analyses.large_signal.steady_start import PLACES
 from nonlinear import commands, simulate
 from nonlinear._kernels import layout as at
@@ -90,11 +91,14 @@ class LimitCycles:
     ----------
     confirmations : tuple of Confirmation
         Empty: the describing function foresees none.
+    stick_slip : StickSlipCycle or None
+        What the analysis of rest, breakaway and slip foresees beside it.
     settlings : tuple of Settling
-        Steps of several sizes, the last below the threshold: it rests, breaks away, and may hunt.
+        Steps of several sizes, the last ones below the threshold: the drive rests, breaks away, and may hunt.
     """
 
     confirmations: tuple[Confirmation, ...]
+    stick_slip: StickSlipCycle | None
     settlings: tuple[Settling, ...]
 
     @property
@@ -104,18 +108,33 @@ class LimitCycles:
         return max(swings, key=lambda one: one.hunting_rad or 0.0, default=None)
 
     @property
-    def as_foreseen(self) -> bool:
-        """Whether simulator and describing function agree on whether friction makes a cycle.
+    def by_friction(self) -> bool:
+        """Whether a step ended in a cycle in which no limit acts."""
+        return self.hunting is not None and not self.hunting.limited
+
+    @property
+    def described(self) -> bool:
+        """Whether the describing function is right about friction.
 
         A stable cycle is foreseen exactly where a step ends in one, and every foreseen one is confirmed.
         """
         stable = any(item.foreseen.stable for item in self.confirmations)
-        found = self.hunting is not None and not self.hunting.limited
-        return all(item.confirmed for item in self.confirmations) and stable == found
+        return all(item.confirmed for item in self.confirmations) and stable == self.by_friction
+
+    @property
+    def as_foreseen(self) -> bool:
+        """Whether describing function and stick-slip analysis together are right about friction."""
+        slips = self.stick_slip is not None and self.stick_slip.stable
+        stable = slips or any(item.foreseen.stable for item in self.confirmations)
+        return all(item.confirmed for item in self.confirmations) and stable == self.by_friction
 
 
 def limit_cycles(
-    design: Design, load_Nm: float, step_rad: float, threshold_rad: float | None = None
+    design: Design,
+    load_Nm: float,
+    step_rad: float,
+    threshold_rad: float | None = None,
+    stick_slip: StickSlipCycle | None = None,
 ) -> LimitCycles:
     """Foresee limit cycles, look for them in the simulator, and wait what steps end in.
 
@@ -125,6 +144,8 @@ def limit_cycles(
         A step, and a tenth of it.
     threshold_rad : float, optional
         Command that breaks away at once; a step of `BELOW` of it is waited for too.
+    stick_slip : StickSlipCycle, optional
+        A cycle foreseen by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
     """
     top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
     if not 0.0 < top < math.inf:
@@ -132,7 +153,8 @@ def limit_cycles(
     foreseen = foreseen_cycles(design, load_Nm, top)
     checked = tuple(_confirm(design, load_Nm, cycle) for cycle in foreseen)
     sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
-    return LimitCycles(checked, tuple(settle(design, load_Nm, size) for size in sizes))
+    sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
+    return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
 
 
 def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmation:

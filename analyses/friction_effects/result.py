@@ -12,6 +12,7 @@ from actuator_lti.design.model import Design
 from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.cycles import LimitCycles, limit_cycles
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
+from analyses.friction_effects.stick_slip import stick_slip_cycle
 from analyses.large_signal.steady_start import linear_steady_state
 
 if TYPE_CHECKING:
@@ -90,16 +91,18 @@ def friction_effects(
     settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
     points = []
     for load in loads:
-        points.append(_point(design, load, settling))
+        points.append(_point(design, loops, load, settling))
         if progress is not None:
             progress(len(points), len(loads))
     return FrictionEffects(design, tuple(points), integrates)
 
 
-def _point(design: Design, load_Nm: float, settling_ticks: int) -> FrictionPoint:
+def _point(design: Design, loops: Loops, load_Nm: float, settling_ticks: int) -> FrictionPoint:
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
     found = threshold(design, load_Nm, settling_ticks)
     loop = None if found is None else hysteresis(design, load_Nm, found.static, settling_ticks)
     dry = design.friction.dry_Nm(load_Nm, 1)
     breakaway = None if found is None else found.static.forward_rad
-    return FrictionPoint(load_Nm, dry, found, loop, limit_cycles(design, load_Nm, step, breakaway))
+    slips = None if found is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
+    cycles = limit_cycles(design, load_Nm, step, breakaway, slips)
+    return FrictionPoint(load_Nm, dry, found, loop, cycles)

@@ -37,14 +37,16 @@ def section(result: FrictionEffects) -> dict[str, Any]:
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> dict[str, Any]:
     """Say whether friction keeps the drive hunting, and whether that was foreseen."""
     cycles, swing = point.cycles, point.cycles.hunting
-    foreseen = _foreseen_words(cycles, fine, small)
+    foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         found = f"none found after steps of {len(cycles.settlings)} sizes"
     else:
         kind = "limits keep" if swing.limited else "friction keeps"
         size = fine * (swing.hunting_rad or 0.0)
         found = f"{kind} it swinging by ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
-    agree = "as foreseen" if cycles.as_foreseen else "not as foreseen: the describing function is refuted"
+    agree = "as foreseen" if cycles.as_foreseen else "not as foreseen"
+    if not cycles.described:
+        agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
         f"no limit cycle at {point.load_Nm:g} {load}",
@@ -73,6 +75,16 @@ def _foreseen_words(cycles: LimitCycles, fine: float, small: str) -> str:
         size = fine * one.output_amplitude_rad
         parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
     return "describing function of the whole loop: " + "; ".join(parts)
+
+
+def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
+    """Say what the analysis of stick and slip foresees."""
+    one = cycles.stick_slip
+    if one is None:
+        return "stick-slip analysis: none"
+    kind = "" if one.stable else ", unstable"
+    size = fine * one.output_amplitude_rad
+    return f"stick-slip analysis: ±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
 
 
 def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
@@ -144,7 +156,10 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
                     "_status": "warn" if one.hunting else None,
                 }
             )
-    note = "The last step at each load is 0.3 of the threshold; errors below 1e-6 of the step are shown as 0."
+    note = (
+        "The third step at each load is 0.3 of the threshold, a fourth that of a foreseen cycle; errors below "
+        "1e-6 of the step are shown as 0."
+    )
     return doc.table("Standing error after a step", columns, rows, note)
 
 
@@ -187,7 +202,7 @@ def _summary(result: FrictionEffects) -> str:
     if result.integrates:
         return (
             "The speed integral takes the standing error away: it creeps to zero and does not hunt. With "
-            "breakaway above sliding friction and a fast integral it may hunt, which a describing function "
-            "of dry friction cannot foresee, as a sinusoid spends no time at rest."
+            "breakaway above sliding friction it may hunt, which a describing function of dry friction "
+            "cannot foresee, as a sinusoid spends no time at rest."
         )
     return "Nothing integrates, so an error of up to the threshold stays for good."

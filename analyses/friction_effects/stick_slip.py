@@ -1,0 +1,175 @@
+"""Stick-slip hunting, foreseen exactly where a describing function is blind: rest, breakaway, slip, rest.
+
+A speed integral winds up while the rotor rests at an error E, until the drive torque reaches breakaway; then
+the drive is the sampled linear loop with the smaller sliding friction until the speed returns to zero.  A
+symmetric cycle is an E that the slip turns into -E.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+
+SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the threshold
+SLOPE_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class StickSlipCycle:
+    """A symmetric stick-slip cycle.
+
+    Attributes
+    ----------
+    output_amplitude_rad : float
+        Error at rest on either side, output side.
+    frequency_hz : float
+    slip_s, rest_s : float
+        Of half a period.
+    slope : float
+        Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts.
+    """
+
+    output_amplitude_rad: float
+    frequency_hz: float
+    slip_s: float
+    rest_s: float
+    slope: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether motion near it comes nearer."""
+        return abs(self.slope) < 1.0
+
+
+@dataclass(frozen=True)
+class _Slip:
+    """Slip from breakaway as the sum of a part that goes with E and a part that does not."""
+
+    period_s: float
+    gain: float
+    integral_gain: float
+    start: float
+    w: np.ndarray
+    th: np.ndarray
+    command: np.ndarray
+
+    def from_error(self, error: float) -> tuple[float, float, float] | None:
+        """Error after the slip (in the direction of the start), duration, and rest until the next breakaway.
+
+        ``None`` where the speed does not return to zero in time.
+        """
+        w = self.w[0] + error * self.w[1]
+        ends = np.flatnonzero((w[1:-1] > 0.0) & (w[2:] <= 0.0)) + 1
+        if not ends.size:
+            return None
+        k = int(ends[0])
+        part = w[k] / (w[k] - w[k + 1])
+        th, command = (
+            float((1.0 - part) * (a[0, k] + error * a[1, k]) + part * (a[0, k + 1] + error * a[1, k + 1]))
+            for a in (self.th, self.command)
+        )
+        if th <= 0.0:
+            return -th, float(k + part) * self.period_s, math.inf
+        # the error is now -th: the command falls from its value at landing to -start
+        rest = (command + self.start) / (self.integral_gain * self.gain * th)
+        return -th, float(k + part) * self.period_s, max(rest, 0.0)
+
+
+def stick_slip_cycle(
+    design: Design, loops: Loops, load_Nm: float, settling_ticks: int
+) -> StickSlipCycle | None:
+    """Find the symmetric stick-slip cycle of a drive whose speed controller integrates.
+
+    Parameters
+    ----------
+    loops : Loops
+        Sampled and sliding, of this design.
+    settling_ticks : int
+        How long a slip is followed, in ticks.
+
+    Returns
+    -------
+    StickSlipCycle or None
+        ``None`` where there is none: every slip stops short of the other side, or ends at a smaller error.
+    """
+    from scipy.optimize import brentq
+
+    slip = _slip(design, loops, load_Nm, settling_ticks)
+    if slip is None:
+        return None
+    threshold = slip.start / slip.gain
+    grid = threshold * np.geomspace(SMALLEST, LARGEST, POINTS)
+
+    def surplus(error: float) -> float:
+        found = slip.from_error(error)
+        return -error if found is None else -found[0] - error
+
+    values = np.array([surplus(float(error)) for error in grid])
+    falls = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
+    if not falls.size:
+        return None
+    k = int(falls[-1])
+    error = float(brentq(surplus, grid[k], grid[k + 1], xtol=1e-12 * grid[k]))
+    found = slip.from_error(error)
+    if found is None or not math.isfinite(found[2]):
+        return None
+    step = SLOPE_STEP * error
+    slope = (surplus(error + step) - surplus(error - step)) / (2.0 * step) + 1.0
+    _, slipping, resting = found
+    hz = 0.5 / (slipping + resting)
+    return StickSlipCycle(error / design.total_ratio, hz, slipping, resting, slope)
+
+
+def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | None:
+    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be."""
+    velocity, friction, system = design.controller.velocity, design.friction, loops.tick_system
+    symmetric = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
+    if velocity is None or velocity.integral_time_s is None or system is None or not symmetric:
+        return None
+    if friction.law != "coulomb" or design.load.path == "back-drivable" or friction.dry_Nm(load_Nm) == 0.0:
+        return None
+    torque_gain, resistance = _torque_gain(design)
+    start = friction.dry_Nm(load_Nm) * friction.breakaway_ratio / torque_gain
+    gain = velocity.gain * design.controller.position.gain
+    held = {"i": start, "I_velocity": start, "hold_i_ref": start}
+    voltage = start * resistance if design.controller.current is not None else start
+    if design.motor.has_electrical_dynamics and design.controller.current is None:
+        held["i"] = start / resistance
+    held |= {"I_current": voltage} | {name: voltage for name in system.states if name[0] == "u"}
+    error = {"th": -1.0, "I_velocity": -gain, "hold_w_ref": design.controller.position.gain}
+    rests = (
+        system.initial_state({k: v for k, v in held.items() if k in system.states}),
+        system.initial_state({k: v for k, v in error.items() if k in system.states}),
+    )
+    reference, dry = np.zeros(ticks), friction.dry_Nm(load_Nm)
+    runs = [system.respond(reference, -dry, rests[0]), system.respond(reference, 0.0, rests[1])]
+    key = "i_ref" if design.controller.current is not None else "u"
+    return _Slip(
+        period_s=design.controller.period_s,
+        gain=gain,
+        integral_gain=1.0 / velocity.integral_time_s,
+        start=start,
+        w=np.array([run["w"] for run in runs]),
+        th=np.array([run["th"] for run in runs]),
+        command=np.array([run[key] for run in runs]),
+    )
+
+
+def _torque_gain(design: Design) -> tuple[float, float]:
+    """Motor torque per unit of what the speed controller sets, rotor at rest, and the resistance."""
+    motor = design.motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V, 1.0
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    if design.controller.current is None:
+        return motor.torque_constant_Nm_A / motor.resistance_ohm, motor.resistance_ohm
+    return motor.torque_constant_Nm_A, motor.resistance_ohm
