@@ -85,7 +85,7 @@ def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
     from reports.sections.validation import section
 
     with progress(f"validating {drive.name}", quiet=quiet) as validating:
-        return section(validate(drive, progress=validating))
+        return section(validate(drive, progress=validating), timing=False)
 
 
 def _unstable(made: dict[str, object]) -> bool:

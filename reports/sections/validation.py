@@ -24,11 +24,15 @@ STATUS = {True: "pass", False: "fail", None: "info"}
 WORD = {True: "holds", False: "FAILS", None: "not judged"}
 
 
-def section(validation: Validation) -> list[dict[str, Any]]:
-    """Make all sections of a validation, verdicts first."""
+def section(validation: Validation, *, timing: bool = True) -> list[dict[str, Any]]:
+    """Make all sections of a validation, verdicts first; without ``timing`` the same input gives the same."""
     from reports.sections import conditional, confirmation, sweep
 
-    sections = [summary(validation), *sweep.sections(validation), *confirmation.sections(validation)]
+    sections = [
+        summary(validation, timing=timing),
+        *sweep.sections(validation),
+        *confirmation.sections(validation),
+    ]
     if validation.conditional is not None:
         sections.append(conditional.section(validation.conditional, validation.design.axis))
     return [*sections, *_others(validation)]
@@ -49,7 +53,7 @@ def _others(validation: Validation) -> list[dict[str, Any]]:
     return made
 
 
-def summary(validation: Validation) -> dict[str, Any]:
+def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
     """Make the section of verdicts with the ledger."""
     blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation), what="checks")]
     failed = [row for row in validation.ledger if row.passed is False]
@@ -61,7 +65,8 @@ def summary(validation: Validation) -> dict[str, Any]:
         )
     if validation.notes:
         blocks += [doc.text(note) for note in validation.notes]
-    blocks.append(doc.details("Where the time went", [_times(validation)]))
+    if timing:
+        blocks.append(doc.details("Where the time went", [_times(validation)]))
     intro = (
         "Every linear prediction was put to the nonlinear simulator. Small signals ride on a constant speed, "
         "where dry friction is a constant torque; what cannot hold from rest is shown with the reason."
@@ -173,16 +178,18 @@ def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
 
 
 def row_of(row: Entry) -> dict[str, Any]:
-    """One entry as a row; seconds as ms."""
+    """One entry as a row; seconds as ms; without the digits that are noise of the last bit."""
     scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, row.unit)
+    digits = 6 if row.quantity == "resonance" else 12  # where a flat top is highest is known to 1e-7 at best
+    predicted, measured = _rounded(row.predicted, scale, digits), _rounded(row.measured, scale, digits)
+    difference = _rounded(row.difference, scale, 5)
+    if row.quantity == "resonance" and predicted is not None and measured is not None:
+        difference = _rounded(measured - predicted, 1.0, 5)
     values = {
-        key: None if value is None else value * scale
-        for key, value in (
-            ("predicted", row.predicted),
-            ("measured", row.measured),
-            ("difference", row.difference),
-            ("tolerance", row.tolerance),
-        )
+        "predicted": predicted,
+        "measured": measured,
+        "difference": difference,
+        "tolerance": _rounded(row.tolerance, scale, 12),
     }
     return {
         "quantity": quantity_name(row),
@@ -193,6 +200,10 @@ def row_of(row: Entry) -> dict[str, Any]:
         "_status": STATUS[row.passed],
         **values,
     }
+
+
+def _rounded(value: float | None, scale: float, digits: int) -> float | None:
+    return None if value is None else float(f"{value * scale:.{digits}g}")
 
 
 def quantity_name(row: Entry) -> str:

@@ -5,6 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from actuator_lti import load_design
+from analyses.validation import QUICK, validate
+from reports.sections.validation import section
+
+
+def validated() -> list[dict[str, Any]]:
+    """Give the sections of a quick validation of ilr33-amber."""
+    return section(validate(load_design("ilr33-amber"), QUICK), timing=False)
+
 
 class Built(NamedTuple):
     """A report on disk and the document it was made of."""
