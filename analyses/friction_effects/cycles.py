@@ -135,6 +135,7 @@ def limit_cycles(
     step_rad: float,
     threshold_rad: float | None = None,
     stick_slip: StickSlipCycle | None = None,
+    foreseen: tuple[ForeseenCycle, ...] | None = None,
 ) -> LimitCycles:
     """Foresee limit cycles, look for them in the simulator, and wait what steps end in.
 
@@ -146,15 +147,23 @@ def limit_cycles(
         Command that breaks away at once; a step of `BELOW` of it is waited for too.
     stick_slip : StickSlipCycle, optional
         A cycle foreseen by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
+    foreseen : tuple of ForeseenCycle, optional
+        By describing function, if known already.
     """
-    top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
-    if not 0.0 < top < math.inf:
-        top = 1e3
-    foreseen = foreseen_cycles(design, load_Nm, top)
+    if foreseen is None:
+        foreseen = described_cycles(design, load_Nm)
     checked = tuple(_confirm(design, load_Nm, cycle) for cycle in foreseen)
     sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
     sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
     return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
+
+
+def described_cycles(design: Design, load_Nm: float) -> tuple[ForeseenCycle, ...]:
+    """Limit cycles by describing function, up to the top speed of the drive."""
+    if design.friction.dry_Nm(load_Nm, 1) + design.friction.dry_Nm(load_Nm, -1) <= 0.0:
+        return ()
+    top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
+    return foreseen_cycles(design, load_Nm, top if 0.0 < top < math.inf else 1e3)
 
 
 def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmation:

@@ -7,7 +7,7 @@ foreseen where an eigenvalue of the whole closed loop with that slope lies on th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,13 +66,31 @@ def foreseen_cycles(design: Design, load_Nm: float, top_speed_rad_s: float) -> t
     return tuple(cycle for cycle in found if cycle.frequency_hz > 0.0)
 
 
+def at_load(cycle: ForeseenCycle, design: Design, from_load_Nm: float, load_Nm: float) -> ForeseenCycle:
+    """The same cycle at another hinge moment: the slope at the border is the same, so W goes with Tc."""
+    ratio = _mean_dry(design, load_Nm) / _mean_dry(design, from_load_Nm)
+    return replace(
+        cycle,
+        speed_amplitude_rad_s=ratio * cycle.speed_amplitude_rad_s,
+        output_amplitude_rad=ratio * cycle.output_amplitude_rad,
+    )
+
+
+def _mean_dry(design: Design, load_Nm: float) -> float:
+    return 0.5 * (design.friction.dry_Nm(load_Nm, 1) + design.friction.dry_Nm(load_Nm, -1))
+
+
 def _matrix(design: Design, load_Nm: float, speed: float) -> tuple[np.ndarray, tuple[str, ...], float]:
     """Give the closed loop over one position period, with its states and that period."""
+    known: dict[tuple[bool, ...], np.ndarray] = {}
     wired = cascade(design, "describing-function", load_Nm, speed)
     program = TickProgram(wired, "position")
     A = np.eye(len(program.states))
     for k in range(program.ticks):
-        A = program.tick(k).A @ A
+        kind = tuple(k % every == 0 for every in wired.interval.values())
+        if kind not in known:
+            known[kind] = program.tick(k).A
+        A = known[kind] @ A
     return A, program.states, wired.period_s("position")
 
 

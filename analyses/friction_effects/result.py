@@ -10,7 +10,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.friction_effects.breakaway import Threshold, threshold
-from analyses.friction_effects.cycles import LimitCycles, limit_cycles
+from analyses.friction_effects.cycles import LimitCycles, described_cycles, limit_cycles
+from analyses.friction_effects.describing import ForeseenCycle, at_load
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.friction_effects.stick_slip import stick_slip_cycle
 from analyses.large_signal.steady_start import linear_steady_state
@@ -89,20 +90,26 @@ def friction_effects(
         return FrictionEffects(design, (), integrates, "the design has no dry friction")
     loops = assemble_loops(design) if loops is None else loops
     settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
-    points = []
+    points: list[FrictionPoint] = []
+    most = max(loads, key=lambda load: design.friction.dry_Nm(load, 1) + design.friction.dry_Nm(load, -1))
+    described = described_cycles(design, most)
     for load in loads:
-        points.append(_point(design, loops, load, settling))
+        dry = design.friction.dry_Nm(load, 1) + design.friction.dry_Nm(load, -1)
+        scaled = tuple(at_load(cycle, design, most, load) for cycle in described if dry > 0.0)
+        points.append(_point(design, loops, load, settling, scaled))
         if progress is not None:
             progress(len(points), len(loads))
     return FrictionEffects(design, tuple(points), integrates)
 
 
-def _point(design: Design, loops: Loops, load_Nm: float, settling_ticks: int) -> FrictionPoint:
+def _point(
+    design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[ForeseenCycle, ...]
+) -> FrictionPoint:
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
     found = threshold(design, load_Nm, settling_ticks)
     loop = None if found is None else hysteresis(design, load_Nm, found.static, settling_ticks)
     dry = design.friction.dry_Nm(load_Nm, 1)
     breakaway = None if found is None else found.static.forward_rad
     slips = None if found is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
-    cycles = limit_cycles(design, load_Nm, step, breakaway, slips)
+    cycles = limit_cycles(design, load_Nm, step, breakaway, slips, described)
     return FrictionPoint(load_Nm, dry, found, loop, cycles)

@@ -157,8 +157,8 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
                 }
             )
     note = (
-        "The third step at each load is 0.3 of the threshold, a fourth that of a foreseen cycle; errors below "
-        "1e-6 of the step are shown as 0."
+        "The third step at each load is 0.3 of the threshold, a fourth that of a foreseen cycle; errors "
+        "below 1e-6 of the step are shown as 0."
     )
     return doc.table("Standing error after a step", columns, rows, note)
 
