@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import subprocess
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,8 @@ from nonlinear._kernels.segment import CONSTANTS, prepare
 SOURCE = Path(__file__).with_name("c_reference.c")
 FLAGS = ("-O3", "-march=native", "-std=c11", "-D_GNU_SOURCE", "-fPIC", "-shared")
 DOUBLES = (
-    at.PERIOD, at.RESISTANCE, at.INDUCTANCE, at.BACK_EMF, at.TORQUE_CONSTANT, at.INERTIA, at.RATIO, at.VISCOUS,
+    at.PERIOD, at.RESISTANCE, at.INDUCTANCE, at.BACK_EMF, at.TORQUE_CONSTANT, at.INERTIA, at.RATIO,
+    at.VISCOUS,
     at.DRY, at.LOAD_COEFFICIENT, at.BREAKAWAY, at.POSITION_GAIN, at.VELOCITY_GAIN, at.VELOCITY_INTEGRAL,
     at.CURRENT_GAIN, at.CURRENT_INTEGRAL, at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT,
     at.VOLTAGE_LIMIT, at.LOAD, at.COMMAND + 1, at.COMMAND + 3, at.DELAY_FRACTION,
@@ -28,22 +28,18 @@ class CSimulator:
     """``simulate`` of ``c_reference.c``; needs gcc."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory()
-        library = Path(self._folder.name) / "c_reference.so"
-        subprocess.run(["gcc", *FLAGS, str(SOURCE), "-o", str(library), "-lm"], check=True)
-        self._simulate = ctypes.CDLL(str(library)).simulate
+        with tempfile.TemporaryDirectory() as folder:
+            library = Path(folder) / "c_reference.so"
+            subprocess.run(["gcc", *FLAGS, str(SOURCE), "-o", str(library), "-lm"], check=True)
+            self._simulate = ctypes.CDLL(str(library)).simulate  # stays mapped when the file goes
         self._simulate.restype = ctypes.c_int64
 
-    def run(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray, int, float]:
-        """History, flags, events and seconds of the run that the parameter row describes."""
+    def run(self, row: np.ndarray, history: np.ndarray, flags: np.ndarray) -> int:
+        """Fill history (8, ticks) and flags (ticks,) of the run that a row describes; events."""
         constants = np.zeros(CONSTANTS)
         prepare(row, constants)
         drive = np.array([row[k] for k in DOUBLES])
         counts = np.array([row[k] for k in INTEGERS], dtype=np.int64)
         packed = np.frombuffer(drive.tobytes() + counts.tobytes(), dtype=np.uint8).copy()
-        ticks = int(row[at.TICKS])
-        history, flags = np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
         pointers = [ctypes.c_void_p(a.ctypes.data) for a in (packed, constants, history, flags)]
-        start = time.perf_counter()
-        events = self._simulate(*pointers)
-        return history, flags, int(events), time.perf_counter() - start
+        return int(self._simulate(*pointers))

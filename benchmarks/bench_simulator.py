@@ -1,0 +1,196 @@
+"""Speed of the nonlinear simulator, each figure as a ratio measured in one run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+
+import numpy as np
+
+from actuator_lti import load_design
+from benchmarks.c_simulator import CSimulator
+from benchmarks.control_cascade import seconds_per_second
+from benchmarks.row import Row
+from nonlinear import commands
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.call import call
+from nonlinear.batch import put_sine, repeat_row, run_rows
+from nonlinear.parameters import design_row
+from nonlinear.setup import Tables, put_signal
+
+GROUP = "simulator"
+DURATION_S = 10.0
+FIRST_CALL = """
+import time
+start = time.perf_counter()
+from actuator_lti import load_design
+from nonlinear import commands, simulate
+simulate(load_design("ilr33-amber"), commands.sine(0.02, 1.0), 0.01)
+print(time.perf_counter() - start, time.process_time())
+"""
+
+
+def rows(quick: bool = False) -> Iterator[Row]:
+    """The rows of the table."""
+    row = sawtooth_row()
+    best = numba_seconds(row, 3 if quick else 20)
+    yield against_c(row, 2 if quick else 8)
+    yield against_control(best)
+    yield Row(
+        group=GROUP,
+        name="real time over one core's time, 10 s run with history",
+        measured=DURATION_S / best,
+        unit="x",
+        target=2000.0,
+        comparison=">=",
+        note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
+    )
+    yield two_threads(quick)
+    yield from constant_cost(quick)
+    yield from first_calls()
+
+
+def sawtooth_row() -> np.ndarray:
+    """5 deg at 1 Hz with 4 N m on the baseline: stick, slip and saturation."""
+    row = design_row(load_design("ilr33-amber"))
+    row[at.TICKS] = round(DURATION_S / row[at.PERIOD])
+    row[at.LOAD] = 4.0
+    put_signal(row, at.COMMAND, commands.sine(np.radians(5.0), 1.0), Tables())
+    return row
+
+
+def numba_seconds(row: np.ndarray, repeats: int) -> float:
+    """Best time of the compiled run with its history."""
+    history, flags = room(row)
+    out, shared, tables = np.zeros(at.OUT_SIZE), np.zeros(2), np.zeros(1)
+    return best_of(lambda: call(row, tables, history, flags, out, shared), repeats)
+
+
+def room(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Arrays for a history."""
+    ticks = int(row[at.TICKS])
+    return np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
+
+
+def best_of(work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.thread_time) -> float:
+    """Shortest time of some repetitions, after one for warming up; time of this thread unless said."""
+    work()
+    times = []
+    for _ in range(repeats):
+        start = clock()
+        work()
+        times.append(clock() - start)
+    return min(times)
+
+
+def against_c(row: np.ndarray, repeats: int) -> Row:
+    """The same run in C, in turns, each with its own arrays."""
+    reference, history, flags = CSimulator(), *room(row)
+    pairs = []
+    for _ in range(4):
+        here = numba_seconds(row, repeats)
+        there = best_of(lambda: reference.run(row, history, flags), repeats)
+        pairs.append((here, there))
+    here, there = np.array(pairs).min(axis=0)
+    return Row(
+        group=GROUP,
+        name="time over that of C (-O3 -march=native), 10 s run",
+        measured=float(here / there),
+        unit="x",
+        target=1.3,
+        note=f"C: {1e9 * there / row[at.TICKS]:.1f} ns a tick",
+    )
+
+
+def against_control(best: float) -> Row:
+    """The same cascade as python-control nonlinear systems."""
+    slow = seconds_per_second(load_design("ilr33-amber"), 4.0)
+    return Row(
+        group=GROUP,
+        name="speed over control.input_output_response (RK45, rtol 1e-6)",
+        measured=slow / (best / DURATION_S),
+        unit="x",
+        target=3000.0,
+        comparison=">=",
+        note=f"control: {slow:.0f} s for a simulated second, from its first 20 ms",
+    )
+
+
+def two_threads(quick: bool) -> Row:
+    """A batch of 1000 runs on two threads over one; and what two processes of plain arithmetic get here."""
+    row = sawtooth_row()
+    row[at.TICKS] = 2000 if quick else 20_000
+    batch = repeat_row(row, 1000)
+    put_sine(batch, at.COMMAND, np.linspace(0.001, 0.1, 1000), 3.0)
+    pairs = [
+        [best_of(lambda n=n: run_rows(batch, threads=n), 1, time.perf_counter) for n in (1, 2)]
+        for _ in range(3)
+    ]
+    one, two = np.array(pairs).min(axis=0)
+    return Row(
+        group=GROUP,
+        name="two threads over one, batch of 1000",
+        measured=float(one / two),
+        unit="x",
+        target=1.8,
+        comparison=">=",
+        note=f"two plain processes gain {machine_gain():.2f} on this machine now",
+    )
+
+
+def machine_gain() -> float:
+    """What two processes that share nothing gain over one: below 2 where the cores are shared."""
+    with ProcessPoolExecutor(2) as pool:
+        list(pool.map(spin, [1000, 1000]))
+        start = time.perf_counter()
+        list(pool.map(spin, [3_000_000]))
+        one = time.perf_counter() - start
+        start = time.perf_counter()
+        list(pool.map(spin, [3_000_000, 3_000_000]))
+        two = time.perf_counter() - start
+    return 2.0 * one / two
+
+
+def spin(n: int) -> int:
+    """Plain arithmetic."""
+    total = 0
+    for k in range(n):
+        total += k & 7
+    return total
+
+
+def constant_cost(quick: bool) -> Iterator[Row]:
+    """Cost per tick of short and of very long runs (reduced, without history)."""
+    row = sawtooth_row()
+    costs = []
+    for ticks in (10**4, 10**6, 10**7 if quick else 10**8):
+        row[at.TICKS], row[at.WINDOW], row[at.CYCLES] = ticks, 2000, 1
+        history, flags, out = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(at.OUT_SIZE)
+        work = partial(call, row, np.zeros(1), history, flags, out, np.zeros(2))
+        costs.append(best_of(work, 50 if ticks <= 10**6 else 1) / ticks)
+    yield Row(
+        group=GROUP,
+        name="dearest over cheapest cost per tick, 1e4 to 1e8 ticks",
+        measured=max(costs) / min(costs),
+        unit="x",
+        target=1.25,
+        note=", ".join(f"{1e9 * c:.1f}" for c in costs) + " ns",
+    )
+
+
+def first_calls() -> Iterator[Row]:
+    """First call with an empty cache, then in a new process."""
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        for name, target in (("first call after installation", 10.0), ("first call of a later process", 1.0)):
+            command = [sys.executable, "-c", FIRST_CALL]
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+            wall, cpu = (float(word) for word in done.stdout.split())
+            note = f"{cpu:.2f} s of processor time"
+            yield Row(group=GROUP, name=name, measured=wall, unit="s", target=target, note=note)
