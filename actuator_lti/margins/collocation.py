@@ -25,10 +25,11 @@ def chebyshev_differentiation(points: int) -> Real:
     return D - np.diag(D.sum(axis=1))
 
 
-def points_for(form: DelayForm, fastest: float) -> int:
-    """Collocation points for poles up to the frequency ``fastest`` (rad/s)."""
+def points_for(form: DelayForm, fastest: float) -> int | None:
+    """Collocation points for poles up to the frequency ``fastest`` (rad/s); ``None`` where too many."""
     longest = max([form.series_s, *form.delays.tolist()], default=0.0)
-    return int(np.clip(12 + 1.3 * fastest * longest, _FEWEST, _MOST))
+    points = 12 + 1.3 * fastest * longest
+    return None if points > _MOST else int(max(points, _FEWEST))
 
 
 def open_loop_matrix(form: DelayForm, points: int) -> Real:

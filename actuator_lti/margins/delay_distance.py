@@ -14,7 +14,7 @@ from actuator_lti.margins.extremes import COMPLEMENTARY, FAR, MODULUS, PEAK, Cri
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.sweep import reach
 
-_FINEST = 1e-3  # how much lower the smallest distance may be, relative, before it is polished
+_FINEST = 1e-4  # how much lower the smallest distance may be, relative, before it is polished
 _MOST = 400_000
 
 
@@ -27,7 +27,7 @@ def delayed_extreme(form: DelayForm, criterion: Criterion) -> tuple[float, float
 def smallest_distance(setting: Setting, found: Cells, criterion: Criterion) -> tuple[float, float]:
     """Smallest value of a criterion and its x, from intervals that cover the axis.
 
-    Intervals in which the bound allows less than 0.999 of the best so far are split; the best is polished.
+    Intervals in which the bound allows less than 0.9999 of the best so far are split; the best is polished.
 
     Raises
     ------

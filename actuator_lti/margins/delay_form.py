@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg.lapack import dgebal
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.factors import poles, zeros
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 _CHUNK = 512
@@ -20,7 +21,8 @@ class DelayForm:
 
     dx/dt = A x + B1 u + B2 z, y = C1 x + D11 u + D12 z, v = C2 x + D21 u + D22 z, z_k(t) = v_k(t - delays_k),
     and all of it behind one more delay ``series_s``. A sampled loop (``period_s``) has no inner delays;
-    its argument x is the angle of z, as in `RationalLoop`.
+    its argument x is the angle of z, as in `RationalLoop`. ``zeros`` and ``poles`` of a loop without inner
+    delays give a closer bound.
     """
 
     A: Real
@@ -35,6 +37,8 @@ class DelayForm:
     delays: Real
     series_s: float = 0.0
     period_s: float | None = None
+    zeros: Complex | None = None
+    poles: Complex | None = None
 
     @property
     def sampled(self) -> bool:
@@ -94,7 +98,8 @@ def from_rational(loop: RationalLoop, series_s: float) -> DelayForm:
     n = loop.order
     whole = np.empty((n + 1, n + 1))
     whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = loop.A, loop.b, loop.c, loop.d
-    return _form(whole, n, np.empty(0), series_s, loop.period_s)
+    form = _form(whole, n, np.empty(0), series_s, loop.period_s)
+    return replace(form, zeros=zeros(loop), poles=poles(loop))
 
 
 def _form(whole: Real, n: int, delays: Real, series_s: float, period_s: float | None) -> DelayForm:
@@ -193,9 +198,21 @@ def _cells(form: DelayForm, low: Real, high: Real) -> Cells:
     late = 1j * form.delays * lag * X[:, n:]
     top = turn[:, None] * X[:, :n] + late @ form.B2.T
     slope0 = -(Y[:, :n] * top).sum(axis=1) - (Y[:, n:] * (late @ form.D22.T)).sum(axis=1) - late @ form.D12
-    spread = _spread(form, half, np.abs(inverse), np.abs(X), np.abs(Y), q)
+    if form.zeros is not None and form.poles is not None:
+        spread = np.abs(L0) * _relative_spread(points, half, form.zeros, form.poles)
+    else:
+        spread = _spread(form, half, np.abs(inverse), np.abs(X), np.abs(Y), q)
     back = np.exp(-1j * x * form.series)
     return Cells(x, half, L0 * back, (slope0 - 1j * form.series * L0) * back, spread)
+
+
+def _relative_spread(points: Complex, half: Real, zeros: Complex, poles: Complex) -> Real:
+    """Bound of |L(x)/L - 1| from the factors: each (p - root) changes by half at most."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        up = half[:, None] / np.abs(points[:, None] - zeros)
+        down = half[:, None] / np.abs(points[:, None] - poles)
+        most = np.prod(1.0 + up, axis=1) / np.prod(np.maximum(1.0 - down, 0.0), axis=1)
+    return np.where((down < 1.0).all(axis=1), most - 1.0, np.inf)
 
 
 def _spread(form: DelayForm, half: Real, G: Real, X: Real, Y: Real, q: int) -> Real:

@@ -17,6 +17,7 @@ from actuator_lti.margins.sweep import RESOLVED, reach, subdivided
 
 FLOOR = 0.01  # gain below which no crossing of the real axis is listed: 40 dB
 _PER_DECADE = 12
+_NO_TURN = 0.99  # a gain below this takes 1 + L out of the right half plane nowhere
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Setting:
         Poles at zero frequency that L shows, and that it does not.
     listed_to : float
         Up to which x crossings of the real axis are listed however small the gain.
+    floor : float
+        Beyond that they are listed only where the gain is above this.
     """
 
     form: DelayForm
@@ -44,6 +47,7 @@ class Setting:
     order: int
     hidden: int
     listed_to: float = 0.0
+    floor: float = FLOOR
 
 
 def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> Setting:
@@ -68,8 +72,9 @@ def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = T
     if not tail:
         return Setting(form, poles, low, math.inf, order, hidden)
     high = _tail(form, max(float(sizes.max()) if sizes.size else 0.0, low * 10.0))
-    listed_to = 0.0 if band is None else float(band[1])
-    return Setting(form, poles, low, max(high, listed_to), order, hidden, listed_to)
+    if band is None:
+        return Setting(form, poles, low, high, order, hidden)
+    return Setting(form, poles, low, max(high, float(band[1])), order, hidden, float(band[1]), math.inf)
 
 
 def low_frequency(form: DelayForm) -> tuple[float, int]:
@@ -125,12 +130,13 @@ def _tail(form: DelayForm, start: float) -> float:
     )
 
 
-def excluded(found: Cells, R: Real, listed_to: float) -> tuple[Mask, Mask]:
+def excluded(found: Cells, R: Real, setting: Setting) -> tuple[Mask, Mask]:
     """Intervals that hold no crossing of the unit circle; none of the negative real axis."""
     size = np.abs(found.L)
     no_gain = (size - found.spread > 1.0) | (size + found.spread < 1.0)
     to_axis = np.where(found.L.real < 0.0, np.abs(found.L.imag), size)
-    return no_gain, (to_axis > R) | ((size + R < FLOOR) & (found.x > listed_to))
+    beyond = found.x - found.half > setting.listed_to
+    return no_gain, (to_axis > R) | ((size + R < setting.floor) & beyond)
 
 
 def cells_of(setting: Setting) -> Cells:
@@ -139,9 +145,10 @@ def cells_of(setting: Setting) -> Cells:
 
     def resolved(found: Cells) -> Mask:
         R = reach(form, found)
-        no_gain, no_phase = excluded(found, R, setting.listed_to)
-        turns = 0.7 * np.abs(1.0 + found.L) > R
-        return turns & ((RESOLVED * np.abs(found.L) >= R) | (no_gain & no_phase))
+        no_gain, no_phase = excluded(found, R, setting)
+        size = np.abs(found.L)
+        followed = (0.7 * np.abs(1.0 + found.L) > R) | (size + found.spread < _NO_TURN)
+        return followed & ((RESOLVED * size >= R) | (no_gain & no_phase))
 
     decades = max(math.log10(setting.high / setting.low), 0.1)
     edges = np.geomspace(setting.low, setting.high, int(_PER_DECADE * decades) + 2)

@@ -34,7 +34,7 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     setting = setting_of(form, band_rad_s)
     found = cells_of(setting)
     R = reach(form, found)
-    no_gain, no_phase = excluded(found, R, setting.listed_to)
+    no_gain, no_phase = excluded(found, R, setting)
     gain_x, gain_touch = crossings(form, found, GAIN, no_gain)
     phase_x, phase_touch = crossings(form, found, PHASE, no_phase)
     count = _nyquist(setting, found)
@@ -46,8 +46,9 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
 def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
     """Frequencies at which the gain crosses ``level``, in order (x)."""
     scaled = replace(form, C1=form.C1 / level, D11=form.D11 / level, D12=form.D12 / level)
-    found = cells_of(setting_of(scaled, None))
-    x, touch = crossings(scaled, found, GAIN, excluded(found, reach(scaled, found), 0.0)[0])
+    setting = setting_of(scaled, None)
+    found = cells_of(setting)
+    x, touch = crossings(scaled, found, GAIN, excluded(found, reach(scaled, found), setting)[0])
     return x[~touch].tolist() if x.size else []
 
 
@@ -74,7 +75,10 @@ def _agreement(setting: Setting, count: int | None, found: Cells, crossover: flo
     form = setting.form
     if form.sampled:
         return Agreement(None, count)
-    closed = sorted_poles(closed_loop_matrix(form, points_for(form, 2.0 * crossover)), False)
+    points = points_for(form, 2.0 * crossover)
+    if points is None:  # the gain is above one for many turns of the delay: more poles than can be collocated
+        return Agreement(None, count)
+    closed = sorted_poles(closed_loop_matrix(form, points), False)
     return Agreement(closed.unstable, count, max(closed.border_count - setting.hidden, 0))
 
 

@@ -41,7 +41,8 @@ def slope_at_dc(response: Callable[[Real], Complex], start: float, most: int) ->
             "a pole at zero frequency is cancelled, all but completely: cancel it in the loop first"
         )
     order = int(np.round(slope[whole]).max())
-    k = int(whole[np.round(slope[whole]) == order][0])
+    steepest = whole[np.round(slope[whole]) == order]
+    k = int(steepest[steepest.size // 2])
     return max(order, 0), complex(L[k + 1])
 
 

@@ -100,6 +100,11 @@ def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
             values, radius, cloud = _gathered(values, radius, float(np.abs(A).max()), in_z)
         distance = np.abs(values) - 1.0 if in_z else values.real
         on_border = np.abs(distance) <= radius
+        if gather:
+            centre = 1.0 if in_z else 0.0
+            scattered = on_border & (np.abs(values - centre) <= 2.0 * radius)
+            cloud = max(cloud, float(np.abs(values - centre)[scattered].max(initial=0.0)))
+            values[scattered], radius[scattered] = centre, 0.0
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     border = _clusters(values, radius, on_border, in_z)
     return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), cloud)
@@ -118,7 +123,7 @@ def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[C
         beyond = float(distance[order[m]]) if m < values.size else norm
         reach = float(distance[order[m - 1]])
         scatter = _SCATTER * (_EPS * norm) ** (1.0 / m) * beyond ** (1.0 - 1.0 / m)
-        if reach <= (scatter if m > 1 else radius[order[0]]) and reach <= 1e-4 * beyond:
+        if reach <= (scatter if m > 1 else radius[order[0]]) and reach <= 1e-6 * beyond:
             values, radius = values.copy(), radius.copy()
             values[order[:m]], radius[order[:m]] = centre, 0.0
             return values, radius, reach

@@ -61,7 +61,7 @@ def rational_margins(loop: RationalLoop) -> StabilityMargins:
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     if not loop.order or not loop.b.any() or not loop.c.any():
         return _constant(loop)
-    poles = sorted_poles(loop.A, loop.in_z, gather=True)
+    poles = sorted_poles(loop.A, loop.in_z, gather=loop.numerator is None)
     closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     end_x = loop.end
     inner = np.array([pole.x for pole in poles.border if 0.0 < pole.x < end_x])
@@ -253,7 +253,7 @@ def _order_at_dc(loop: RationalLoop, poles: SortedPoles, first_x: float) -> tupl
     """
     distance = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
     away = distance[distance > 1e-9 * distance.max()]
-    start = 0.1 * min(first_x, float(away.min()) if away.size else first_x)
+    start = 0.1 * float(away.min() if away.size else first_x)
     return slope_at_dc(loop.response, max(start, _FLOOR * poles.cloud), poles.at_dc)
 
 

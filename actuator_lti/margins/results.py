@@ -25,6 +25,7 @@ __all__ = [
     "Verdict",
 ]
 
+_PRINTED = 8
 Verdict = Literal["stable", "unstable", "on the border", "undecided"]
 
 
@@ -154,7 +155,9 @@ def _lines(m: StabilityMargins) -> list[str]:
     for name, margins in named:
         if not margins:
             lines.append(f"{name} margin: none")
-        lines += [f"{name} margin: {margin}" for margin in margins]
+        lines += [f"{name} margin: {margin}" for margin in margins[:_PRINTED]]
+        if len(margins) > _PRINTED:
+            lines.append(f"{name} margin: {len(margins) - _PRINTED} more")
     if m.modulus_margin is not None and m.modulus_frequency_rad_s is not None:
         lines.append(f"modulus margin: {m.modulus_margin:.6g} at {frequency_text(m.modulus_frequency_rad_s)}")
     if m.disk_margin is not None:

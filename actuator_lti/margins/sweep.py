@@ -6,16 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.crossings import TOUCH
 from actuator_lti.margins.delay_form import Cells, DelayForm, cells
-from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.loop import Complex, Mask, Real
 
 RESOLVED = 0.05  # change inside an interval, relative to the value, below which it is not split further
 _MOST = 400_000
 _NARROWEST = 1e-12
+_STEPS = 80
+_CLOSE = 1e-14
 
 
 def reach(form: DelayForm, found: Cells) -> Real:
@@ -43,7 +46,8 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Cells], Mask]) 
         low, high = low[~good], high[~good]
         if count > _MOST:
             raise NumericalError(
-                f"more than {_MOST} intervals up to {edges[-1]:.4g}: ask for a narrower band_rad_s"
+                f"more than {_MOST} intervals up to {edges[-1]:.4g} rad/s: the delay turns the loop too many "
+                "times while its gain is of consequence; shorten the delay, or ask for a narrower band_rad_s"
             )
         if low.size and float(((high - low) / high).min()) < _NARROWEST:
             raise NumericalError(
@@ -70,17 +74,13 @@ def joined(parts: list[Cells]) -> Cells:
 class Level:
     """A real function of L whose zeros are wanted: its value, its rate by x, and whether a zero counts."""
 
-    value: Callable[[complex], float]
-    rate: Callable[[complex, complex], float]
-    counts: Callable[[complex], bool]
+    value: Callable[[Complex], Real]
+    rate: Callable[[Complex, Complex], Real]
+    counts: Callable[[Complex], Mask]
 
 
-def _phase(L: complex) -> float:
-    return float(np.angle(-L))
-
-
-GAIN = Level(lambda L: float(np.log(abs(L))), lambda L, d: (d / L).real, lambda L: True)
-PHASE = Level(_phase, lambda L, d: (d / L).imag, lambda L: L.real < 0.0)
+GAIN = Level(lambda L: np.log(np.abs(L)), lambda L, d: (d / L).real, lambda L: np.ones(L.shape, dtype=bool))
+PHASE = Level(lambda L: np.angle(-L), lambda L, d: (d / L).imag, lambda L: L.real < 0.0)
 
 
 def crossings(form: DelayForm, found: Cells, level: Level, skip: Mask) -> tuple[Real, Mask]:
@@ -93,34 +93,63 @@ def crossings(form: DelayForm, found: Cells, level: Level, skip: Mask) -> tuple[
     touch : array of bool
         Whether the level is only touched there.
     """
-    value = np.array([level.value(L) for L in found.L])
-    rate = np.array([level.rate(L, d) for L, d in zip(found.L, found.slope, strict=True)])
-    out: list[tuple[float, bool]] = []
+    value, rate = level.value(found.L), level.rate(found.L, found.slope)
+    near = ~(skip[1:] & skip[:-1]) & (np.abs(value[1:] - value[:-1]) < 3.0)  # else the angle wraps
+    x = _roots(form, level, found.x, value, np.flatnonzero(near & (value[1:] * value[:-1] <= 0.0)))
+    turns = (
+        near & (value[:-1] * rate[:-1] < 0.0) & (value[1:] * rate[1:] > 0.0) & (value[1:] * value[:-1] > 0.0)
+    )
+    pairs: list[tuple[float, bool]] = []
+    for k in np.flatnonzero(turns):
+        pairs += _near_turn(form, level, float(found.x[k]), float(found.x[k + 1]), float(value[k]))
+    all_x = np.concatenate((x, [at for at, _ in pairs]))
+    touch = np.concatenate((np.zeros(x.size, dtype=bool), [flat for _, flat in pairs])).astype(bool)
+    order = all_x.argsort()
+    return all_x[order], touch[order]
 
-    def at(x: float) -> float:
-        return level.value(complex(cells(form, np.array([x]), np.array([x])).L[0]))
 
-    def rate_at(x: float) -> float:
-        one = cells(form, np.array([x]), np.array([x]))
-        return level.rate(complex(one.L[0]), complex(one.slope[0]))
+def _at(form: DelayForm, x: Real) -> Cells:
+    return cells(form, x, x)
 
-    def root(function: Callable[[float], float], low: float, high: float) -> float:
-        return float(brentq(function, low, high, xtol=1e-300, rtol=1e-15, maxiter=300))
 
-    candidates = np.flatnonzero(~(skip[1:] & skip[:-1]) & (np.abs(value[1:] - value[:-1]) < 3.0))
-    for i in candidates:
-        low, high = float(found.x[i]), float(found.x[i + 1])
-        if value[i] * value[i + 1] < 0.0:
-            x = root(at, low, high)
-            if level.counts(complex(cells(form, np.array([x]), np.array([x])).L[0])):
-                out.append((x, False))
-        elif value[i] == 0.0:
-            out.append((low, False))
-        elif value[i] * rate[i] < 0.0 < value[i + 1] * rate[i + 1]:
-            top = root(rate_at, low, high)
-            peak = at(top)
-            if abs(peak) <= TOUCH:
-                out.append((top, True))
-            elif peak * value[i] < 0.0:
-                out += [(root(at, low, top), False), (root(at, top, high), False)]
-    return np.array([x for x, _ in out]), np.array([touch for _, touch in out], dtype=bool)
+def _roots(form: DelayForm, level: Level, x: Real, value: Real, hit: NDArray[np.intp]) -> Real:
+    """Newton in all brackets [x[k], x[k + 1]] at once, bisection wherever it would leave its own."""
+    if not hit.size:
+        return np.empty(0)
+    low, high, side = x[hit], x[hit + 1], value[hit]
+    share = np.abs(value[hit]) / np.maximum(np.abs(value[hit]) + np.abs(value[hit + 1]), 1e-300)
+    at = low + share * (high - low)
+    for _ in range(_STEPS):
+        point = _at(form, at)
+        here = level.value(point.L)
+        before = here * side > 0.0
+        low, high = np.where(before, at, low), np.where(before, high, at)
+        ahead = at - here / level.rate(point.L, point.slope)
+        ahead = np.where((ahead >= low) & (ahead <= high), ahead, 0.5 * (low + high))
+        done = np.abs(ahead - at) <= _CLOSE * at
+        at = ahead
+        if done.all():
+            break
+    return at[level.counts(_at(form, at).L)]
+
+
+def _near_turn(
+    form: DelayForm, level: Level, low: float, high: float, side: float
+) -> list[tuple[float, bool]]:
+    """Where the level turns back between two points: no zero, a touch, or a pair of zeros."""
+
+    def value(x: float) -> float:
+        return float(level.value(_at(form, np.array([x])).L)[0])
+
+    def rate(x: float) -> float:
+        one = _at(form, np.array([x]))
+        return float(level.rate(one.L, one.slope)[0])
+
+    def root(function: Callable[[float], float], start: float, stop: float) -> float:
+        return float(brentq(function, start, stop, xtol=1e-300, rtol=1e-15, maxiter=300))
+
+    top = root(rate, low, high)
+    peak = value(top)
+    if abs(peak) <= TOUCH:
+        return [(top, True)]
+    return [(root(value, low, top), False), (root(value, top, high), False)] if peak * side < 0.0 else []

@@ -91,6 +91,33 @@ def test_bound_holds_inside_every_interval() -> None:
     assert np.abs(slope / found.slope - 1).max() < 1e-5
 
 
+@pytest.mark.parametrize("sampled", [False, True])
+def test_bound_from_the_factors_holds_and_is_close(sampled: bool) -> None:
+    loop = control.ss(40 * (s**2 + 0.1 * s + 30) / (s**2 * (s**2 + 0.02 * s + 25) * (s / 30 + 1)))
+    form = from_rational(rational_loop(control.c2d(loop, 0.02) if sampled else loop), 0.013)
+    rng = np.random.default_rng(5)
+    low = np.exp(rng.uniform(np.log(0.01), np.log(2.5 if sampled else 100.0), 400))
+    high = low * (1 + 10 ** rng.uniform(-5, -1, 400))
+    bare = form.without_series()
+    found = cells(bare, low, high)
+    bounded = np.isfinite(found.spread)
+    seen = np.zeros(low.size)
+    for part in np.linspace(0, 1, 33):
+        seen = np.maximum(seen, np.abs(border_values(bare, low + part * (high - low)) - found.L))
+    assert bounded.mean() > 0.9
+    assert (seen[bounded] <= found.spread[bounded] * (1 + 1e-6) + 1e-12 * np.abs(found.L[bounded])).all()
+    assert np.median(found.spread[bounded] / seen[bounded]) < 4.0
+
+
+def test_a_double_integrator_close_to_the_negative_axis_takes_no_endless_splitting() -> None:
+    den = [1.0]
+    for factor in ([1, 2.05], [1, 0.2, 0.39], [1, 0.25], [1, 0, 0]):
+        den = np.polymul(den, factor)
+    m = stability_margins(control.tf([1e-3], den), delay_s=0.05)
+    assert m.stable is False
+    assert m.agreement.unstable_poles == m.agreement.unstable_nyquist
+
+
 def test_collocated_poles_are_those_of_the_exact_delay() -> None:
     form = from_rational(rational_loop(control.tf([100], [1, 0])), 0.005)
     values = np.linalg.eigvals(closed_loop_matrix(form, 24))

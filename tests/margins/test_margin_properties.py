@@ -141,8 +141,9 @@ def test_smallest_distances_are_not_undercut_on_a_grid(loop: control.TransferFun
     L = np.polyval(loop.num[0][0], points) / np.polyval(loop.den[0][0], points)
     assert m.modulus_margin is not None
     assert m.disk_margin is not None
-    assert m.modulus_margin <= np.abs(1 + L).min() * (1 + 1e-6)
-    assert m.disk_margin.alpha <= np.abs(2 * (1 + L) / (1 - L)).min() * (1 + 1e-6)
+    rel = 1e-3 if loop.dt else 1e-6  # polynomials in z near z = 1 lose digits in this plain evaluation
+    assert m.modulus_margin <= np.abs(1 + L).min() * (1 + rel)
+    assert m.disk_margin.alpha <= np.abs(2 * (1 + L) / (1 - L)).min() * (1 + rel)
 
 
 @settings(max_examples=25, deadline=None)

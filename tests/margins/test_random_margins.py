@@ -1,8 +1,7 @@
 """Thousands of random loops against polynomial roots at high precision: every crossover found, none invented.
 
 Lightly damped, non-minimum-phase, unstable, integrating and sampled loops of order 2 to 12, as transfer
-functions and as badly scaled, permuted state spaces. python-control 0.10.2 is right on about 95 % of such
-a set.
+functions and as badly scaled, permuted state spaces.
 """
 
 from __future__ import annotations
