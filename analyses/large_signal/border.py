@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,8 @@ class BorderCheck:
         Empty where there is none.
     resolution : float
         Relative width of the last interval of the bisection.
+    reason : str
+        Why it is not judged, if so.
     """
 
     friction_on: bool
@@ -45,6 +47,7 @@ class BorderCheck:
     predicted_limiter: tuple[str, ...]
     simulated_limiter: tuple[str, ...]
     resolution: float
+    reason: str = ""
 
     @property
     def ratio(self) -> np.ndarray:
@@ -63,8 +66,10 @@ class BorderCheck:
         return tuple(a == b for a, b in zip(self.predicted_limiter, self.simulated_limiter, strict=True))
 
     @property
-    def passed(self) -> bool:
-        """Within `TOLERANCE` with the same limiter at every frequency (friction off)."""
+    def passed(self) -> bool | None:
+        """Within `TOLERANCE` with the same limiter at every frequency; ``None`` where not judged."""
+        if self.reason:
+            return None
         error = self.largest_error
         return error is None or (error <= TOLERANCE and all(self.same_limiter))
 
@@ -87,7 +92,10 @@ def check_border(
     ----------
     friction_on : bool
         Without dry friction the border is that of the linear loop; with it, the shift is what is asked for.
+        Encoder counts are left out together with the friction: they are no part of the linear loop.
     """
+    if not friction_on:
+        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])
@@ -119,7 +127,17 @@ def check_border(
         border.active,
         tuple(names),
         (tries[1] / tries[0]) ** (0.5**rounds) - 1.0,
+        _not_linear(design, friction_on),
     )
+
+
+def _not_linear(design: Design, friction_on: bool) -> str:
+    """Say why the border need not be that of the linear loop; empty where it must be."""
+    if friction_on:
+        return "dry friction shifts the border"
+    if design.friction.viscous(1) != design.friction.viscous(-1):
+        return "viscous friction differs by direction, so that no single linear loop describes the drive"
+    return ""
 
 
 def _bisect(

@@ -93,9 +93,28 @@ def test_the_border_check_can_fail(amber: Design) -> None:
     assert not border.passed
 
 
+def test_encoder_counts_are_no_part_of_the_border(amber: Design) -> None:
+    encoder = replace(amber.encoder, speed="difference", difference_samples=4, filter_time_s=5e-4)
+    design = replace(amber, encoder=encoder)
+    assert design.encoder.counts_per_rev == 1024
+    border = check_border(design, assemble_loops(design))
+    assert border is not None
+    assert border.passed
+
+
+def test_viscous_friction_by_direction_is_not_judged() -> None:
+    emps = load_design("emps")
+    design = replace(emps, friction=replace(emps.friction, viscous_reverse_Nms_rad=240.0))
+    border = check_border(design, assemble_loops(design), count=4)
+    assert border is not None
+    assert border.passed is None
+    assert "direction" in border.reason
+
+
 def test_friction_shifts_the_border(amber: Design) -> None:
     border = check_border(amber, assemble_loops(amber), friction_on=True)
     assert border is not None
+    assert border.passed is None
     assert 0.01 < np.max(np.abs(border.ratio - 1.0)) < 0.1
     # at low frequency it is the speed command that limits, which friction hardly changes
     assert abs(border.ratio[0] - 1.0) < 0.005
