@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.friction_effects.static import StaticThreshold, static_threshold
+from analyses.static_threshold import StaticThreshold, static_threshold
 from nonlinear._kernels import layout as at
 from nonlinear.batch import put_step, repeat_row, run_rows
 from nonlinear.parameters import design_row

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.friction_effects.static import StaticThreshold
+from analyses.static_threshold import StaticThreshold
 from nonlinear import commands, simulate
 
 SPAN = 25.0  # amplitude over the threshold

@@ -71,7 +71,7 @@ def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.nda
     Parameters
     ----------
     smallest_rad : float or None
-        Command that just overcomes dry friction at once (`analyses.friction_effects.threshold`); the range
+        Command that just overcomes dry friction at once (`analyses.static_threshold`); the range
         begins at twice that, within 1/20000 to 1/200 of full deflection.
     """
     full = design.validation.full_deflection_rad

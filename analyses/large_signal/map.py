@@ -10,11 +10,11 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops
-from analyses.friction_effects.static import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, waveforms
 from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
+from analyses.static_threshold import static_threshold
 from nonlinear._kernels import layout as at
 
 Progress = Callable[[int, int], None]

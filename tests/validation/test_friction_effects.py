@@ -12,7 +12,7 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
 from analyses.friction_effects.cycles import limit_cycles, settle
-from analyses.friction_effects.static import static_threshold
+from analyses.static_threshold import static_threshold
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,13 @@ import pytest
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
-from analyses.friction_effects.static import static_threshold
 from analyses.large_signal.border import check_border
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
+from analyses.static_threshold import static_threshold
 
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
 
