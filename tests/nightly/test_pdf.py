@@ -69,6 +69,33 @@ def test_the_cover_names_design_revision_verdicts_and_who_signs(plain) -> None:
         assert piece in cover, piece
 
 
+def test_a_dozen_requirements_still_leave_room_to_sign_on_the_cover() -> None:
+    from reports.document import verdict, verdicts
+
+    items = [
+        verdict(
+            f"r{k}",
+            f"requirement {k}",
+            value=9.0,
+            limit=6.0,
+            unit="dB",
+            distance=3.0,
+            passed=True,
+            source="s",
+        )
+        for k in range(12)
+    ]
+    blocks = [verdicts(items), verdicts(items[:2], what="checks"), verdicts(items[:2], what="odds")]
+    made = document(
+        title="A drive", subtitle="words " * 30, design={"name": "a", "revision": "B"}, provenance=ORIGIN,
+        sections=[section("verdicts", "Verdicts", blocks)],
+    )  # fmt: skip
+    cover = words_of(read(pdf_bytes(made)).pages[0])
+    assert "12 of 12 requirements met" in cover
+    assert "requirement 11" in cover
+    assert "Signature" in cover
+
+
 def test_every_page_is_numbered(plain) -> None:
     count = len(plain.pages)
     assert count >= 2
