@@ -11,7 +11,6 @@ from nonlinear._kernels.segment import CONSTANTS, prepare
 from nonlinear._kernels.smooth import LEVEL, LEVELS, prepare_tanh
 
 Floats = npt.NDArray[np.float64]
-NO_TABLE = np.zeros(0)
 
 
 def call(
@@ -22,10 +21,11 @@ def call(
     out: Floats,
     shared: Floats,
 ) -> int:
-    """Run one row (see `run`); coefficients of the tanh law are made, and compiled, only where it is used."""
-    constants, table = np.zeros(CONSTANTS), NO_TABLE
+    """Run one row (see `run`); the tanh law is prepared, and compiled, only where it is used."""
+    constants = np.zeros(CONSTANTS)
     prepare(row, constants)
-    if row[layout.LAW] > 0.0:
-        table = np.zeros(2 * LEVELS * LEVEL)
-        prepare_tanh(row, constants, table)
+    if row[layout.LAW] == 0.0:
+        return int(run(row, constants, None, tables, history, flags, out, shared))
+    table = np.zeros(2 * LEVELS * LEVEL)
+    prepare_tanh(row, constants, table)
     return int(run(row, constants, table, tables, history, flags, out, shared))

@@ -26,7 +26,8 @@ PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
     """Run the drive described by the row ``p``; returns a status number of ``layout``.
 
-    ``c`` holds the constants of `segment.prepare`, ``table`` those of `smooth.prepare_tanh` (or nothing).
+    ``c`` holds the constants of `segment.prepare`, ``table`` those of `smooth.prepare_tanh`.  With ``None`` for
+    it, the tanh law is not even compiled.
     ``history`` is (columns, rows) or empty; ``flag_history`` (rows,); ``out`` a row of results;
     ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops the run.
     """
@@ -45,7 +46,6 @@ def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignor
     offset, CM = p[layout.OFFSET], p[layout.LOAD_COEFFICIENT]
     load_slope = p[layout.LOAD_SLOPE] / N
     load_length, torque_length = int(p[layout.LOAD_TABLE_LENGTH]), int(p[layout.TORQUE_TABLE_LENGTH])
-    tanh_law = p[layout.LAW] > 0.0
     probe_u, probe_i = p[PROBE_U] > 0.0, p[PROBE_I] > 0.0
     probe_w, probe_y = p[PROBE_W] > 0.0, p[PROBE_Y] > 0.0
     probing = probe_u or probe_i or probe_w or probe_y
@@ -70,6 +70,8 @@ def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignor
     i, w, th = p[layout.CURRENT_START], p[layout.SPEED_START], p[layout.ANGLE_START]
     th_start = th
     s = 1.0 if smooth or w > 0.0 else (-1.0 if w < 0.0 else 0.0)
+    if table is not None:  # the smoothed law knows no rest
+        s = 1.0
     I_c, I_v = p[layout.CURRENT_INTEGRATOR_START], p[layout.VELOCITY_INTEGRATOR_START]
     w_lim = p[layout.SPEED_COMMAND_START]
     w_ref, i_ref, u = w_lim, p[layout.CURRENT_COMMAND_START], p[layout.VOLTAGE_START]
@@ -252,7 +254,7 @@ def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignor
         events = 0
         for part in range(0 if split else 1, 2):
             held = u_first if part == 0 else u_second
-            if tanh_law:
+            if table is not None:
                 i, w, th = tanh_segment(p, c, table, part, held, Tb, Tcp, Tcm, i, w, th, out)
                 continue
             if not close:

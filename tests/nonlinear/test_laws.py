@@ -131,3 +131,9 @@ def test_tanh_against_an_integrator(tolerance: float) -> None:
         x = solve_ivp(rate, (0.0, Ts), x, "DOP853", args=(held[k],), rtol=1e-12, atol=1e-13).y[:, -1]
     assert np.abs(speeds).max() > 10.0
     assert np.abs(run.motor_speed_rad_s - speeds).max() < 10.0 * tolerance * f.smoothing_speed_rad_s + 1e-9
+
+
+def test_the_smoothed_law_knows_no_rest() -> None:
+    run = simulate(smooth(), commands.hold(), 0.01)
+    assert run.stick_fraction == 0.0
+    assert simulate(load_design("ilr33-amber"), commands.hold(), 0.01).stick_fraction == 1.0
