@@ -126,6 +126,9 @@ def facts(items: Iterable[Mapping[str, Any]]) -> Block:
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
 
+COMPARISONS = {">=": "≥", "<=": "≤"}
+
+
 def verdict(
     id: str,
     label: str,
@@ -139,14 +142,17 @@ def verdict(
     reason: str = "",
     comparison: str = "",
 ) -> dict[str, Any]:
-    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` may be None."""
+    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` may be None.
+
+    ``comparison`` is the good side of the limit, ``">="`` or ``"<="``; it is kept as it is printed.
+    """
     return plain(
         {
             "id": id,
             "label": label,
             "value": value,
             "limit": limit,
-            "comparison": comparison,
+            "comparison": COMPARISONS.get(comparison, comparison),
             "unit": unit,
             "distance": distance,
             "passed": passed,

@@ -37,7 +37,7 @@ def draw(data: dict[str, Any], fig: Figure) -> None:
     gain.tick_params(labelbottom=False)
     gain.set_title("Output over command")
     gain.set_ylabel("gain of the fundamental, dB")
-    phase.set_ylabel("phase, °")
+    phase.set_ylabel("phase, deg")
     gain.legend(loc="lower left", title="amplitude")
     _bandwidths(fig.add_subplot(grid[:, 1]), data["against"])
 

@@ -117,7 +117,7 @@ def _limit_text(item: Mapping[str, Any]) -> str:
     if limit is None:
         return ""
     text = f"{limit:.6g}" if _is_number(limit) else str(limit)
-    comparison = str(item.get("comparison") or "").replace(">=", "≥").replace("<=", "≤")
+    comparison = str(item.get("comparison") or "")
     return f"{comparison} {text}".strip()
 
 

@@ -21,7 +21,7 @@ def section(result: FrictionEffects) -> dict[str, Any]:
         blocks = [doc.text(f"Not applicable: {result.reason}.")]
         return doc.section("friction-effects", title, blocks)
     scale, unit = output_unit(result.design)
-    fine, small = 1e3 * scale, {"°": "m°", "mm": "µm"}[unit]
+    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
     load = load_unit(result.design)
     items = [_cycle_verdict(point, fine, small, load) for point in result.points]
     blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]

@@ -45,7 +45,7 @@ def section(result: LargeSignals) -> dict[str, Any]:
 
 def output_unit(design: Design) -> tuple[float, str]:
     """Scale and unit of an output position: degrees, or millimetres on a linear axis."""
-    return (1e3, "mm") if design.axis == "linear" else (math.degrees(1.0), "°")
+    return (1e3, "mm") if design.axis == "linear" else (math.degrees(1.0), "deg")
 
 
 def load_unit(design: Design) -> str:
@@ -86,7 +86,7 @@ def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
         )
     rows = (
         ("gain", "fundamental of the sawtooth against 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
-        ("lag", "lag of the sawtooth against arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "°"),
+        ("lag", "lag of the sawtooth against arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
     )
     return [
         doc.verdict(

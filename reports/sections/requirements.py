@@ -63,7 +63,7 @@ def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
     """Give the limit that is nearer, and the side that is good."""
     low, high = verdict.requirement.minimum, verdict.requirement.maximum
     if low is None:
-        return high, "≤"
+        return high, "<="
     if high is None or verdict.value is None:
-        return low, "≥"
-    return (low, "≥") if verdict.value - low <= high - verdict.value else (high, "≤")
+        return low, ">="
+    return (low, ">=") if verdict.value - low <= high - verdict.value else (high, "<=")

@@ -149,7 +149,7 @@ def _verdict(
         distance = value - limit if comparison == ">=" else limit - value
     return doc.verdict(
         id, label, value=value, limit=limit, unit=unit, distance=distance, passed=passed, reason=reason,
-        comparison={">=": "≥", "<=": "≤"}[comparison],
+        comparison=comparison,
     )  # fmt: skip
 
 
