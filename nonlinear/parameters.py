@@ -22,8 +22,8 @@ def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
 
     Examples
     --------
-    >>> split_delay(1.5e-4, 1e-4)
-    (1, 5e-05)
+    >>> split_delay(3e-4, 1e-4)
+    (3, 0.0)
     """
     whole = floor(delay_s / period_s + 1e-9)
     rest = delay_s - whole * period_s

@@ -26,8 +26,8 @@ PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
     """Run the drive described by the row ``p``; returns a status number of ``layout``.
 
-    ``c`` holds the constants of `segment.prepare`, ``table`` those of `smooth.prepare_tanh`.  With ``None`` for
-    it, the tanh law is not even compiled.
+    ``c`` holds the constants of `segment.prepare`, ``table`` those of `smooth.prepare_tanh`; with ``None``
+    for it the tanh law is not even compiled.
     ``history`` is (columns, rows) or empty; ``flag_history`` (rows,); ``out`` a row of results;
     ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops the run.
     """

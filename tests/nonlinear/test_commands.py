@@ -1,0 +1,161 @@
+"""Commands, loads and results: values, units and refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuator_lti import load_design
+from actuator_lti.errors import InputError, NumericalError
+from nonlinear import State, commands, loads, simulate
+from nonlinear.commands import Command
+from nonlinear.records import read_columns
+
+TS = 1e-3
+T = np.arange(2000) * TS
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        (commands.sine(2.0, 3.0, 0.4, 0.5), np.where(T >= 0.5, 2 * np.sin(6 * np.pi * (T - 0.5) + 0.4), 0)),
+        (commands.ramp(2.0, 0.3, 0.8), 2.0 * np.clip(T - 0.3, 0.0, 0.5)),
+        (commands.step(1.5, 0.25), np.where(T >= 0.25, 1.5, 0.0)),
+        (commands.hold(0.7), np.full(T.size, 0.7)),
+        (commands.triangle(2.0, 4.0), 2.0 * signal.sawtooth(8 * np.pi * T + np.pi / 2, 0.5)),
+        (
+            commands.chirp(1.0, 1.0, 20.0, 2.0),
+            signal.chirp(T, 1.0, 2.0, 20.0, method="logarithmic", phi=-90.0),
+        ),
+        (
+            commands.chirp(1.0, 1.0, 20.0, 2.0, logarithmic=False),
+            signal.chirp(T, 1.0, 2.0, 20.0, phi=-90.0),
+        ),
+        (commands.sampled([0.0, 1.0, 2.0], [0.0, 3.0, 1.0]), np.interp(T, [0, 1, 2], [0, 3, 1])),
+    ],
+    ids=lambda value: value.kind if isinstance(value, Command) else "",
+)
+def test_values(command: Command, expected: np.ndarray) -> None:
+    np.testing.assert_allclose(command.values(TS, T.size), expected, atol=1e-9)
+
+
+def test_stepped_sine_joins_whole_periods() -> None:
+    command = commands.stepped_sine(1.0, [5.0, 10.0], cycles=3, period_s=TS, settle_cycles=2)
+    values = command.values(TS, 2000)
+    np.testing.assert_allclose(values[:1000], np.sin(2 * np.pi * 5.0 * T[:1000]), atol=1e-12)
+    np.testing.assert_allclose(values[1000:1500], np.sin(2 * np.pi * 10.0 * (T[1000:1500] - 1.0)), atol=1e-9)
+    assert not values[1500:].any()
+
+
+def test_multisine_has_its_lines_and_its_seed() -> None:
+    lines = [3.0, 7.0, 11.0]
+    a, b, c = (commands.multisine(0.5, lines, 2.0, TS, seed=s).values(TS, 2000) for s in (1, 1, 2))
+    assert np.array_equal(a, b)
+    assert not np.array_equal(a, c)
+    assert np.abs(a).max() == pytest.approx(0.5)
+    spectrum = np.abs(np.fft.rfft(a)) / a.size
+    strong = np.flatnonzero(spectrum > 0.1 * spectrum.max()) / 2.0
+    assert strong.tolist() == lines
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: commands.sine(1.0, 0.0), "frequency_hz = 0.0: must be positive"),
+        (lambda: commands.step(float("nan")), "amplitude_rad = nan"),
+        (lambda: commands.ramp(1.0, 1.0, 0.5), "must be later"),
+        (lambda: commands.multisine(1.0, [], 1.0, TS), "at least one frequency"),
+        (lambda: commands.sampled([0.0, 1.0], [0.0]), "equal numbers"),
+        (lambda: commands.sampled([0.0, 0.0], [0.0, 1.0]), "must be later than"),
+        (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
+        (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
+        (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read"),
+        (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm or m"),
+        (lambda: loads.constant(float("inf")), "finite"),
+        (lambda: loads.proportional(float("nan")), "finite"),
+        (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
+    ],
+)
+def test_refusals(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_cells_that_are_no_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("t,a\n0,1\n1,x\n")
+    with pytest.raises(InputError, match=r"line 3, column 2 = 'x'"):
+        read_columns(path, ("t", "a"))
+    with pytest.raises(InputError, match="no column 'b'; there are t, a"):
+        read_columns(path, ("b",))
+
+
+def test_loads_act_as_friction_or_as_torque() -> None:
+    design = load_design("ilr33-amber")
+    command, n = commands.ramp(0.15), design.total_ratio
+    free = replace(design, load=replace(design.load, path="back-drivable"))
+    times = np.linspace(0.0, 1.0, 11)
+    locked_A = simulate(design, command, 1.0, loads.series(times, np.full(11, 6.0))).current_A[-1]
+    driven_A = simulate(free, command, 1.0, loads.constant(6.0)).current_A[-1]
+    none_A = simulate(design, command, 1.0).current_A[-1]
+    kM, CM = design.motor.torque_constant_Nm_A, design.friction.load_coefficient
+    assert locked_A - none_A == pytest.approx(6.0 * CM / kM, rel=1e-6)
+    assert driven_A - none_A == pytest.approx((6.0 * CM - 6.0 / n) / kM, rel=1e-6)
+    slope = simulate(design, commands.step(0.02), 0.5, loads.proportional(-300.0))
+    still = simulate(design, commands.step(0.02), 0.5)
+    assert slope.output_angle_rad[-1] == pytest.approx(0.02, rel=0.02)
+    assert slope.motor_speed_rad_s.max() < still.motor_speed_rad_s.max()
+
+
+def test_extra_torque_and_initial_state() -> None:
+    design = load_design("ilr33-amber")
+    start = State(motor_angle_rad=10.0)
+    hold = commands.hold(10.0 / design.total_ratio)
+    run = simulate(design, hold, 0.3, initial=start, disturbance_Nm=1e-3)
+    assert not run.motor_speed_rad_s.any()  # below the dry friction
+    run = simulate(design, hold, 0.3, initial=start, disturbance_Nm=5e-3)
+    assert run.output_angle_rad.max() > 10.0 / design.total_ratio
+    with pytest.raises(InputError, match="not finite"):
+        simulate(design, hold, 0.3, disturbance_Nm=[0.0, np.nan])
+
+
+def test_trajectory_carries_units_and_leaves_as_a_frame() -> None:
+    run = simulate(load_design("ilr33-amber"), commands.step(0.01), 0.05, record_every=5)
+    frame = run.to_pandas()
+    assert list(frame.columns[:4]) == ["time_s", "reference_rad", "output_angle_rad", "motor_angle_rad"]
+    assert len(frame) == 100
+    assert frame["time_s"].iloc[1] == pytest.approx(5e-4)
+    assert frame.attrs["design"] == "ilr33-amber"
+    assert "deg" in repr(run)
+    assert "A, limits" in repr(run)
+    again = simulate(load_design("ilr33-amber"), commands.step(0.01), 0.05, record_every=5)
+    assert again.parameters_hash == run.parameters_hash
+
+
+def test_a_failure_is_said_and_never_passed_for_a_result() -> None:
+    design = load_design("ilr33-amber")
+    velocity = replace(design.controller.velocity, gain=50.0)
+    wild = replace(design, controller=replace(design.controller, velocity=velocity))
+    with pytest.raises(NumericalError, match=r"run stopped at .* s \(not finite\): .* unstable"):
+        simulate(wild, commands.step(0.01), 1.0, limits_on=False)
+    run = simulate(wild, commands.step(0.01), 1.0, limits_on=False, raise_on_failure=False)
+    assert run.status == "not finite"
+    assert np.isnan(run.output_angle_rad[-1])
+    assert run.time_s.size == 10_000
+
+
+def test_progress_and_interruption() -> None:
+    design, seen = load_design("ilr33-amber"), []
+    simulate(design, commands.hold(), 1.0, progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (10_000, 10_000)
+
+    def stop(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(design, commands.hold(), 100.0, record_every=1000, progress=stop)
