@@ -13,7 +13,7 @@ import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from reports.nightly.job import canonical
 from reports.nightly.text import sha256
 
 PAGE_BYTES = 16384
+RECENT = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,6 +102,7 @@ class History:
         self.notice = notice
         self._figure_ids: dict[str, int] = {}
         self._table: dict[int, Figure] = {}
+        self._recent: dict[int, dict[str, Figure]] = {}
 
     # ---- writing -----------------------------------------------------------------------------------
 
@@ -271,17 +273,30 @@ class History:
         """Return the figures of one result by name."""
         if snapshot is None:
             return {}
+        if snapshot not in self._recent:
+            if len(self._recent) >= RECENT:
+                self._recent.clear()
+            self._recent[snapshot] = self._read_figures(snapshot)
+        return self._recent[snapshot]
+
+    def _read_figures(self, snapshot: int) -> dict[str, Figure]:
         layout, numbers = self.connection.execute(
             "SELECT v.layout, v.numbers FROM snapshots s JOIN vectors v ON v.id = s.vector WHERE s.id = ?",
             (snapshot,),
         ).fetchone()
         known = self.figure_table()
-        values = np.frombuffer(numbers, dtype="<f8")
+        values = np.frombuffer(numbers, dtype="<f8").tolist()
         out = {}
-        for number, value in zip(self._layout(layout), values.tolist(), strict=True):
-            figure = known[number]
-            out[figure.name] = replace(figure, value=None if math.isnan(value) else value)
+        for number, value in zip(self._layout(layout), values, strict=True):
+            f = known[number]
+            shown = None if math.isnan(value) else value
+            out[f.name] = Figure(name=f.name, value=shown, unit=f.unit, better=f.better, kind=f.kind)
         return out
+
+    def known(self, keys: Iterable[str]) -> set[str]:
+        """Return those of some content addresses whose results are stored."""
+        query = "SELECT 1 FROM snapshots WHERE key = ?"
+        return {key for key in keys if self.connection.execute(query, (key,)).fetchone()}
 
     def figure_table(self) -> dict[int, Figure]:
         """Return name, unit and direction of every figure by its number (without values)."""

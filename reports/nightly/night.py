@@ -117,13 +117,25 @@ def run_night(
         history.claim(study.name)
         run = history.start_run(_run_row(version, study, clock()))
         outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
-        history.finish_run(run, clock(), [_new_result(o) for o in outcomes])
-        return publish(study, site, history, Cache(state / "cache"), use)
+        known = history.known(o.key for o in outcomes)
+        history.finish_run(run, clock(), [_new_result(o, o.key in known) for o in outcomes])
+        metas = {o.key: o.meta for o in outcomes}
+        return publish(study, site, history, Cache(state / "cache"), use, metas)
 
 
-def publish(study: Study, site: Path, history: History, cache: Cache, settings: Settings) -> Overview:
-    """Make the site of the last finished night anew from history and cache."""
-    view = overview(history, cache, study)
+def publish(
+    study: Study,
+    site: Path,
+    history: History,
+    cache: Cache,
+    settings: Settings,
+    metas: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Overview:
+    """Make the site of the last finished night anew from history and cache.
+
+    ``metas`` holds what is known already of the results, by content address; the rest is read.
+    """
+    view = overview(history, cache, study, metas or {})
     site_files.publish(site, view, history, cache, keep_reports=settings.keep_reports)
     return view
 
@@ -241,7 +253,8 @@ def _message(outcome: Outcome) -> str:
     return outcome.message or (f"not passed: {', '.join(sections)}" if sections else "")
 
 
-def _new_result(outcome: Outcome) -> NewResult:
+def _new_result(outcome: Outcome, known: bool) -> NewResult:
+    """Make a row of the history; of a result that it knows the figures are not needed."""
     meta = outcome.meta
     ranked = [v for v in meta.get("verdicts", ()) if v["relative"] is not None]
     worst = min(ranked, key=lambda v: v["relative"], default=None)
@@ -250,7 +263,7 @@ def _new_result(outcome: Outcome) -> NewResult:
         kind=outcome.job.kind,
         status=outcome.status,
         key=outcome.key,
-        figures=[Figure(**f) for f in meta.get("figures", ())],
+        figures=[] if known else [Figure(**f) for f in meta.get("figures", ())],
         inputs={
             "parameters": dict(outcome.job.parameters),
             "settings": _flat_settings(outcome.job.payload),

@@ -47,6 +47,8 @@ def visible(text: str) -> str:
     >>> visible("a\\x00b\\u202ec")
     'a\\ufffdb\\u27e8U+202E\\u27e9c'
     """
+    if text.isascii() and text.isprintable():
+        return text
     clean = _ILLEGAL_XML.sub("\N{REPLACEMENT CHARACTER}", text)
     return _BIDI.sub(lambda m: f"⟨U+{ord(m.group()):04X}⟩", clean)
 

@@ -141,11 +141,14 @@ def report_folder(name: str, key: str) -> str:
     return f"reports/{slug(name)}/{key[:16]}"
 
 
-def overview(history: History, cache: Cache, study: Study) -> Overview:
+def overview(
+    history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]] | None = None
+) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs()
     run = runs[-1]
     reader = _Reader(history, cache, study, runs)
+    reader.metas = dict(metas or {})
     tonight = history.results(run=run.id)
     designs = sorted((reader.design(r) for r in tonight), key=lambda d: d.rank)
     before = {r.name for r in history.results(run=runs[-2].id)} if len(runs) > 1 else set()
@@ -172,6 +175,7 @@ class _Reader:
         self.runs = {r.id: r for r in runs}
         self.last = runs[-1]
         self.baselines = [b for b in history.baselines() if b.run in self.runs]
+        self.metas: dict[str, Mapping[str, Any]] = {}
         self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
         self._table = history.figure_table()
         self._number = {f.name: i for i, f in self._table.items()}
@@ -192,6 +196,8 @@ class _Reader:
     def _meta(self, result: Result) -> Mapping[str, Any]:
         if not result.key:
             return {}
+        if self.metas.get(result.key):
+            return self.metas[result.key]
         try:
             entry = self.cache.read(result.key)
         except CorruptEntry:
