@@ -10,6 +10,7 @@ from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import kernel
 from nonlinear._kernels.control import clamp, measured_angle, measured_speed, note_limits, pi
 from nonlinear._kernels.probes import memory_size, probe
+from nonlinear._kernels.record import collect, record, record_probes
 from nonlinear._kernels.reduce import clear, extremes, step_figures, window
 from nonlinear._kernels.segment import DECAY, LENGTH, RINGING, SMOOTH, segment, slip_step
 from nonlinear._kernels.signals import signal
@@ -187,28 +188,9 @@ def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignor
         if recording:
             if since_record == 0 and row >= 0:  # the second spares the compiler its checks
                 since_record = every
-                history[0, row] = ref
-                history[1, row] = th / N
-                history[2, row] = w
-                history[3, row] = i
-                history[4, row] = u
-                history[5, row] = i_ref
-                history[6, row] = w_ref
-                history[7, row] = th
-                flag_history[row] = flags
+                record(history, flag_history, row, flags, ref, th / N, w, i, u, i_ref, w_ref, th)
                 if probing:
-                    col = layout.HISTORY_PROBES
-                    if probe_u:
-                        history[col, row], history[col + 1, row] = u_pre, u
-                        col += 2
-                    if probe_i:
-                        history[col, row], history[col + 1, row] = i_pre, i_ref
-                        col += 2
-                    if probe_w:
-                        history[col, row], history[col + 1, row] = w_pre, w_ref
-                        col += 2
-                    if probe_y:
-                        history[col, row], history[col + 1, row] = y_pre, y_post
+                    record_probes(p, history, row, u_pre, u, i_pre, i_ref, w_pre, w_ref, y_pre, y_post)
                 row += 1
             since_record -= 1
         if target != 0.0:
@@ -217,13 +199,8 @@ def run(p, c, table, tables, history, flag_history, out, shared):  # type: ignor
             y_last = y
         if reducing:
             if with_extremes or into_window >= 0:
-                sig[0], sig[1], sig[2], sig[3], sig[4] = ref, th / N, w, i, u
-                sig[5], sig[6] = i_ref, w_ref
-                count = layout.BASE_SIGNALS
-                if probing:
-                    sig[7], sig[8], sig[9], sig[10] = u_pre, u, i_pre, i_ref
-                    sig[11], sig[12], sig[13], sig[14] = w_pre, w_ref, y_pre, y_post
-                    count = layout.ALL_SIGNALS
+                collect(sig, ref, th / N, w, i, u, i_ref, w_ref, u_pre, i_pre, w_pre, y_pre, y_post)
+                count = layout.ALL_SIGNALS if probing else layout.BASE_SIGNALS
                 if with_extremes:
                     extremes(sig, count, out)
                 if length > 0 and into_window >= 0:
