@@ -13,9 +13,10 @@ import numpy as np
 from benchmarks.row import Row
 from reports.nightly.cache import Cache
 from reports.nightly.figures import Figure
-from reports.nightly.history import History, NewResult, open_history
+from reports.nightly.history import History, open_history
 from reports.nightly.night import Settings, Study, run_night
 from reports.nightly.pages import design_page, index
+from reports.nightly.records import NewResult
 from reports.nightly.source import read_study
 from reports.nightly.trend import change_points
 from reports.nightly.view import overview

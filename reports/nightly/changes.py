@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from reports.nightly.figures import Figure
-from reports.nightly.history import Run
+from reports.nightly.records import Run
 from reports.nightly.tolerance import Tolerances
 
 

@@ -12,7 +12,8 @@ from markupsafe import Markup
 from reports.nightly.charts import Chart, line_chart
 from reports.nightly.clock import to_seconds
 from reports.nightly.figures import Figure, Verdict, first_number
-from reports.nightly.history import History, Result
+from reports.nightly.history import History
+from reports.nightly.records import Result
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview

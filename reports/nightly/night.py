@@ -15,10 +15,11 @@ from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
-from reports.nightly.history import History, NewResult, open_history
+from reports.nightly.history import History, open_history
 from reports.nightly.job import Job, Outcome, check_jobs
 from reports.nightly.lock import hold
 from reports.nightly.pool import Done, Pool, Task
+from reports.nightly.records import NewResult
 from reports.nightly.text import one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview

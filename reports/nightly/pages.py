@@ -10,8 +10,9 @@ from markupsafe import Markup
 
 from reports.html import asset, environment, security_policy
 from reports.nightly.course import Course, course_of
-from reports.nightly.history import History, Result, Run
+from reports.nightly.history import History
 from reports.nightly.machines import STATE_WORDS, cause_lines
+from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line, visible
 from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, report_folder
 

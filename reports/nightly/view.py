@@ -15,8 +15,9 @@ from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.changes import Cause, Change, Comparison, cause_of, compare_figures
 from reports.nightly.code_version import commits_between
 from reports.nightly.figures import Figure, Verdict
-from reports.nightly.history import Baseline, History, Result, Run
+from reports.nightly.history import History
 from reports.nightly.job import BROKEN
+from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.text import slug
 from reports.nightly.trend import WINDOW, flaps, missing_nights
 

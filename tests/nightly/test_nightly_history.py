@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from actuator_lti.errors import InputError
 from reports.nightly import schema
 from reports.nightly.figures import Figure
-from reports.nightly.history import NewResult, open_history
+from reports.nightly.history import open_history
+from reports.nightly.records import NewResult
 
 RUN = {"started": "2026-01-01T00:00:00Z", "code": "c", "code_commit": "", "study_commit": "", "host": "h"}
 
