@@ -166,11 +166,11 @@ def spin(n: int) -> int:
 
 
 def constant_cost(quick: bool) -> Iterator[Row]:
-    """Cost per tick of short and of very long runs (reduced, without history)."""
+    """Cost per tick of short and of very long runs (without history)."""
     row = sawtooth_row()
     costs = []
     for ticks in (10**4, 10**6, 10**7 if quick else 10**8):
-        row[at.TICKS], row[at.WINDOW], row[at.CYCLES] = ticks, 2000, 1
+        row[at.TICKS] = ticks
         history, flags, out = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(at.OUT_SIZE)
         work = partial(call, row, np.zeros(1), history, flags, out, np.zeros(2))
         costs.append(best_of(work, 50 if ticks <= 10**6 else 1) / ticks)

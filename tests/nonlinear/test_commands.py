@@ -13,7 +13,9 @@ from scipy import signal
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear import State, commands, loads, simulate
+from nonlinear._kernels.control import measured_speed
 from nonlinear.commands import Command
+from nonlinear.parameters import design_row
 from nonlinear.records import read_columns
 
 TS = 1e-3
@@ -159,3 +161,29 @@ def test_progress_and_interruption() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         simulate(design, commands.hold(), 100.0, record_every=1000, progress=stop)
+
+
+def test_speed_from_counts_is_floored_differenced_and_filtered() -> None:
+    design = load_design("ilr33-amber")
+    encoder = replace(design.encoder, speed="difference", difference_samples=2, filter_time_s=3e-4)
+    row, period = design_row(replace(design, encoder=encoder)), 1e-4
+    count = 2.0 * np.pi / 1024
+    angles, place, filtered, expected = np.zeros(2), 0, 0.0, 0.0
+    th = np.linspace(-3.5, 6.2, 9) * count
+    floors = np.concatenate(([0.0, 0.0], np.floor(th / count) * count))
+    for k, angle in enumerate(th):
+        filtered = measured_speed(row, angle, 0.0, angles, place, filtered, period)
+        place = 1 - place
+        expected += 0.25 * ((floors[k + 2] - floors[k]) / (2 * period) - expected)
+        assert filtered == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_coarse_encoder_makes_the_drive_rough() -> None:
+    design = load_design("ilr33-amber")
+    runs = {}
+    for counts in (None, 1024, 65536):
+        encoder = replace(design.encoder, speed="difference", counts_per_rev=counts)
+        run = simulate(replace(design, encoder=encoder), commands.ramp(0.05), 0.5)
+        runs[counts] = np.std(run.current_A[2500:])
+    assert runs[None] < 1e-6
+    assert runs[1024] > 10.0 * runs[65536] > 0.0
