@@ -8,15 +8,19 @@ one by one, so that memory holds only a few chunks, whatever their number.
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
+
+if TYPE_CHECKING:
+    from distributed import Client, LocalCluster
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
@@ -80,22 +84,49 @@ class Engine:
 
         try:
             if self.scheduler is not None:
-                with distributed.Client(self.scheduler, timeout=CONNECT_S) as client:
+                with _connected(self.scheduler) as client:
                     _submit(client, task, todo, sink)
                 return
-            with (
-                distributed.LocalCluster(
-                    n_workers=self.workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                    silence_logs=50,
-                ) as cluster,
-                distributed.Client(cluster) as client,
-            ):
+            with _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
                 _submit(client, task, todo, sink)
         except (OSError, TimeoutError) as error:
             raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {error}") from error
+
+
+def _connected(address: str) -> Client:
+    """Connect to a running scheduler.
+
+    Raises
+    ------
+    InputError
+        If the address is none.
+    """
+    import distributed
+
+    try:
+        return distributed.Client(address, timeout=CONNECT_S)
+    except ValueError as error:
+        raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
+
+
+def _local_cluster(workers: int) -> LocalCluster:
+    """Start worker processes that leave Ctrl-C to this one: each would print its own traceback."""
+    from multiprocessing import resource_tracker
+
+    import distributed
+
+    resource_tracker.ensure_running()  # its start would take the mask away again
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
+    try:
+        return distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=50,
+        )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
 @dataclass

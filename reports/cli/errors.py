@@ -55,6 +55,8 @@ def run(call: Callable[[], object]) -> int:
         return _say(_usage_line(error), BAD_INPUT)
     except (OSError, UnicodeDecodeError) as error:
         return _say(_os_line(error), BAD_INPUT)
+    if status == INTERRUPTED:  # typer swallows the interruption and gives its status
+        return _say("interrupted", INTERRUPTED)
     return status if isinstance(status, int) else DONE
 
 

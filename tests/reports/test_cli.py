@@ -164,6 +164,17 @@ def test_statuses(raised: BaseException, status: int, words: str, capsys: pytest
     assert words in one_line(capsys.readouterr().err)
 
 
+def test_an_interrupted_command_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("actuator_lti.design.load_design", lambda name: interrupted())
+    assert main(["margins"]) == 130
+    assert "interrupted" in one_line(capsys.readouterr().err)
+
+
 def test_a_mistake_of_the_program_is_not_hidden() -> None:
     def call() -> None:
         raise ZeroDivisionError

@@ -69,3 +69,5 @@ def test_impossible_engines_are_refused():
         Engine(workers=2, scheduler="tcp://x")
     with pytest.raises(InputError, match="at least 1"):
         Engine(workers=0)
+    with pytest.raises(InputError, match="tcp://host:8786"):
+        Engine(scheduler="nowhere").run(None, [(0, 1)], lambda c, a: None)
