@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
 
+DEFAULT_DURATION_S = 1.0
+
 CommandOption = Annotated[str, typer.Option("--command", metavar="KIND", help=f"One of {KINDS}.")]
 AmplitudeOption = Annotated[
     float,
@@ -31,7 +33,10 @@ CountOption = Annotated[int, typer.Option("--count", help="Number of frequencies
 CyclesOption = Annotated[int, typer.Option("--cycles", help="Periods of each frequency of a stepped sine.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of the phases of a multisine.")]
 StartOption = Annotated[float, typer.Option("--start", metavar="S", help="Time at which the command begins.")]
-DurationOption = Annotated[float, typer.Option("--duration", metavar="S", help="Duration of the run.")]
+DurationOption = Annotated[
+    float | None,
+    typer.Option("--duration", metavar="S", help="Duration; 1, or that of a stepped sine or a record."),
+]
 BiasOption = Annotated[
     float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
 ]
@@ -63,7 +68,7 @@ def simulate(
     cycles: CyclesOption = 5,
     seed: SeedOption = 0,
     start: StartOption = 0.0,
-    duration: DurationOption = 1.0,
+    duration: DurationOption = None,
     bias_rate: BiasOption = 0.0,
     load: LoadOption = 0.0,
     load_slope: SlopeOption = 0.0,
@@ -89,7 +94,7 @@ def simulate(
     wanted = build_command(
         drive,
         command,
-        duration,
+        DEFAULT_DURATION_S if duration is None else duration,
         start,
         seed,
         record,
@@ -104,7 +109,7 @@ def simulate(
         run = run_simulation(
             drive,
             wanted,
-            duration,
+            run_time(wanted, duration),
             build_load(load, load_slope, load_file),
             bias=commands.ramp(bias_rate * scale) if bias_rate else None,
             friction_on=not no_friction,
@@ -115,6 +120,27 @@ def simulate(
         )
     files = write_files(run, csv, parquet, plot)
     show(run, files, as_json)
+
+
+def run_time(command: Command, wanted_s: float | None) -> float:
+    """Duration of the run: what is wanted, else that of the command where it has one.
+
+    Raises
+    ------
+    InputError
+        If a stepped sine would be cut off before its last frequency.
+    """
+    from actuator_lti.errors import InputError
+
+    tabled = command.kind in ("stepped_sine", "recorded", "sampled")
+    if wanted_s is None:
+        return command.end_s if tabled and 0.0 < command.end_s < float("inf") else DEFAULT_DURATION_S
+    if command.kind == "stepped_sine" and 0.0 < wanted_s < command.end_s * (1.0 - 1e-9):
+        raise InputError(
+            f"--duration {wanted_s:g}: the stepped sine takes {command.end_s:.6g} s;"
+            " allowed: that or more, or fewer --count or --cycles"
+        )
+    return wanted_s
 
 
 def unit_scale(drive: Design) -> float:
@@ -218,7 +244,7 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
     print_line(f"{run.design_name}: {run.time_s.size} rows, status {run.status}")
     for name, value in facts.items():
         if isinstance(value, float):
-            print_line(f"  {name:26} {value:.6g}")
+            print_line(f"  {_in_words(name, value)}")
     for name, use in run.limits.items():
         words = "never" if use.first_time_s is None else f"{100 * use.fraction:.3g} % of the time, "
         words += "" if use.first_time_s is None else f"first at {use.first_time_s:.6g} s"
@@ -230,3 +256,24 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
         print_line(f"  {'balance, relative':26} {run.energy.relative_error:.2g}")
     for name in files:
         print_line(f"wrote {name}")
+
+
+def _in_words(name: str, value: float) -> str:
+    """A figure as people read it: outputs in the unit of the command line, motor speeds in rpm as well.
+
+    Examples
+    --------
+    >>> _in_words("largest_motor_speed_rad_s", 100.0)
+    'largest motor speed        100 rad/s (954.93 rpm)'
+    """
+    from math import pi
+
+    units = (
+        ("_rad_s", 1.0, "rad/s"), ("_m_s", 1.0, "m/s"), ("_rad", 180.0 / pi, "deg"), ("_m", 1e3, "mm"),
+        ("_A", 1.0, "A"), ("_V", 1.0, "V"), ("_s", 1.0, "s"),
+    )  # fmt: skip
+    for ending, factor, unit in units:
+        if name.endswith(ending):
+            more = f" ({value * 30.0 / pi:.6g} rpm)" if unit == "rad/s" else ""
+            return f"{name.removesuffix(ending).replace('_', ' '):26} {value * factor:.6g} {unit}{more}"
+    return f"{name.replace('_', ' '):26} {value:.6g}"
