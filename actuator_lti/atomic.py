@@ -12,6 +12,8 @@ from typing import BinaryIO
 
 from actuator_lti.errors import InputError
 
+_PART = ".part"
+
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
@@ -66,9 +68,9 @@ def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], objec
             os.replace(temporary, path)
             staged.pop(0)
     except OSError as error:
-        raise InputError(
-            f"cannot write: {error.strerror or error}", where=str(error.filename or "")
-        ) from error
+        named = str(error.filename or "")
+        where = str(path) if named.endswith(_PART) else named
+        raise InputError(f"cannot write: {error.strerror or error}", where=where) from error
     finally:
         for temporary, _ in staged:
             with suppress(OSError):
@@ -78,7 +80,7 @@ def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], objec
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
     """Fill a file beside its place, flushed to disk, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=".", suffix=".part", dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=".", suffix=_PART, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)

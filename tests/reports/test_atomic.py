@@ -49,3 +49,11 @@ def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path: Path) -> None
     plain.write_text("x")
     atomic.write_text(written, "x")
     assert written.stat().st_mode == plain.stat().st_mode
+
+
+def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(InputError, match="taken: cannot write") as caught:
+        atomic.write_text(tmp_path / "taken", "x")
+    assert ".part" not in str(caught.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
