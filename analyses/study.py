@@ -12,9 +12,9 @@ A study file is TOML and only data::
     override = { "gear.worm.ratio" = 50 }
 
     [[variant]]
-    name = "other motor"
-    motor = "motor-24V.toml"                 # its [motor] table replaces the base's
-    override = { "limits.voltage" = "24 V" }
+    name = "more voltage, less resistance"
+    override = { "limits.voltage" = "16 V", "motor.resistance" = "50 mohm" }
+    # motor = "motor-24V.toml"               # its [motor] table replaces the base's
 
     [[sweep]]                                # one parameter: a list, or from, to, points, spacing
     parameter = "control.velocity.gain"
@@ -34,7 +34,7 @@ A study file is TOML and only data::
     samples = 1000
     seed = 0
 
-    [nightly]                                # read by the nightly alone: see `reports.nightly.source`
+    [nightly]                                # read by the nightly alone: a PDF beside each report
     pdf = true
 """
 

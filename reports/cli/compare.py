@@ -12,7 +12,9 @@ from reports.cli.options import JsonOption, OutOption, QuietOption
 if TYPE_CHECKING:
     from analyses.study import Study
 
-StudyArgument = Annotated[str, typer.Argument(metavar="STUDY", help="Study file, or a design.")]
+StudyArgument = Annotated[
+    str | None, typer.Argument(metavar="STUDY", help="Study file (--example prints one), or a design.")
+]
 VariantOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help='A variant more: "gear.worm.ratio=50"; repeatable.'),
@@ -22,17 +24,27 @@ ValidateOption = Annotated[
     bool | None,
     typer.Option("--validate/--no-validate", help="The nonlinear check of every design; as the study says."),
 ]
+ExampleOption = Annotated[bool, typer.Option("--example", help="Print a study file to start from, and stop.")]
 
 
 def compare(
-    study: StudyArgument,
+    study: StudyArgument = None,
     change: VariantOption = None,
     validation: ValidateOption = None,
     out: OutOption = Path("out/compare"),
     as_json: JsonOption = False,
     quiet: QuietOption = False,
+    example: ExampleOption = False,
 ) -> None:
     """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what."""
+    from actuator_lti.errors import InputError
+
+    if example:
+        _print_example()
+        return
+    if study is None:
+        raise InputError("compare: give a study file or a design; --example prints a study file")
+
     from analyses.variants import compare as compared
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
@@ -61,6 +73,16 @@ def compare(
         print_line(f"{page}\n{data}")
     untrue = any(entry.passed is False for one in found.all for entry in one.ledger)
     leave_with(made["verdict"]["passed"] and not found.refused and not untrue)
+
+
+def _print_example() -> None:
+    import textwrap
+
+    import analyses.study
+    from reports.cli.output import print_line
+
+    text = (analyses.study.__doc__ or "").split("::", 1)[1]
+    print_line(textwrap.dedent(text).strip())
 
 
 def _study(path: str, changes: list[str]) -> Study:

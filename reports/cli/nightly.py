@@ -16,7 +16,8 @@ Words = Annotated[
     list[str],
     typer.Argument(
         metavar="[approve] STUDY",
-        help="Study file, design file or shipped design; first 'approve' to approve.",
+        help="Study file (compare --example prints one), design file or shipped design; first 'approve'"
+        " to approve.",
     ),
 ]
 SiteOption = Annotated[Path, typer.Option("--site", metavar="DIR", help="Folder of the site.")]

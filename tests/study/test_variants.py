@@ -241,3 +241,14 @@ def test_the_ledger_of_every_design_stands_side_by_side(tmp_path):
     assert [row["design"] for row in rows] == ["ilr33-amber", "faster"]
     assert rows[0]["e0"]["status"] == "pass"
     assert sections(compare(study_of(load_design("ilr33-amber")))) == []
+
+
+def test_the_printed_example_is_a_study(tmp_path, capsys):
+    from reports.cli.main import main
+
+    assert main(["compare", "--example"]) == 0
+    path = tmp_path / "study.toml"
+    path.write_text(capsys.readouterr().out)
+    assert len(load_study(path).variants) == 10
+    assert main(["compare"]) == 2
+    assert "--example" in capsys.readouterr().err
