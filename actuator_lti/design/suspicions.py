@@ -7,6 +7,8 @@ from math import isfinite, pi
 
 from actuator_lti.design.model import Design
 
+GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
+
 
 def warnings_of(design: Design) -> tuple[str, ...]:
     """Everything suspicious in a design, each as one line that begins with the key.
@@ -114,6 +116,8 @@ def _pedigree(design: Design) -> Iterator[str]:
         yield "validation.full_deflection: not given, 10 deg (linear axis: 0.01 m) assumed"
     plant = ("motor.", "gear.", "load.", "friction.")
     for path, item in design.parameters.items():
+        if not set(item.grade.split("/")) <= GRADES:
+            yield f"{path}: grade {item.grade[:20]!r} is none of A, B, C, D, X"
         if item.grade == "X" and item.tolerance is None and path.startswith(plant):
             yield f"{path}: an assumed value (grade X) without a tolerance"
 

@@ -180,6 +180,7 @@ def test_what_is_only_suspicious_is_warned_of(values: dict[str, float], says: st
     ("overrides", "says"),
     [
         ({"encoder.speed": "difference"}, "encoder.counts_per_rev"),
+        ({"motor.resistance": {"value": "50 mohm", "grade": "Z"}}, "motor.resistance: grade 'Z'"),
         ({"gear.worm.input_inertia": {"value": "5 g*cm^2", "grade": "X"}}, "gear.worm.input_inertia"),
     ],
 )
