@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Correlation, Design, Tolerance
+from actuator_lti.errors import InputError
 from analyses.identification.dynamic import DynamicModel
 from analyses.identification.surface import PATHS, SurfaceFit
 
@@ -73,11 +74,22 @@ def design_with_estimate(design: Design, estimate: Estimate, *, name: str | None
     -------
     Design
         ``write_design`` makes a file of it.
+
+    Raises
+    ------
+    InputError
+        For an estimate that no drive can have: the record does not tell that parameter.
     """
     values = {p: _short(float(v)) for p, v in zip(estimate.paths, estimate.values, strict=True)}
     if "friction.viscous_reverse" in estimate.paths and design.friction.offset_torque_Nm:
         values["friction.offset_torque"] = 0.0
-    changed = with_values(design, values)
+    try:
+        changed = with_values(design, values)
+    except InputError as error:
+        raise InputError(
+            f"identified {error.message}; the record does not tell it: it takes a longer motion,"
+            " at several speeds in both directions"
+        ) from error
     parameters = dict(changed.parameters)
     for path, std in zip(estimate.paths, np.sqrt(np.diag(estimate.covariance)), strict=True):
         parameters[path] = replace(

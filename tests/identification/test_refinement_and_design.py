@@ -18,7 +18,7 @@ from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
 from analyses.identification.steady import SteadyWindow
 from analyses.identification.surface import SurfaceFit, fit_surface
-from analyses.identification.to_design import design_with_estimate, dynamic_estimate
+from analyses.identification.to_design import Estimate, design_with_estimate, dynamic_estimate
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
 
@@ -182,3 +182,11 @@ def test_a_rotary_drive_is_identified_from_its_own_simulation() -> None:
     assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=0.01)
     assert model["dry"] == pytest.approx(2.25e-3, rel=0.01)
     assert model["viscous"] == pytest.approx(5.25e-6, rel=0.02)
+
+
+def test_an_estimate_that_no_drive_has_is_refused_with_advice() -> None:
+    estimate = Estimate(
+        paths=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14, source="a step"
+    )
+    with pytest.raises(InputError, match=r"identified friction\.viscous = -1e-06.* longer motion"):
+        design_with_estimate(load_design("ilr33-amber"), estimate)
