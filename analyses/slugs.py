@@ -16,7 +16,7 @@ def slug(name: str) -> str:
     Examples
     --------
     >>> slug("Gear 66:1")
-    'gear-66-1-7f6ab6'
+    'gear-66-1-d47910'
     >>> slug("slow"), ".." in slug("../../etc/passwd")
     ('slow', False)
     """
