@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from reports.cli.options import JsonOption, QuietOption
+from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
@@ -20,7 +21,12 @@ RecordsArgument = Annotated[
 ]
 FolderOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Write the page with the pictures, and its JSON, there."),
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        callback=folder_for_results,
+        help="Write the page with the pictures, and its JSON, there.",
+    ),
 ]
 ChirpOption = Annotated[
     Path | None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from reports.cli.options import JsonOption, QuietOption
+from reports.cli.targets import folder_for_results, refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -52,7 +53,15 @@ CriterionOption = Annotated[
 ]
 FolderOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Write page, JSON and the identified design file there."),
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        callback=folder_for_results,
+        help="Write page, JSON and the identified design file there.",
+    ),
+]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="With --virtual-bench: overwrite a campaign that is there.")
 ]
 ExampleOption = Annotated[
     bool, typer.Option("--example", help="Print a campaign file to start from, and stop.")
@@ -65,6 +74,7 @@ def identify(
     virtual_bench: BenchOption = None,
     design: DesignOption = None,
     seed: SeedOption = 0,
+    force: ForceOption = False,
     friction: FrictionOption = "symmetric",
     refine: RefineOption = False,
     cutoff: CutoffOption = 100.0,
@@ -104,7 +114,7 @@ def identify(
     elif dynamic is not None:
         _dynamic(dynamic, design or "emps", friction, refine, cutoff, decimation, out, as_json, quiet)
     elif virtual_bench is not None:
-        _bench(virtual_bench, design or "ilr33-amber", seed, as_json, quiet)
+        _bench(virtual_bench, design or "ilr33-amber", seed, force, as_json, quiet)
 
 
 def _print_example() -> None:
@@ -237,7 +247,7 @@ def _dynamic(
     print_blocks([block for block in made["blocks"] if block["kind"] in ("table", "text")])
 
 
-def _bench(folder: Path, name: str, seed: int, as_json: bool, quiet: bool) -> None:
+def _bench(folder: Path, name: str, seed: int, force: bool, as_json: bool, quiet: bool) -> None:
     from actuator_lti.design import load_design
     from analyses.virtual_bench import simulate_bench
     from analyses.virtual_bench_files import write_bench
@@ -245,6 +255,7 @@ def _bench(folder: Path, name: str, seed: int, as_json: bool, quiet: bool) -> No
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
 
+    refuse_existing(folder / "campaign.toml", force)
     drive = load_design(name)
     with progress("simulating the runs", quiet=quiet) as bar:
         runs = simulate_bench(drive, seed=seed, progress=bar)

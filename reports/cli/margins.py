@@ -31,14 +31,17 @@ def margins(
 
     Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
     """
-    from actuator_lti.design import load_design
+    from actuator_lti.design import load_design, warnings_of
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
     from analyses.requirements import all_pass, evaluate_requirements
     from reports.cli.errors import leave_with
+    from reports.cli.output import print_warning
     from reports.sections.names import load_unit
 
     drive = load_design(design)
+    for warning in warnings_of(drive):
+        print_warning(f"{drive.name}: {warning}")
     loops = assemble_loops(
         drive,
         form=form,  # type: ignore[arg-type]

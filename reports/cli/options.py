@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from reports.cli.targets import folder_for_results
+
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
 
@@ -14,7 +16,10 @@ DesignArgument = Annotated[
     str, typer.Argument(metavar="DESIGN", help="Name of a shipped design, or path of a design file.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="JSON to standard output, and nothing else there.")]
-OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the results.")]
+OutOption = Annotated[
+    Path,
+    typer.Option("--out", metavar="DIR", help="Folder for the results.", callback=folder_for_results),
+]
 LoadOption = Annotated[float, typer.Option("--load", metavar="N_m", help="Hinge moment at the output, N m.")]
 FormOption = Annotated[
     str, typer.Option("--form", metavar="FORM", help="Linear form: sampled, continuous or ideal.")

@@ -26,6 +26,11 @@ def console() -> Console:
     return Console(highlight=False, width=width)
 
 
+def print_warning(text: str) -> None:
+    """Print one line about something suspicious on standard error."""
+    sys.stderr.write(f"warning: {' '.join(text.split())}\n")
+
+
 def print_line(text: str) -> None:
     """Print one line of plain text."""
     sys.stdout.write(text + "\n")

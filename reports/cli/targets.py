@@ -1,7 +1,8 @@
-"""Files that a command is asked to write."""
+"""Files and folders that a command is asked to write."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 
@@ -19,3 +20,25 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise InputError("is a directory; allowed: a file to write", where=str(path))
     if path.exists() and not force:
         raise InputError("exists already; allowed: another name, or --force", where=str(path))
+
+
+def folder_for_results(path: Path | None) -> Path | None:
+    """Refuse a folder that cannot be written, before anything is computed; made only when it is needed.
+
+    Raises
+    ------
+    InputError
+        With the path that stands in the way.
+    """
+    from actuator_lti.errors import InputError
+
+    if path is None:
+        return None
+    there = path.absolute()
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    if not there.is_dir():
+        raise InputError("is not a directory; allowed for --out: a folder, made if needed", where=str(there))
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError("cannot be written to; allowed for --out: a folder of your own", where=str(there))
+    return path

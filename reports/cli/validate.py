@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption
+from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from analyses.validation import Validation
 
 FolderOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Also write validation.html and validation.json there."),
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        callback=folder_for_results,
+        help="Also write validation.html and validation.json there.",
+    ),
 ]
 QuickOption = Annotated[
     bool, typer.Option("--quick", help="Fewer frequencies, a coarser map; no margins by amplitude.")

@@ -119,6 +119,9 @@ def test_the_virtual_bench_writes_54_runs(
     assert status == 0
     assert "54 runs written" in out
     assert len(list(tmp_path.glob("run*_drive.csv"))) == len(list(tmp_path.glob("run*_torque.csv"))) == 54
+    status, _, err = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "4")
+    assert (status, "--force" in err) == (2, True)
+    assert "seed 3" in (tmp_path / "campaign.toml").read_text()
 
 
 def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

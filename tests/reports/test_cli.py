@@ -201,3 +201,27 @@ def test_progress_stays_off_where_nobody_looks(capsys: pytest.CaptureFixture[str
     with progress("work") as report:
         report(1, 2)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
+def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
+    command: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def unwanted(*_: object) -> None:
+        raise AssertionError("the design was read before the folder was looked at")
+
+    monkeypatch.setattr("actuator_lti.design.load_design", unwanted)
+    (tmp_path / "file").write_text("mine")
+    assert main([command, "ilr33-amber", "--out", str(tmp_path / "file" / "inside")]) == 2
+    assert "is not a directory" in one_line(capsys.readouterr().err)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_margins_say_what_is_suspicious_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "emps", "--json"]) in (0, 1)
+    printed = capsys.readouterr()
+    assert printed.err.startswith("warning: emps: control.position.gain:")
+    assert json.loads(printed.out)["design"] == "emps"
