@@ -24,7 +24,7 @@ GAINS = (
     "control.velocity.integral_time",
     "control.position.gain",
 )
-MOST_CORNERS = 4096
+MOST_FACTORS = 10
 _SIZE = {"dB": 6.0, "deg": 45.0, "%": 10.0, "1": 0.5}  # what a limit of zero is measured against
 _TIMED = ("rise_time", "overshoot", "settling_time")
 
@@ -57,8 +57,8 @@ class Problem:
     evaluations: int = field(default=0)
 
     @cached_property
-    def factors(self) -> tuple[Factor, ...]:
-        """Toleranced parameters that are no gain."""
+    def toleranced(self) -> tuple[Factor, ...]:
+        """All toleranced parameters that are no gain."""
         from actuator_lti.batch import variable_paths
         from actuator_lti.design import tolerances
 
@@ -66,15 +66,26 @@ class Problem:
         return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
 
     @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """Those whose corners are looked at: all, or the ten that move the requirements most."""
+        if len(self.toleranced) <= MOST_FACTORS:
+            return self.toleranced
+        nominal = np.array([f.nominal for f in self.toleranced])
+        ends = np.array([f.box for f in self.toleranced])
+        points = np.tile(nominal, (2 * len(nominal) + 1, 1))
+        for k in range(len(nominal)):
+            points[2 * k + 1 : 2 * k + 3, k] = ends[k]
+        found = self._distances(self.start[None, :], points, self.toleranced)[0]
+        moved = np.abs(found[1:] - found[0]).max(axis=1).reshape(-1, 2).max(axis=1)
+        chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
+        return tuple(self.toleranced[k] for k in chosen)
+
+    @cached_property
     def all_corners(self) -> np.ndarray:
         """Nominal point, then the corners of the tolerance box, shape (corners, factors)."""
         nominal = np.array([[f.nominal for f in self.factors]])
         if not self.factors:
             return np.zeros((1, 0))
-        if 2 ** len(self.factors) > MOST_CORNERS:
-            raise InputError(
-                f"{len(self.factors)} toleranced parameters: tuning looks at every corner; at most 12"
-            )
         lower, upper = np.array([f.box for f in self.factors]).T
         size = len(self.factors)
         bits = (np.arange(2**size)[:, None] >> np.arange(size)) & 1
@@ -85,9 +96,12 @@ class Problem:
 
         Unstable designs get a number below -3 that falls with the distance of the poles from the circle.
         """
+        return self._distances(gains, corners, self.factors)
+
+    def _distances(self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...]) -> np.ndarray:
         count, many = len(gains), len(corners)
         values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
-        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(self.factors)}
+        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(factors)}
         population = Population(self.design, values, count * many)
         self.evaluations += population.count
         timed = any(r.quantity in _TIMED for r in self.requirements)

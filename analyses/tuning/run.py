@@ -65,7 +65,7 @@ def tune(
     Raises
     ------
     InputError
-        If there is no requirement on a loop, or more than 12 toleranced parameters.
+        If there is no requirement on a loop.
     """
     settings = settings or TuningSettings()
     tell = progress or (lambda done, total: None)
@@ -178,6 +178,9 @@ def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str,
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
         "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
     ]
+    left = [f.path for f in problem.toleranced if f not in problem.factors]
+    if left:
+        notes.append(f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}.")
     if found.min() < 0.0:
         missed = [r.id for k, r in enumerate(problem.requirements) if found[:, k].min() < 0.0]
         notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")

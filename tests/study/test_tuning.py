@@ -212,3 +212,25 @@ def test_wishes_that_make_no_sense_are_refused(words, message):
 def test_a_design_without_requirements_on_loops_is_refused():
     with pytest.raises(InputError, match="no requirement"):
         tune(integrator())
+
+
+def test_of_many_tolerances_the_strongest_make_the_corners():
+    import tomllib
+
+    import tomli_w
+
+    from actuator_lti import read_design_text, write_design
+
+    tree = tomllib.loads(write_design(load_design("ilr33-amber")))
+    for key in ("resistance", "inductance", "rotor_inertia"):
+        tree["motor"][key]["tolerance"] = "10 %"
+    for key in ("viscous", "dry_torque", "load_coefficient"):
+        tree["friction"][key]["tolerance"] = "30 %"
+    tree["limits"]["voltage"]["tolerance"] = "5 %"
+    design = read_design_text(tomli_w.dumps(tree))
+    problem = problem_of(design, loop_requirements(design), dict(rule_gains(design).values))
+    kept = {f.path for f in problem.factors}
+    assert len(problem.toleranced) == 11
+    assert len(kept) == 10
+    assert "motor.resistance" in kept
+    assert problem.all_corners.shape == (1025, 10)
