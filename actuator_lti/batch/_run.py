@@ -27,6 +27,7 @@ TOP = np.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated ap
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
 CAPACITY = 1200
 SMOOTH = 0.05
+HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's
 
 
 @kernel
@@ -99,7 +100,10 @@ def _closed_dc(n, h, b, c, system):
 
 @kernel
 def _poles(n, a, b, c, closed, scratch, wr, wi):
-    """Eigenvalues of a - closed * b c into wr, wi; the largest modulus (nan if the iteration fails)."""
+    """Eigenvalues of a - closed * b c into wr, wi; the largest modulus (nan if the iteration fails).
+
+    An eigenvalue at 1 is not counted: it is the motor angle that an inner loop does not see.
+    """
     for i in range(n):
         for j in range(n):
             scratch[i, j] = a[i, j] - closed * b[i] * c[j]
@@ -110,7 +114,8 @@ def _poles(n, a, b, c, closed, scratch, wr, wi):
         return np.nan
     radius = 0.0
     for i in range(n):
-        radius = max(radius, np.hypot(wr[i], wi[i]))
+        if np.hypot(wr[i] - 1.0, wi[i]) > HIDDEN:
+            radius = max(radius, np.hypot(wr[i], wi[i]))
     return radius
 
 
@@ -131,10 +136,13 @@ def _one_loop(n, a, b, c, lead, time_figures, arrays, row):
     for i in range(n):
         a[i, i] -= 1.0
     kept = _grid(n, poles[2], poles[3], poles[0], poles[1], points)
+    count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
     dc = _closed_dc(n, a, b, c, scratch)
+    for i in range(n):
+        if np.hypot(poles[2, i] - 1.0, poles[3, i]) <= HIDDEN:
+            dc = (rs[0] / (1.0 + rs[0])).real
     row[DC_GAIN] = dc
     row[FINAL] = dc
-    count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
     open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else np.inf
     nyquist, _ = evaluate(n, a, b, c, np.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)

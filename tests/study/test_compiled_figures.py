@@ -11,7 +11,7 @@ from actuator_lti import (
     step_figures,
 )
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.design import parameter_value, with_values
+from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.errors import InputError
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
@@ -108,6 +108,22 @@ def test_feed_forward_is_in_the_figures_of_the_command(share):
     }
     for quantity, truth in pairs.items():
         assert figures.quantity(quantity, "position")[0] == pytest.approx(truth, rel=1e-6, abs=1e-6), quantity
+
+
+def test_the_angle_under_an_elastic_load_is_no_instability():
+    """With a hinge moment that follows the angle, the velocity loop keeps an eigenvalue at 1."""
+    changes = {"load.path": "back-drivable", "load.moment_slope": "-20 N*m/rad"}
+    design = with_overrides(load_design("ilr33-amber"), changes)
+    figures = linear_figures(Population(design, {}, 1))
+    loops = assemble_loops(design)
+    for name, loop in loops.present.items():
+        truth = stability_margins(loop.open_loop)
+        assert truth.stable
+        assert figures.stable(name)[0]
+        assert figures.quantity("phase_margin", name)[0] == pytest.approx(truth.phase_margin_deg, rel=1e-6)
+    width = closed_loop_bandwidth(loops.velocity.closed_loop)
+    # T at DC is read off at the lowest angle here, not at zero
+    assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-3)
 
 
 def test_an_unstable_loop_is_called_so_and_takes_no_delay():
