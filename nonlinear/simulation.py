@@ -91,7 +91,7 @@ def simulate(
     raise_on_failure : bool
         ``False`` returns a failed run with its status instead; rows not reached are NaN.
     progress : callable, optional
-        Called as ``progress(done, total)`` in ticks from time to time.
+        Called as ``progress(done, total)`` in ticks from time to time, and once at the end.
 
     Returns
     -------
@@ -177,9 +177,11 @@ def _call(
     try:
         while thread.is_alive():
             thread.join(0.1)
-            progress(int(shared[0]), total)
+            if thread.is_alive():
+                progress(int(shared[0]), total)
     except BaseException:
         shared[1] = 1.0
         thread.join()
         raise
+    progress(int(shared[0]), total)  # a run may end before it was looked at once
     return result[0]
