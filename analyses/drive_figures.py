@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.static_threshold import stall_torque_Nm
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> DriveFigures:
     k_M = design.motor.torque_constant_Nm_A
     if design.motor.has_electrical_dynamics and k_M and math.isfinite(speed):
         current = (against + viscous * speed) / k_M
-    torque = _stall_torque_Nm(design)
+    torque = stall_torque_Nm(design)
     free = max(torque - against * design.friction.breakaway_ratio, 0.0)
     gain = max(torque - against, 0.0) / design.inertia_kgm2 if free > 0.0 else 0.0
     limit = design.limits.acceleration_rad_s2
@@ -101,29 +102,16 @@ def _resistance_Nm(design: Design, load_Nm: float, direction: int) -> float:
     return total
 
 
-def _stall_torque_Nm(design: Design) -> float:
-    """Give the largest motor torque at rest; ``inf`` without a limit."""
-    motor, limits = design.motor, design.limits
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * limits.voltage_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    current = limits.voltage_V / motor.resistance_ohm
-    if design.controller.current is not None:
-        current = min(current, limits.peak_current_A)
-    return motor.torque_constant_Nm_A * current
-
-
 def _top_speed(design: Design, against: float, viscous: float) -> tuple[float, str]:
     """Give the largest steady motor speed and what sets it."""
     motor, limits = design.motor, design.limits
-    if _stall_torque_Nm(design) <= against:
+    if stall_torque_Nm(design) <= against:
         return 0.0, "force"
     bounds = [(math.inf, "nothing")]
     if design.controller.velocity is not None:
         bounds.append((limits.speed_rad_s, "speed limit"))
     if viscous > 0.0:
-        bounds.append(((_stall_torque_Nm(design) - against) / viscous, "force"))
+        bounds.append(((stall_torque_Nm(design) - against) / viscous, "force"))
     if motor.source_gain_Nm_V is None:
         assert motor.resistance_ohm is not None
         assert motor.torque_constant_Nm_A is not None

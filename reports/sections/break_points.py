@@ -8,20 +8,13 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import BreakPoint
 from reports import document as doc
-from reports.sections.margins import finite, margin_row, times, worst_status
+from reports.sections.margins import MARGIN_COLUMNS, finite, margin_row, times, worst_status
 from reports.sections.names import POINTS
 
 COLUMNS = [
     doc.column("point", "Cut at"),
     doc.column("others", "Other loops"),
-    doc.column("stable", "Closed loop"),
-    doc.column("gain_margin_db", "Gain margin", "dB", format="fix:2"),
-    doc.column("gain_margin_hz", "at", "Hz", format="sig:4"),
-    doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
-    doc.column("crossover_hz", "at", "Hz", format="sig:4"),
-    doc.column("delay_margin_ms", "Delay margin", "ms", format="sig:3"),
-    doc.column("modulus_margin", "Modulus margin", format="fix:3"),
-    doc.column("s_peak_db", "Peak of S", "dB", format="fix:2"),
+    *(c for c in MARGIN_COLUMNS if c["key"] not in ("loop", "delay_margin_samples", "disk_margin")),
 ]
 EXACT_COLUMNS = [
     doc.column("point", "Cut at"),
