@@ -61,7 +61,7 @@ def _cascade(design: Design, where: str) -> None:
         raise _refuse(
             where, "control.current", "a table", "not allowed with motor.source_gain, which has no current"
         )
-    position, velocity = design.controller.position, design.controller.velocity
+    position, velocity = design.controller.position_loop, design.controller.velocity
     if position.feedforward and velocity is None:
         raise _refuse(
             where, "control.position.feedforward", position.feedforward, "allowed: 0 without a velocity loop"
@@ -71,7 +71,7 @@ def _cascade(design: Design, where: str) -> None:
 def _sampling(design: Design, where: str) -> None:
     control = design.controller
     n_v = control.velocity.every if control.velocity else 1
-    n_p = control.position.every
+    n_p = control.position_loop.every
     if n_p % n_v:
         raise _refuse(
             where, "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"

@@ -57,7 +57,7 @@ def estimated_crossovers(design: Design) -> dict[str, float]:
             divisor = 1.0 if control.current is not None else motor.resistance_ohm
             torque = motor.torque_constant_Nm_A / divisor
         found["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
-        found["position"] = control.position.gain
+        found["position"] = control.position_loop.gain
     return found
 
 
