@@ -21,6 +21,7 @@ LoadPath = Literal["self-locking", "back-drivable"]
 SpeedSource = Literal["ideal", "difference", "tracking"]
 Sensor = Literal["motor", "output"]
 Direction = Literal["both", "forward", "reverse"]
+MotorConstants = Literal["dc", "rms-line", "peak-phase"]
 AntiWindup = Literal["conditional", "clamped", "back-calculation"]
 FilterKind = Literal["lowpass", "notch", "leadlag", "biquad"]
 FilterPlace = Literal["torque", "speed"]
@@ -44,6 +45,7 @@ class Motor:
     torque_constant_Nm_A: float | None = None
     back_emf_constant_Vs_rad: float | None = None
     source_gain_Nm_V: float | None = None
+    constants: MotorConstants = "dc"
 
     @property
     def has_electrical_dynamics(self) -> bool:
@@ -249,7 +251,7 @@ class CurrentLoop:
     """
 
     gain_V_A: float
-    integral_time_s: float | None
+    integral_time_s: float | None = None
     back_emf_feedforward: float = 0.0
     resistance_feedforward: float = 0.0
     anti_windup: AntiWindup = "conditional"
@@ -404,6 +406,11 @@ class Temperature:
     winding_limit_degC: float = inf
     thermal_resistance_K_W: float | None = None
     thermal_time_s: float | None = None
+
+
+def default_deflection(axis: Axis) -> float:
+    """Full deflection where a design states none: 10 deg, or 0.01 m on a linear axis."""
+    return 0.01 if axis == "linear" else 0.17453292519943295
 
 
 @dataclass(frozen=True, kw_only=True)
