@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, log, pi, prod, sin
+from math import inf, log, pi, prod, sin, sqrt
 from typing import Literal
 
 from actuator_lti.design.parameters import FrozenMap
@@ -605,22 +605,41 @@ class Design:
 
     @property
     def effective_motor(self) -> Motor:
-        """The motor at its winding and magnet temperature; the data-sheet motor where none is stated."""
-        heat, motor = self.temperature, self.motor
-        if heat is None or motor.resistance_ohm is None:
+        """The motor as the model has it: one constant k, phase-phase R and L, at its temperature.
+
+        An AC servo motor becomes the DC motor of the same torque, losses and voltage limit, with u the peak
+        line-line voltage and i = sqrt(3/2) I_rms = (sqrt(3)/2) I_peak: then P = k i w, R and L are the
+        line-line values, and the bus voltage limits u.
+        """
+        motor = self.motor
+        if motor.resistance_ohm is None:
             return motor
-        magnet = 1.0 + heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
-        winding = 1.0 + heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
+        torque, voltage, impedance = _EQUIVALENT[motor.constants]
+        winding = magnet = 1.0
+        if self.temperature is not None:
+            heat = self.temperature
+            magnet += heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
+            winding += heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
         return replace(
             motor,
-            resistance_ohm=motor.resistance_ohm * winding,
-            torque_constant_Nm_A=_times(motor.torque_constant_Nm_A, magnet),
-            back_emf_constant_Vs_rad=_times(motor.back_emf_constant_Vs_rad, magnet),
+            resistance_ohm=_times(motor.resistance_ohm, impedance * winding),
+            inductance_H=_times(motor.inductance_H, impedance),
+            torque_constant_Nm_A=_times(motor.torque_constant_Nm_A, torque * magnet),
+            back_emf_constant_Vs_rad=_times(motor.back_emf_constant_Vs_rad, voltage * magnet),
+            constants="dc",
         )
 
 
+# factors on kM, on kE, and on R and L, from the data sheet to the equivalent DC motor
+_EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
+    "dc": (1.0, 1.0, 1.0),
+    "rms-line": (1.0 / sqrt(1.5), sqrt(2.0), 1.0),
+    "peak-phase": (2.0 / sqrt(3.0), sqrt(3.0), 2.0),
+}
+
+
 def _times(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor
+    return value if value is None or factor == 1.0 else value * factor
 
 
 def _train_inertia(gears: tuple[Gear, ...]) -> float:
