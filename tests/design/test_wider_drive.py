@@ -11,13 +11,12 @@ from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 
 AMBER = load_design("ilr33-amber")
+FILTER = "control.velocity.filter"
 NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth": 0.1}
 
 
 def test_filters_keep_their_order_and_have_keys_of_their_own() -> None:
-    design = with_overrides(
-        AMBER, {"control.velocity.filter": [NOTCH, {"kind": "lowpass", "frequency": "1 kHz"}]}
-    )
+    design = with_overrides(AMBER, {FILTER: [NOTCH, {"kind": "lowpass", "frequency": "1 kHz"}]})
     first, second = design.controller.velocity.filters  # type: ignore[union-attr]
     assert (first.frequency_rad_s, first.width_rad_s, first.depth) == (640.0, 320.0, 0.1)
     assert second.frequency_rad_s == pytest.approx(2 * pi * 1000, rel=1e-15)
@@ -96,11 +95,11 @@ def test_a_speed_drive_has_no_position_loop() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"control.velocity.filter": [{"kind": "notch", "frequency": "1 kHz"}]}, r"filter\.1\.width.*missing"),
-        ({"control.velocity.filter": [{**NOTCH, "order": 2}]}, r"filter\.1\.order = 2.*not allowed with kind"),
-        ({"control.velocity.filter": [{**NOTCH, "frequency": "6 kHz"}]}, r"below the velocity loop's Nyquist"),
-        ({"control.velocity.filter": [NOTCH] * 9}, "allowed: at most 8"),
-        ({"control.velocity.filter": [{"kind": "biquad", "b": [1.0], "a": [-2.1, 1.0]}]}, "inside the unit circle"),
+        ({FILTER: [{"kind": "notch", "frequency": "1 kHz"}]}, r"filter\.1\.width.*missing"),
+        ({FILTER: [{**NOTCH, "order": 2}]}, r"filter\.1\.order = 2.*not allowed with kind"),
+        ({FILTER: [{**NOTCH, "frequency": "6 kHz"}]}, r"below the velocity loop's Nyquist"),
+        ({FILTER: [NOTCH] * 9}, "allowed: at most 8"),
+        ({FILTER: [{"kind": "biquad", "b": [1.0], "a": [-2.1, 1.0]}]}, "inside the unit circle"),
         ({"encoder.speed": "tracking"}, r"needs encoder\.bandwidth"),
         ({"encoder.speed": "tracking", "encoder.bandwidth": "2 kHz"}, "too fast for its period"),
         ({"encoder.bandwidth": "100 Hz"}, 'allowed with speed = "tracking"'),
@@ -123,7 +122,7 @@ def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
 
 
 def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
-    """The tracking loop of model.md section 7: th+ = p + 2 w0 T r, w+ = w + w0^2 T r, p = th + T w, r = y - p."""
+    """The tracking loop of section 7: th+ = p + 2 w0 T r, w+ = w + w0^2 T r, p = th + T w, r = y - p."""
     import numpy as np
 
     def radius(x: float) -> float:
