@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, log, pi, prod, sin, sqrt
-from typing import Literal
+from typing import Any, Literal
 
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
@@ -549,6 +549,37 @@ class Design:
     revision: str = ""
     description: str = ""
     origin: str = ""
+
+    def with_values(self, values: Mapping[str, Any]) -> Design:
+        """A copy with some keys changed, as a design file would write them.
+
+        Parameters
+        ----------
+        values : mapping of dotted key to value
+            Text with its unit (``"90 1/s"``), or a number in SI; other keys take text, lists and tables.
+            A changed value says in its source what it was; a tolerance in percent follows it.
+
+        Returns
+        -------
+        Design
+            Checked like a file.
+
+        Raises
+        ------
+        InputError
+            For an unknown key, a wrong unit, or values that contradict each other.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> design = load_design("ilr33-amber")
+        >>> better = design.with_values({"control.position.gain": "90 1/s", "limits.voltage": 24.0})
+        >>> better.controller.position.gain, better.parameters["limits.voltage"].source
+        (90.0, 'changed from 12 V')
+        """
+        from actuator_lti.design.writing import with_overrides, with_units
+
+        return with_overrides(self, with_units(self, values))
 
     @property
     def total_ratio(self) -> float:
