@@ -75,6 +75,11 @@ _MOTOR = (
     _positive("motor.source_gain", "source_gain_Nm_V", "{torque}/V", "g",
               "gain of an ideal torque source, instead of R, L, kM, kE", example="35.15 N/V"),
 )
+_SCREW = (
+    _positive("screw.lead", "lead_m", "m", "p",
+              "travel per revolution of the screw: with it the motor's values may stand in N m, rad and "
+              "kg m2, and encoder.counts_per_rev is per revolution", required=True, example="10 mm"),
+)
 _GEAR = (
     _positive("gear.*.ratio", "ratio", "1", "i", "input speed over output speed", required=True,
               example="66"),
@@ -149,7 +154,7 @@ _FRICTION_POINT = (
 )
 _ENCODER = (
     _integer("encoder.counts_per_rev", "counts_per_rev", 2**32, "",
-             "counts per motor revolution after quadrature (linear axis: per metre)"),
+             "counts per motor revolution after quadrature (linear axis without a screw: per metre)"),
     _choice("encoder.speed", "speed", ("ideal", "difference", "tracking"),
             "the speed itself, a difference of angles, or a tracking loop (observer)"),
     _integer("encoder.difference_samples", "difference_samples", 64, "m",
@@ -313,8 +318,8 @@ _VALIDATION = (
 # fmt: on
 
 ALL_FIELDS: tuple[Field, ...] = (
-    *_DESIGN, *_MOTOR, *_GEAR, *_COUPLING, *_LOAD, *_LOAD_FRICTION, *_GRAVITY, *_FRICTION, *_FRICTION_POINT,
-    *_ENCODER, *_OUTPUT_ENCODER, *_INSTRUMENTS, *_LIMITS, *_SUPPLY, *_TEMPERATURE, *_COMMAND, *_CONTROL,
-    *_FILTER, *_VALIDATION,
+    *_DESIGN, *_MOTOR, *_SCREW, *_GEAR, *_COUPLING, *_LOAD, *_LOAD_FRICTION, *_GRAVITY, *_FRICTION,
+    *_FRICTION_POINT, *_ENCODER, *_OUTPUT_ENCODER, *_INSTRUMENTS, *_LIMITS, *_SUPPLY, *_TEMPERATURE,
+    *_COMMAND, *_CONTROL, *_FILTER, *_VALIDATION,
 )  # fmt: skip
 """Every key, in the order of a design file."""

@@ -64,6 +64,22 @@ class Gear:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Screw:
+    """A screw, rack or belt between a rotary motor and a linear axis: travel per revolution.
+
+    It lets the motor's data sheet stand in its own units: with p = lead/2 pi a torque T is the force T/p, an
+    angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
+    """
+
+    lead_m: float
+
+    @property
+    def travel_m_rad(self) -> float:
+        """p, travel per radian."""
+        return self.lead_m / (2.0 * pi)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Coupling:
     """The elastic coupling between the motor's side and the load's side (model.md section 6).
 
@@ -535,6 +551,7 @@ class Design:
     friction: Friction = field(default_factory=Friction)
     encoder: Encoder = field(default_factory=Encoder)
     output_encoder: OutputEncoder = field(default_factory=OutputEncoder)
+    screw: Screw | None = None
     coupling: Coupling | None = None
     command: Command = field(default_factory=Command)
     supply: Supply | None = None
@@ -605,18 +622,18 @@ class Design:
 
     @property
     def angle_quantum_rad(self) -> float | None:
-        """One encoder count at the motor, in rad (linear axis: counts per metre, so in m); None without."""
-        return self._quantum(self.encoder.counts_per_rev)
+        """One encoder count at the motor, in rad (linear axis: in m, of a screw's lead or of a metre)."""
+        return self._quantum(self.encoder.counts_per_rev, self.screw.lead_m if self.screw else 1.0)
 
     @property
     def output_quantum_rad(self) -> float | None:
         """One count of the output's encoder at the output shaft, in rad or m; None without."""
         return self._quantum(self.output_encoder.counts_per_rev)
 
-    def _quantum(self, counts: int | None) -> float | None:
+    def _quantum(self, counts: int | None, travel_m: float = 1.0) -> float | None:
         if counts is None:
             return None
-        return (1.0 if self.axis == "linear" else 2.0 * pi) / counts
+        return (travel_m if self.axis == "linear" else 2.0 * pi) / counts
 
     @property
     def inertia_kgm2(self) -> float:
