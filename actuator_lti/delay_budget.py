@@ -147,7 +147,9 @@ def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, 
     lag = encoder.filter_time_s
     names = [f"speed filter {1 / lag:.4g} rad/s"] if lag > 0 else []
     names += [_name(k, item) for k, item in enumerate(velocity.filters, 1)]
-    steps = [(0.0, ())] + ([(lag, ())] if lag > 0 else [])
+    steps: list[tuple[float, tuple[Filter, ...]]] = [(0.0, ())]
+    if lag > 0:
+        steps.append((lag, ()))
     steps += [(lag, velocity.filters[: k + 1]) for k in range(len(velocity.filters))]
     loops = [_continuous(_filtered(wired, *step), stage, frozenset(), omega) for step in steps]
     shares = [_from_low(after / before) for before, after in pairwise(loops)]

@@ -30,8 +30,8 @@ class LimiterPath:
         Of `actuator_lti.drive.signals.LIMITERS`. ``"speed"``: speed command before the clamp (rad/s, motor
         side). ``"acceleration"``: its change per update over the period of the position loop (rad/s^2).
         ``"current"``: current command before the clamp (A). ``"voltage"``: voltage before the clamp (V).
-        ``"torque-command"``: what the velocity controller gives to the torque filters. ``"overload"``: the motor
-        current, whose square the protection averages.
+        ``"torque-command"``: what the velocity controller gives to the torque filters. ``"overload"``: the
+        motor current, whose square the protection averages.
     limit : float
         The limit, same unit; ``inf`` where there is none.
     unit : str
@@ -72,9 +72,9 @@ class LimiterPath:
 
         Notes
         -----
-        A mean square (time constant tau) of a sinusoid of amplitude I tends to I^2/2 with a ripple of the double
-        frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds its square
-        and, by the product of both, a ripple of the single frequency, bounded by its amplitude.
+        A mean square (time constant tau) of a sinusoid of amplitude I tends to I^2/2 with a ripple of the
+        double frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds
+        its square and, by the product of both, a ripple of the single frequency, bounded by its amplitude.
         """
         magnitude = np.abs(self.response(omega_rad_s))
         with np.errstate(divide="ignore"):
@@ -131,7 +131,7 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
 
 @dataclass(frozen=True)
 class Place:
-    """Where a limiter acts in a drive: the signal in front of it, the ticks between its updates, the limit."""
+    """Where a limiter acts: the signal in front of it, the ticks between its updates, the limit."""
 
     limiter: Limiter
     signal: str

@@ -1,8 +1,8 @@
 """Controllers, filters and estimators as small linear blocks with a sampled and a continuous face.
 
-A face is ``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` (continuous) with ``y = C x + D e``. Coefficients
-are floats, or arrays of shape (K,) stacked over designs. What the running tick computes block by block
-stands in model.md sections 2 and 7; here is what it is as a linear system.
+A face is ``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` (continuous) with ``y = C x + D e``.
+Coefficients are floats, or arrays of shape (K,) stacked over designs. What the running tick computes block
+by block stands in model.md sections 2 and 7; here is what it is as a linear system.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def lag(time_s: Any, period_s: Any) -> Block:
 
 
 def difference(samples: int, period_s: Any) -> Block:
-    """Mean speed over m periods. Sampled it takes the angle gained in the last period, continuous the speed."""
+    """Mean speed over m periods; sampled, of the angle gained in each, continuous, of the speed."""
     m, span = samples, samples * period_s
     shift = tuple(tuple(1.0 if c == r - 1 else 0.0 for c in range(m - 1)) for r in range(m - 1))
     C = tuple(1 / span if c == m - 2 else 0.0 for c in range(m - 1))
@@ -215,17 +215,20 @@ def _canonical(num: Polynomial, den: Polynomial) -> Face:
     return Face(A, B, (1.0, 0.0)[:n], b[0])
 
 
+def _back(p: Polynomial, h: Any) -> Polynomial:
+    """Coefficients in s of a polynomial in z = (1 + s h)/(1 - s h), highest power first."""
+    if len(p) == 2:
+        return ((p[0] - p[1]) * h, p[0] + p[1])
+    return ((p[0] - p[1] + p[2]) * h * h, 2 * (p[0] - p[2]) * h, p[0] + p[1] + p[2])
+
+
 def _given(item: Filter, period_s: Any) -> Block:
     """A biquad by its sampled coefficients; its continuous face by the inverse of Tustin's rule."""
     size = max(len(item.b), len(item.a))
     b, a = (tuple(p) + (0.0,) * (size - len(p)) for p in (item.b, item.a))
     if size == 1:
         return Block(Face(D=b[0] / a[0]), Face(D=b[0] / a[0]), (), period_s)
-    h = period_s / 2  # z = (1 + s h)/(1 - s h)
-    if size == 2:
-        num, den = (((p[0] - p[1]) * h, p[0] + p[1]) for p in (b, a))
-    else:
-        num, den = (((p[0] - p[1] + p[2]) * h * h, 2 * (p[0] - p[2]) * h, p[0] + p[1] + p[2]) for p in (b, a))
+    num, den = (_back(p, period_s / 2) for p in (b, a))
     if not abs(den[0]) > 0:
         raise InputError("biquad: a pole at z = -1 has no continuous form")
     return Block(_canonical(b, a), _canonical(num, den), ("1", "2")[: size - 1], period_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import cos, isfinite, pi
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -127,7 +128,7 @@ def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
     """(speed from which it holds, slope) of each straight piece of a friction map; the last continues."""
     found = [
         (a.speed_rad_s, (b.torque_Nm - a.torque_Nm) / (b.speed_rad_s - a.speed_rad_s))
-        for a, b in zip(points, points[1:], strict=False)
+        for a, b in pairwise(points)
     ]
     return found or [(0.0, 0.0)]
 

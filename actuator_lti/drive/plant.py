@@ -1,4 +1,6 @@
-"""The continuous plant of a drive at an operating point, rigid or with an elastic coupling (model.md 1, 3, 6).
+"""The continuous plant of a drive at an operating point, rigid or with an elastic coupling.
+
+Equations (1), (2), (14), and model.md section 6.
 
 Coefficients may be arrays of shape (K,) stacked over designs: then the matrices have K in front.
 """
@@ -27,7 +29,8 @@ class Plant:
     states : tuple of str
         ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source; ``("i",)``
         with the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and ``"twist"`` =
-        th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop sees.
+        th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop
+        sees.
     A : ndarray, shape (..., n, n)
         Without the load's stiffness, see `stiffness_Nm_rad`.
     B_u, B_T, B_M : ndarray, shape (..., n)
@@ -50,7 +53,7 @@ class Plant:
 
 
 def matrix(names: tuple[str, ...], entries: dict[tuple[str, str], Any]) -> np.ndarray:
-    """A square matrix over named states from its entries, stacked where an entry is an array of shape (K,)."""
+    """A square matrix over named states, stacked where an entry is an array of shape (K,)."""
     out = np.zeros((*_stack(entries.values()), len(names), len(names)))
     for (row, column), value in entries.items():
         out[..., names.index(row), names.index(column)] = value

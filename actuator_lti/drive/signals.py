@@ -56,7 +56,8 @@ class Limiter:
     name : str
     words : str
     limit : str
-        Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's target.
+        Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's
+        target.
     kind : {"value", "rate", "rms"}
         A clamp of the signal, of its change per update, or of its mean square in the long run.
     bit : int

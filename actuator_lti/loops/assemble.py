@@ -51,7 +51,8 @@ def assemble_loops(
         inner controllers still in the path. Break points, limiters and the response to the command are those
         of the closed drive in any case.
     speed_rad_s, angle_rad : float
-        Motor speed at which the slope of a friction map is taken, output angle at which gravity is made linear.
+        Motor speed at which the slope of a friction map is taken, output angle at which gravity is made
+        linear.
 
     Returns
     -------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -67,10 +68,10 @@ def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
     return A, B
 
 
-def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, scale: float = 1.0) -> Block:
+def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, scale: Any = 1.0) -> Block:
     """From an input held over the ticks to a signal at the start of the first of them."""
     n = len(program.states)
     column = program.inputs.index(source)
     A, B = compose(ticks)
-    row = scale * ticks[0].signals[signal][..., None, :]
+    row = np.asarray(scale)[..., None, None] * ticks[0].signals[signal][..., None, :]
     return Block(A, B[..., :, [column]], row[..., :n], row[..., [n + column]], program.states)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,7 +30,7 @@ _DELAY_STEPS_A_TICK = 4
 
 
 def phase_blocks(
-    program: TickProgram, every: int, source: str, signal: str, scale: float = 1.0
+    program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0
 ) -> list[Block]:
     """From an input held `every` ticks to a signal, one block for each such time within one period."""
     ticks = [program.tick(k) for k in range(program.ticks)]
@@ -49,13 +49,16 @@ def cyclic(blocks: Sequence[Block]) -> Block:
     """Time-invariant system of the fundamental: state m holds the response seen at phase m."""
     if len(blocks) == 1:
         return blocks[0]
-    M, n = len(blocks), blocks[0].A.shape[0]
-    A, B, C = np.zeros((M * n, M * n)), np.zeros((M * n, 1)), np.zeros((1, M * n))
+    M, n = len(blocks), len(blocks[0].states)
+    stack = np.broadcast_shapes(
+        *(each.shape[:-2] for block in blocks for each in (block.A, block.B, block.C))
+    )
+    A, B, C = (np.zeros((*stack, *shape)) for shape in ((M * n, M * n), (M * n, 1), (1, M * n)))
     for m, block in enumerate(blocks):
         after = (m + 1) % M
-        A[after * n : after * n + n, m * n : m * n + n] = block.A
-        B[after * n : after * n + n] = block.B
-        C[:, m * n : m * n + n] = block.C / M
+        A[..., after * n : after * n + n, m * n : m * n + n] = block.A
+        B[..., after * n : after * n + n, :] = block.B
+        C[..., :, m * n : m * n + n] = block.C / M
     names = tuple(f"{name}[{m}]" for m in range(M) for name in blocks[0].states)
     return Block(A, B, C, sum((block.D for block in blocks), np.zeros((1, 1))) / M, names)
 

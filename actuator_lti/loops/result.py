@@ -75,11 +75,11 @@ class Loops:
         By the names of `actuator_lti.drive.signals.LIMITERS`, as far as they exist: from the command to what
         each limiter sees.
     reference_to_output : python-control system or None
-        Command at the output shaft to output angle, feed-forward included; of a speed drive the command to the
-        motor's speed, of a torque drive to its current, of a voltage drive to the motor's speed.
+        Command at the output shaft to output angle, feed-forward included; of a speed drive the command to
+        the motor's speed, of a torque drive to its current, of a voltage drive to the motor's speed.
     moment_to_output : python-control system or None
-        Moment on the output shaft, held over every tick, to the output angle, all loops closed: the compliance;
-        its inverse is the dynamic stiffness.
+        Moment on the output shaft, held over every tick, to the output angle, all loops closed: the
+        compliance; its inverse is the dynamic stiffness.
     tick_system : TickSystem or None
         The whole sampled closed loop, tick by tick (form ``"sampled"``).
     period_s : float or None

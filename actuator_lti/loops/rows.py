@@ -1,4 +1,4 @@
-"""A signal as a linear combination of states and inputs, by name: what a walk over the drive computes with."""
+"""A signal as a linear combination of states and inputs, by name: what a walk computes with."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ class Row:
     """
 
     __slots__ = ("terms",)
+    __array_ufunc__ = None  # an array times a row is a row
 
     def __init__(self, terms: Mapping[str, Any] | None = None) -> None:
         self.terms = dict(terms or {})

@@ -84,7 +84,7 @@ def fundamental_path(program: TickProgram, every: int, source: str, signal: str)
 
 
 def whole_path(wired: Drive) -> tuple[str, str, int, str]:
-    """Command, controlled signal, ticks between two commands, and the name of the output, of a whole drive."""
+    """Command, controlled signal, ticks between two commands, and name of the output."""
     stage = wired.outermost
     signal = {"position": "output_angle", "velocity": "w", "current": "i"}.get(
         stage, "w" if "w" in wired.plant.states else "i"
@@ -94,7 +94,8 @@ def whole_path(wired: Drive) -> tuple[str, str, int, str]:
 
 
 def moment_to_output(wired: Drive) -> control.StateSpace:
-    """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops closed.
+    """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops
+    closed.
 
     Its inverse is the dynamic stiffness (model.md section 9). Where the drive has slower stages, the
     fundamental of the periodic loop.

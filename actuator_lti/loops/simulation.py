@@ -24,9 +24,9 @@ class TickSystem:
     """``x_{k+1} = A_j x_k + B_j v_k, y_k = C_j x_k + D_j v_k``, v = [ref, T, M], j = k mod `ticks`.
 
     ref is the command at t_k: of the position at the output shaft (rad), else ``w_ref`` (rad/s at the motor),
-    ``i_ref`` (A) or ``u`` (V); T a torque in N m at the motor shaft that accelerates it, M a moment in N m that
-    pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc; of the load
-    while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
+    ``i_ref`` (A) or ``u`` (V); T a torque in N m at the motor shaft that accelerates it, M a moment in N m
+    that pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc; of the
+    load while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
     `initial_state` says otherwise (``ref_prev``, motor side).
 
     Attributes

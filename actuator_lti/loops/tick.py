@@ -1,12 +1,13 @@
 """The walk in samples: one controller tick of model.md section 2 as a linear map, with a loop cut anywhere.
 
 Every signal is a row over (states, inputs) at t_k; walking once gives the state-space matrices. States: the
-plant's ``i``, ``w``, ``th``, ``W``, ``twist``; past inputs ``u1``, ``u2``, ... under a delay; a block's own, named
-after its place (``velocity.I``, ``speed.filter``, ``torque1.1``, ``estimate.D1``); held values ``hold_*`` of slower
-stages; ``*_prev`` of differences; ``acc``, the angle gained since the last speed estimate.
+plant's ``i``, ``w``, ``th``, ``W``, ``twist``; past inputs ``u1``, ``u2``, ... under a delay; a block's own,
+named after its place (``velocity.I``, ``speed.filter``, ``torque1.1``, ``estimate.D1``); held values
+``hold_*`` of slower stages; ``*_prev`` of differences; ``acc``, the angle gained since the last speed
+estimate.
 
-An estimated speed is computed from ``acc`` and not from stored angles: so the velocity loop has no eigenvalue at
-1 that it does not see.
+An estimated speed is computed from ``acc`` and not from stored angles: so the velocity loop has no
+eigenvalue at 1 that it does not see.
 """
 
 from __future__ import annotations

@@ -3,9 +3,10 @@
 What time is, the algebra says that a walk runs in: `actuator_lti.loops.tick` (samples) or
 `actuator_lti.loops.flow` (derivatives and delays). The walk knows which signal goes where, and nothing else.
 
-Signals that it leaves behind (motor side, before a cut): the plant's ``i``, ``w``, ``th``, ``W``, ``phi``, ``T_s``
-and ``output_angle``; ``output``, the angle fed back; ``w_cmd`` and ``torque_command`` in front of their limiters; ``w_meas``; the errors ``e_*``; the
-break points ``u``, ``i_ref``, ``w_ref``. The friction feed-forward has a step in it and no linear part.
+Signals that it leaves behind (motor side, before a cut): the plant's ``i``, ``w``, ``th``, ``W``, ``phi``,
+``T_s`` and ``output_angle``; ``output``, the angle fed back; ``w_cmd`` and ``torque_command`` in front of
+their limiters; ``w_meas``; the errors ``e_*``; the break points ``u``, ``i_ref``, ``w_ref``. The friction
+feed-forward has a step in it and no linear part.
 """
 
 from __future__ import annotations
@@ -206,12 +207,13 @@ class Walk(ABC):
         """PI on the current, and the feed-forward of back-EMF and resistance voltage."""
         law, motor = self.control.current, self.design.effective_motor
         assert law is not None
+        assert motor.back_emf_constant_Vs_rad is not None
+        assert motor.resistance_ohm is not None
         error = reference if "current" in self.program.opened else reference - self.signals["i"]
         value = self.apply("current", self.drive.law("current"), self.at_cut(ERRORS["current"], error))
         if self.program.feeds_back_emf:
-            value = (
-                value + law.back_emf_feedforward * motor.back_emf_constant_Vs_rad * self.speed_for_voltage()
-            )
+            gain = law.back_emf_feedforward * motor.back_emf_constant_Vs_rad
+            value = value + gain * self.speed_for_voltage()
         if present(law.resistance_feedforward):
             value = value + law.resistance_feedforward * motor.resistance_ohm * reference
         return value

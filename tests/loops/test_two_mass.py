@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -105,15 +106,14 @@ def test_resonance_and_antiresonance() -> None:
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
 def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
-    rigid = assemble_loops(
-        replace(drive_d(), coupling=None, load=replace(drive_d().load, friction=None)), form
-    )  # type: ignore[arg-type]
+    free = replace(drive_d(), load=replace(drive_d().load, friction=None))
+    rigid = assemble_loops(replace(free, coupling=None), form)  # type: ignore[arg-type]
     omega = np.geomspace(1, 2000, 12)
     gaps = []
     for k in (4e5, 4e7):
         # damping that keeps the mode's damping ratio, as it moves out
-        design = replace(drive_d(), coupling=Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k)))
-        loops = assemble_loops(replace(design, load=replace(design.load, friction=None)), form)  # type: ignore[arg-type]
+        stiff = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k))
+        loops = assemble_loops(replace(free, coupling=stiff), form)  # type: ignore[arg-type]
         worst = 0.0
         for name, loop in rigid.present.items():
             points = np.exp(1j * omega * loop.period_s) if form == "sampled" else 1j * omega
@@ -180,7 +180,7 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
     edges = np.arcsin(np.array([0.0, 10.0, W]) / W)
     nodes, weights = np.polynomial.legendre.leggauss(40)
     whole = 0.0
-    for low, high in zip(edges, edges[1:], strict=False):
+    for low, high in pairwise(edges):
         x = low + (high - low) * (nodes + 1) / 2
         speed = W * np.sin(x)
         torque = np.where(speed < 10, 0.02 - 1e-3 * speed, 0.01 + 5e-4 * (speed - 10))
