@@ -14,9 +14,9 @@ from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
     from actuator_lti.delay_budget import DelayBudget
+    from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.limiters import Onset
     from actuator_lti.loops import ExactMargins, Loops
-    from actuator_lti.plant import OperatingPoint
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
@@ -164,8 +164,8 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 
 def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPointFigures, ...]:
     """Measure the loops sliding, at rest, and described at small speeds, at each load."""
+    from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops
-    from actuator_lti.plant import friction_slope
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None

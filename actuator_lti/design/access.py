@@ -167,3 +167,11 @@ def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Param
             )
         found.append(known)
     return tuple(found)
+
+
+def stacked(design: Design, values: Mapping[str, Any]) -> Design:
+    """A design with arrays in place of some numbers: many designs of one structure, unchecked."""
+    changes: dict[str, dict[str, Any]] = {}
+    for path, array in values.items():
+        changes.setdefault(path.rpartition(".")[0], {})[located(design, path)[0].attribute] = array
+    return _replaced(design, changes, {})

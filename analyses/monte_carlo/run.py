@@ -12,6 +12,7 @@ import numpy as np
 from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
 from analyses.monte_carlo.judging import judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
@@ -177,7 +178,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
 
     found = []
     for place, tally in enumerate(tallies):
-        timed = tally.requirement.quantity in ("rise_time", "overshoot", "settling_time")
+        timed = QUANTITIES[tally.requirement.quantity].timed
         quick = replace(task, step=None, time_figures=timed)
         case = worst_case(quick, tally.requirement, np.array([sample for _, sample, _ in tally.worst]))
         name = f"worst-{place + 1:02d}-{slug(tally.requirement.id)}"

@@ -15,8 +15,8 @@ from loop_designs import amber, ctms_position, designs, emps, without
 
 from actuator_lti import DelaySystem, InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Friction, Load
+from actuator_lti.drive.operating import friction_slope
 from actuator_lti.loops import exact_margins
-from actuator_lti.plant import friction_slope
 
 
 def response(system: Any, omega: np.ndarray) -> np.ndarray:
