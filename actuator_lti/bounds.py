@@ -1,8 +1,8 @@
 """Every bound that keeps a hostile or mistaken input from taking the memory, the disk or the night.
 
-One table: what is bounded, by how much, which option or key asks for it, and why so much. Whoever allocates asks
-the bound first (`Bound.check`); ``python -m actuator_lti.bounds`` writes the table as Markdown for
-the documentation.
+One table: what is bounded, by how much, which option or key asks for it, and why so much. Whoever
+allocates asks the bound first (`Bound.check`); ``python -m actuator_lti.bounds`` writes the table as
+Markdown for the documentation.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ class Bound:
 
         Examples
         --------
-        >>> STUDY_VARIANTS.check(20_000)
+        >>> TONES.check(20_000)
         Traceback (most recent call last):
         ...
-        actuator_lti.errors.InputError: [[variant]], [[sweep]], [[grid]]: 20000 variants of a study; allowed: at most 10000
+        actuator_lti.errors.InputError: --count: 20000 tones of a signal; allowed: at most 10000
         """
         if value <= self.most:
             return
@@ -112,8 +112,8 @@ CSV_ROWS = Bound(
     reason="longer records are averaged over neighbours while they are read; the record says so",
 )  # fmt: skip
 TABLE_BYTES = Bound(
-    what="of a CSV file of a command, load or samples", most=1 << 28, unit="bytes", asked_by="--record, --load-file",
-    reason="read whole into memory",
+    what="of a CSV file of a command, load or samples", most=1 << 28, unit="bytes",
+    asked_by="--record, --load-file", reason="read whole into memory",
 )  # fmt: skip
 TABLE_ROWS = Bound(
     what="rows of a command, load or sample file", most=5_000_000, asked_by="--record, --load-file",
@@ -144,7 +144,7 @@ SIGNAL_ROWS = Bound(
     reason="400 MB, held in memory beside the history",
 )  # fmt: skip
 TONES = Bound(
-    what="frequencies of a stepped sine or multisine", most=10_000, asked_by="--count",
+    what="tones of a signal", most=10_000, asked_by="--count",
     reason="a decade in steps of a fifth of a per mille",
 )  # fmt: skip
 TONE_TICKS = Bound(
@@ -207,15 +207,15 @@ def markdown() -> str:
     lines = [
         "# Limits",
         "",
-        "Made by `python -m actuator_lti.bounds`; more than this is refused in one line before memory is taken.",
+        "Made by `python -m actuator_lti.bounds`. More is refused in one line, before memory is taken.",
         "",
         "| what | at most | asked for by | why |",
         "|---|---:|---|---|",
     ]
-    for bound in table().values():
-        lines.append(
-            f"| {bound.what} | {_readable(bound.most, bound.unit)} | {bound.asked_by} | {bound.reason} |"
-        )
+    lines += [
+        f"| {bound.what} | {_readable(bound.most, bound.unit)} | {bound.asked_by} | {bound.reason} |"
+        for bound in table().values()
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -13,7 +13,6 @@ import stat
 import tomllib
 import unicodedata
 from os import PathLike
-from pathlib import Path
 from typing import Any, BinaryIO
 
 from actuator_lti.bounds import (
