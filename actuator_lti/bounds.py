@@ -135,6 +135,10 @@ RUN_TICKS = Bound(
     what="ticks of one run", most=1_000_000_000, asked_by="--duration",
     reason="28 hours of motion at 100 us, some minutes to compute; a hole of years in a record asks for more",
 )  # fmt: skip
+BATCH_TICKS = Bound(
+    what="ticks of all runs of a batch", most=20_000_000_000,
+    reason="an hour on two cores; a design that moves a million times slower than it samples asks for more",
+)  # fmt: skip
 HISTORY_BYTES = Bound(
     what="of one run's history", most=4_000_000_000, unit="bytes", asked_by="--duration, --every",
     reason="it is held in memory",

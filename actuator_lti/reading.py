@@ -32,6 +32,7 @@ from actuator_lti.errors import InputError
 INTEGERS = range(-(1 << 63), 1 << 63)
 """What TOML promises to hold; longer ones would become infinite as floats, or take long to print."""
 
+_PIECE = 1 << 20
 _HARMLESS = (float, bool, type(None))  # need no look where values are not counted
 _CONTROL = ("Cc", "Cs")
 _CONTROL_OF_KEYS = ("Cc", "Cf", "Cs")
@@ -97,14 +98,16 @@ def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound
         Naming the file and what is allowed.
     """
     where = shown_path(path)
+    data = bytearray()
     with open_regular(path, what) as stream:
         try:
-            data = stream.read(most.most + 1)
+            while len(data) <= most.most and (piece := stream.read(_PIECE)):
+                data += piece
         except OSError as error:
             raise InputError(f"cannot be read: {_reason(error)}", where=where) from None
     if len(data) > most.most:
         raise InputError(f"is larger than allowed: {most.allowed}", where=where)
-    return data
+    return bytes(data)
 
 
 def decode(data: bytes, where: str) -> str:
