@@ -164,7 +164,9 @@ def parse_toml(
 def parse_json(text: str, where: str) -> Any:
     """The value of a JSON text: no NaN, no key twice, bounded depth, no control characters."""
     try:
-        value = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_no_key_twice)
+        value = json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_no_key_twice
+        )
     except RecursionError:
         raise InputError(_too_deep("", JSON_DEPTH), where=where) from None
     except (ValueError, OverflowError) as error:
@@ -175,6 +177,13 @@ def parse_json(text: str, where: str) -> Any:
 
 def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is not allowed")
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if value - value != 0.0:
+        raise ValueError(f"{digits[:20]} is beyond the range of floats")
+    return value
 
 
 def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def _place(column: str | int, header: list[str], where: str) -> int:
     if isinstance(column, str):
         if column not in header:
             there = ", ".join(shown(name) for name in header[:20])
-            raise InputError(f"no column {column!r}; there are {there}", where)
+            raise InputError(f"no column {shown(column)}; there are {there}", where)
         return header.index(column)
     if not 0 <= column < len(header):
         raise InputError(f"column {column}: must be 0 to {len(header) - 1}", where)

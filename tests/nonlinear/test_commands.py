@@ -91,9 +91,9 @@ def test_refusals(make: Callable[[], object], words: str) -> None:
 def test_cells_that_are_no_numbers(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,a\n0,1\n1,x\n")
-    with pytest.raises(InputError, match=r"line 3, column 2 = 'x'"):
+    with pytest.raises(InputError, match=r'line 3, column 2 = "x"'):
         read_columns(path, ("t", "a"))
-    with pytest.raises(InputError, match="no column 'b'; there are t, a"):
+    with pytest.raises(InputError, match='no column "b"; there are "t", "a"'):
         read_columns(path, ("b",))
 
 
