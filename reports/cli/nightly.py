@@ -43,6 +43,10 @@ PdfOption = Annotated[bool, typer.Option("--pdf", help="A PDF beside each report
 PlainOption = Annotated[bool, typer.Option("--no-validation", help="Linear reports only, no simulation.")]
 ByOption = Annotated[str, typer.Option("--by", metavar="NAME", help="Who approves.")]
 ReasonOption = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why the night is approved.")]
+LostOption = Annotated[
+    bool,
+    typer.Option("--accept-lost-history", help="Begin anew where the history knows less than the site."),
+]
 DesignsOption = Annotated[
     list[str] | None,
     typer.Option("--design", metavar="NAME", help="Approve only this design; may be repeated."),
@@ -62,6 +66,7 @@ def nightly(
     by: ByOption = "",
     reason: ReasonOption = "",
     design: DesignsOption = None,
+    accept_lost_history: LostOption = False,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -73,17 +78,29 @@ def nightly(
     """
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
+    from reports.nightly.memory import HistoryLost
     from reports.nightly.night import Settings, approve, run_night
     from reports.nightly.source import read_study
 
     approving, path = _split(words)
     study = read_study(path, pdf=pdf, validation=False if no_validation else None)
-    settings = Settings(workers=workers, time_limit_s=time_limit, wait_s=wait, keep_reports=keep, state=state)
-    if approving:
-        night = approve(study, site, by=by, reason=reason, names=design or (), settings=settings)
-    else:
-        with progress(f"building {len(study.jobs)} reports", quiet=quiet) as report:
-            night = run_night(study, site, settings, progress=report, say=_warn)
+    settings = Settings(
+        workers=workers,
+        time_limit_s=time_limit,
+        wait_s=wait,
+        keep_reports=keep,
+        state=state,
+        accept_lost_history=accept_lost_history,
+    )
+    try:
+        if approving:
+            night = approve(study, site, by=by, reason=reason, names=design or (), settings=settings)
+        else:
+            with progress(f"building {len(study.jobs)} reports", quiet=quiet) as report:
+                night = run_night(study, site, settings, progress=report, say=_warn)
+    except HistoryLost as lost:  # no bad input: the gate cannot judge, so it does not open
+        _warn(str(lost))
+        leave_with(False)
     _show(night, site, as_json)
     leave_with(night.exit_status == 0)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
+from reports.nightly import memory
 from reports.nightly import site as site_files
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.clock import now
@@ -57,6 +58,8 @@ class Settings:
         ``module:function`` that makes ``(meta, files)`` of a job's payload.
     state : pathlib.Path, optional
         Folder of history and cache; ``DIR.state`` beside the site where left out.
+    accept_lost_history : bool
+        Go on where the history knows less than the site: a new one, or an older copy.
     """
 
     workers: int = 2
@@ -65,6 +68,7 @@ class Settings:
     keep_reports: int = 60
     build: str = "reports.nightly.compute:build"
     state: Path | None = None
+    accept_lost_history: bool = False
 
 
 def state_of(site: Path, settings: Settings) -> Path:
@@ -104,6 +108,8 @@ def run_night(
     ------
     InputError
         Where the lock is held, the site or its state cannot be written, or the history is of a newer version.
+    HistoryLost
+        Where the history knows less than the site.
     """
     use = settings or Settings()
     tell = say or _silent
@@ -116,6 +122,8 @@ def run_night(
             tell(history.notice)
         site_files.remove_leftovers(site, state)
         history.claim(study.name)
+        if not use.accept_lost_history:
+            memory.check(site, history.memory(), state)
         run = history.start_run(_run_row(version, study, clock()))
         outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
         known = history.known(o.key for o in outcomes)
@@ -163,9 +171,12 @@ def approve(
         raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
     state = state_of(site, use)
     if not (state / "history.sqlite").exists():
+        memory.check(site, memory.Memory("", 0, 0), state)
         raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
         history.claim(study.name)
+        if not use.accept_lost_history:
+            memory.check(site, history.memory(), state)
         runs = history.runs()
         if not runs:
             raise InputError("no night has been finished here yet", where=str(site))
