@@ -15,6 +15,8 @@ from reports.cli.options import (
     OperatingPointOption,
     OutOption,
     QuietOption,
+    SchedulerOption,
+    TlsOption,
 )
 
 if TYPE_CHECKING:
@@ -25,9 +27,6 @@ SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", help="Numb
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Seed, 0 or more.")]
 WorkersOption = Annotated[
     int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
 ]
 TableOption = Annotated[
     Path | None,
@@ -61,6 +60,7 @@ def montecarlo(
     out: OutOption = Path("out/montecarlo"),
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     from_samples: TableOption = None,
     step: StepOption = None,
     duration: DurationOption = 0.5,
@@ -92,7 +92,9 @@ def montecarlo(
         return
     folder = sample_folder(drive, settings, out)
     with progress(f"sampling {drive.name}", quiet=quiet) as shown:
-        result = monte_carlo(drive, folder, settings, engine=Engine(workers, scheduler), progress=shown)
+        result = monte_carlo(
+            drive, folder, settings, engine=Engine(workers, scheduler, tls=tls), progress=shown
+        )
     leave_with(_written(drive, result, out, at_least, as_json, quiet))
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.options import JsonOption, QuietOption
+from actuator_lti.bounds import JOB_MEMORY
+from reports.cli.options import JsonOption, QuietOption, SchedulerOption, TlsOption
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
@@ -31,6 +32,9 @@ WorkersOption = Annotated[
 LimitOption = Annotated[
     float,
     typer.Option("--time-limit", min=1.0, metavar="SECONDS", help="A design that takes longer is ended."),
+]
+MemoryOption = Annotated[
+    int, typer.Option("--memory-limit", min=300, metavar="MB", help="A design that needs more is ended.")
 ]
 WaitOption = Annotated[
     float,
@@ -58,7 +62,10 @@ def nightly(
     site: SiteOption,
     state: StateOption = None,
     workers: WorkersOption = 2,
+    scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     time_limit: LimitOption = 900.0,
+    memory_limit: MemoryOption = JOB_MEMORY.most // 1_000_000,
     wait: WaitOption = 0.0,
     keep: KeepOption = 60,
     pdf: PdfOption = False,
@@ -76,6 +83,7 @@ def nightly(
     result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
     --reason TEXT` makes the last night the baseline.
     """
+    from analyses.engine import Engine
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
     from reports.nightly.memory import HistoryLost
@@ -91,6 +99,8 @@ def nightly(
         keep_reports=keep,
         state=state,
         accept_lost_history=accept_lost_history,
+        memory_limit_bytes=memory_limit * 1_000_000,
+        engine=None if scheduler is None else Engine(scheduler=scheduler, tls=tls),
     )
     try:
         if approving:

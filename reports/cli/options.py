@@ -30,4 +30,11 @@ OperatingPointOption = Annotated[
         "--operating-point", metavar="POINT", help="Friction: sliding, rest or describing-function."
     ),
 ]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
+]
+TlsOption = Annotated[
+    Path | None,
+    typer.Option("--tls", metavar="DIR", help="ca.pem, cert.pem and key.pem for a tls:// scheduler."),
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]

@@ -9,9 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
+from analyses.engine import Engine
 from reports.nightly import memory
 from reports.nightly import site as site_files
+from reports.nightly.apart import Cluster
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
@@ -60,6 +63,10 @@ class Settings:
         Folder of history and cache; ``DIR.state`` beside the site where left out.
     accept_lost_history : bool
         Go on where the history knows less than the site: a new one, or an older copy.
+    memory_limit_bytes : int
+        Of a worker process; a design that needs more has no result.
+    engine : Engine, optional
+        A Dask cluster to build on in place of worker processes here.
     """
 
     workers: int = 2
@@ -69,6 +76,8 @@ class Settings:
     build: str = "reports.nightly.compute:build"
     state: Path | None = None
     accept_lost_history: bool = False
+    memory_limit_bytes: int = JOB_MEMORY.most
+    engine: Engine | None = None
 
 
 def state_of(site: Path, settings: Settings) -> Path:
@@ -221,13 +230,20 @@ def _outcomes(
     todo = {keys[job.name]: job for job in jobs if job.name not in found}
     if progress is not None:
         progress(len(found), len(jobs))
-    pool = Pool(use.build, cache.folder, use.workers, use.time_limit_s)
+    pool = _pool(use, cache.folder)
     for done in pool.run([Task(key=key, payload=job.payload) for key, job in todo.items()]):
         job = todo[done.key]
         found[job.name] = _built(cache, job, done)
         if progress is not None:
             progress(len(found), len(jobs))
     return [found[job.name] for job in jobs]
+
+
+def _pool(use: Settings, folder: Path) -> Pool | Cluster:
+    """Who builds: processes here, or a Dask cluster."""
+    if use.engine is not None and use.engine.distributed:
+        return Cluster(use.build, folder, use.engine, use.time_limit_s, use.memory_limit_bytes)
+    return Pool(use.build, folder, use.workers, use.time_limit_s, use.memory_limit_bytes)
 
 
 def _from_cache(cache: Cache, job: Job, key: str, tell: Say) -> Outcome | None:
