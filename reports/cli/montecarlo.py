@@ -17,6 +17,7 @@ from reports.cli.options import (
     QuietOption,
     SchedulerOption,
     TlsOption,
+    WorkersOption,
 )
 
 if TYPE_CHECKING:
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
 
 SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", help="Number of samples.")]
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Seed, 0 or more.")]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
 TableOption = Annotated[
     Path | None,
     typer.Option("--from-samples", metavar="FILE", help="CSV or Parquet of identified parameters, SI."),

@@ -30,6 +30,9 @@ OperatingPointOption = Annotated[
         "--operating-point", metavar="POINT", help="Friction: sliding, rest or describing-function."
     ),
 ]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
+]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
 ]

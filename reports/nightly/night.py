@@ -28,6 +28,7 @@ from reports.nightly.text import one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
 
+DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
 Progress = Callable[[int, int], None]
 Say = Callable[[str], None]
 
@@ -231,12 +232,19 @@ def _outcomes(
     if progress is not None:
         progress(len(found), len(jobs))
     pool = _pool(use, cache.folder)
-    for done in pool.run([Task(key=key, payload=job.payload) for key, job in todo.items()]):
+    for done in pool.run([_task(key, job) for key, job in todo.items()]):
         job = todo[done.key]
         found[job.name] = _built(cache, job, done)
         if progress is not None:
             progress(len(found), len(jobs))
     return [found[job.name] for job in jobs]
+
+
+def _task(key: str, job: Job) -> Task:
+    """What a job asks of the pool; a comparison takes as long as the designs that it holds."""
+    study = job.payload.get("study")
+    designs = len(study["designs"]) if isinstance(study, Mapping) else 1
+    return Task(key=key, payload=job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
 
 
 def _pool(use: Settings, folder: Path) -> Pool | Cluster:

@@ -24,10 +24,11 @@ ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Something to build: an address and what the build function gets."""
+    """Something to build: an address, what the build function gets, and how many time limits it may take."""
 
     key: str
     payload: Mapping[str, Any]
+    limits: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +118,7 @@ class Pool:
         try:
             process = self._context.Process(
                 target=worker.main,
-                args=(there, self._build, self._cache, self._limit, self._memory),
+                args=(there, self._build, self._cache, self._memory),
                 daemon=True,
             )
             process.start()
@@ -163,8 +164,8 @@ class Pool:
             return
         task = queue.popleft()
         now = time.monotonic()
-        one.task, one.started, one.deadline = task, now, now + self._limit
-        one.connection.send((task.key, dict(task.payload)))
+        one.task, one.started, one.deadline = task, now, now + self._limit * task.limits
+        one.connection.send((task.key, dict(task.payload), self._limit * task.limits))
 
     def _replace(self, one: _Worker, queue: deque[Task], status: str) -> Done | None:
         """End a worker, put a fresh one in its place while there is work, and say what became of its task."""
@@ -172,7 +173,8 @@ class Pool:
         self._workers = [w for w in self._workers if w is not one]
         code = one.process.exitcode
         if status == "timeout":
-            message = f"did not end within {self._limit:g} s"
+            limit = START_LIMIT_S if one.task is None else self._limit * one.task.limits
+            message = f"did not end within {limit:g} s"
         else:
             how = f"signal {-code}" if code is not None and code < 0 else f"status {code}"
             message = f"its process ended ({how})"

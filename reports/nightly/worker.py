@@ -28,8 +28,8 @@ def resolve(name: str) -> Callable[..., Any]:
     return getattr(importlib.import_module(module), function)
 
 
-def main(connection: Connection, build: str, cache: Path, time_limit_s: float, memory_bytes: int) -> None:
-    """Receive ``(key, payload)``, build, store, answer; ends when the pipe closes or the parent is gone."""
+def main(connection: Connection, build: str, cache: Path, memory_bytes: int) -> None:
+    """Receive ``(key, payload, limit)``, build, store, answer; ends when the pipe closes or the parent is gone."""
     _end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     limit_memory(memory_bytes)
@@ -43,7 +43,7 @@ def main(connection: Connection, build: str, cache: Path, time_limit_s: float, m
             return
         if task is None:
             return
-        key, payload = task
+        key, payload, time_limit_s = task
         _alarm(time_limit_s + GRACE_S)
         connection.send(execute(function, store, key, payload))
         _alarm(0)
