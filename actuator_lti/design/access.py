@@ -12,10 +12,10 @@ from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.model import Design, Parameter
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.design.reading import shown
 from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 
 def paths_of(design: Design) -> tuple[str, ...]:

@@ -81,12 +81,11 @@ def report(
 
 def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
     """Put the linear predictions to the simulator, and give the sections about it."""
-    from analyses.validation import validate
+    from reports.build import validation_sections
     from reports.cli.progress import progress
-    from reports.sections.validation import section
 
     with progress(f"validating {drive.name}", quiet=quiet) as validating:
-        return section(validate(drive, progress=validating), timing=False)
+        return validation_sections(drive, validating, timing=False)
 
 
 def _unstable(made: dict[str, object]) -> bool:
