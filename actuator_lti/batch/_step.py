@@ -31,6 +31,7 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
     tail = alone < 0.7 * ticks
     if tail:
         ticks = int(alone)
+    fed_back = 0.0 if np.isnan(lead) else 1.0
     state = np.zeros(n)
     after = np.zeros(n)
     ten = -1
@@ -42,7 +43,7 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
         total = 0.0
         for j in range(n):
             total += c[j] * state[j]
-        error = 1.0 if np.isnan(lead) else 1.0 - total
+        error = 1.0 - fed_back * total
         if k == 1 and lead > 0.0:
             error += lead  # the command has jumped since the sample before
         for i in range(n):

@@ -20,7 +20,7 @@ from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 
-_CHUNK = 512
+_CHUNK = 1024
 _MOST_ORDER = 80
 
 
