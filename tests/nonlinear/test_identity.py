@@ -55,7 +55,8 @@ def ride(
     lifted = system.lifted()
     n = system.ticks
     torque = -design.friction.dry_Nm(load_Nm) if friction_on else 0.0
-    inputs = np.vstack([run.reference_rad[::n], np.full(TICKS // n, torque)])
+    held = np.ones(TICKS // n)
+    inputs = np.vstack([run.reference_rad[::n], torque * held, 0.0 * held])  # no load moment beside it
     times = np.arange(TICKS // n) * (n * design.controller.period_s)
     response = control.forced_response(lifted, times, inputs, x0)
     outputs = response.outputs.reshape(n, len(system.outputs), -1)
@@ -72,6 +73,7 @@ def assert_identical(run: Trajectory, linear: dict[str, np.ndarray]) -> None:
         "u": run.voltage_V,
         "i_ref": run.current_command_A,
         "w_ref": run.speed_command_rad_s,
+        "output_angle": run.output_angle_rad,
     }
     assert (run.motor_speed_rad_s > 0).all()
     assert not any(use.active for use in run.limits.values())
