@@ -49,8 +49,9 @@ def ride(
     )  # fmt: skip
     system = assemble_loops(design, load_Nm=load_Nm).tick_system
     T_v = design.controller.velocity.every * design.controller.period_s
-    known = {"w": SPEED, "th": start, "filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
-    known |= {name: int(name[1:]) * T_v * SPEED for name in system.states if name.startswith("D")}
+    known = {"w": SPEED, "th": start, "speed.filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
+    past = [name for name in system.states if name.startswith("estimate.D")]
+    known |= {name: int(name.removeprefix("estimate.D")) * T_v * SPEED for name in past}
     x0 = system.initial_state({name: value for name, value in known.items() if name in system.states})
     lifted = system.lifted()
     n = system.ticks
