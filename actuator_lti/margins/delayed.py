@@ -16,7 +16,7 @@ from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.rational import delay_margins, verdict_of
+from actuator_lti.margins.assemble import delay_margins, verdict_of
 from actuator_lti.margins.results import (
     Agreement,
     DiskMargin,
