@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +49,7 @@ class _Candidates:
     samples: Real  # one more than x
 
 
-def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real, floor_x: float) -> Crossings:
+def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real) -> Crossings:
     """Find every crossing of the unit circle and of the real axis with 0 < x < end.
 
     Parameters
@@ -59,8 +58,6 @@ def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real, floor_
         At least one state, no pole on the border but at zero frequency.
     typical_x : array
         Further frequencies at which to look at the signs.
-    floor_x : float
-        Below this, where a multiple pole at zero frequency is scattered, L only follows that pole.
 
     Raises
     ------
@@ -70,8 +67,8 @@ def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real, floor_
     gain_zeros, real_zeros = circles.circle(1.0, 0.0, -1.0), circles.real_axis()
     if gain_zeros is None or real_zeros is None:
         raise Doubtful("the gain is one, or the phase zero, at every frequency")
-    gain = _candidates(gain_zeros, loop.in_z, floor_x)
-    real = _candidates(real_zeros, loop.in_z, floor_x)
+    gain = _candidates(gain_zeros, loop.in_z)
+    real = _candidates(real_zeros, loop.in_z)
     x = np.concatenate((gain.samples, real.samples, typical_x))
     x.sort()
     L = loop.response(x)
@@ -94,7 +91,7 @@ def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
         zeros = circles.circle(1.0, 0.0, -1.0)
         if zeros is None:
             return np.empty(0)
-        found = _candidates(zeros, loop.in_z, 0.0)
+        found = _candidates(zeros, loop.in_z)
         if not found.x.size:
             return np.empty(0)
         x = found.samples
@@ -127,10 +124,8 @@ def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
     return np.where((at > low) & (at < high), at, np.sqrt(low * high))
 
 
-def _candidates(zeros: Complex, in_z: bool, floor_x: float) -> _Candidates:
+def _candidates(zeros: Complex, in_z: bool) -> _Candidates:
     near = on_axis(zeros)
-    if floor_x:
-        near = near[near.imag > (math.tan(0.5 * floor_x) if in_z else floor_x)]
     w, off_axis = near.imag, np.abs(near.real) / near.imag
     if (
         w.size > 1 and (w[1:] - w[:-1] <= _SAME * w[1:]).any()

@@ -10,6 +10,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.certified_roots import all_roots
 from actuator_lti.margins.exact_findings import Crossing, Findings
+from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, Real
 
 _FAR = 1e3  # a real-axis crossing with a gain beyond this (60 dB), or below its inverse, is of no consequence
@@ -65,9 +66,7 @@ def settled(base: Findings, others: list[Findings]) -> Settled:
     moved = 0.0
     for other in others:
         problem = problem or _difference(base.gains, other.gains, "|L| = 1")
-        core = tuple(c for c in other.reals if not _far(c))
-        problem = problem or _difference(tuple(c for c in reals if not _far(c)), other.reals, "the real axis")
-        problem = problem or _difference(core, base.reals, "the real axis")
+        problem = problem or _difference(reals, other.reals, "the real axis")
         moved = max([moved, *[_movement(c, other.gains) for c in base.gains]])
         moved = max([moved, *[_movement(c, other.reals) for c in reals]])
     return Settled(unstable, border, hidden, base.gains, reals, dropped, moved, problem)
@@ -83,23 +82,30 @@ def _partner(c: Crossing, others: tuple[Crossing, ...]) -> Crossing | None:
         same_w = c.w == other.w or (
             0.0 < c.w * other.w < math.inf and abs(math.log(c.w / other.w)) < _SAME_W
         )
-        if same_w and c.touch == other.touch and abs(math.log(abs(c.L) / abs(other.L))) < _SAME_GAIN:
+        if same_w and c.touch == other.touch and _same_size(abs(c.L), abs(other.L)):
             return other
     return None
 
 
+def _same_size(a: float, b: float) -> bool:
+    return a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+
+
 def _difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: str) -> str | None:
-    for c in ours:
-        if _partner(c, theirs) is None:
-            return f"8 ulp of the entries decide whether and where L meets {line} (w = {c.w:.6g} in the s-plane)"
-    if line == "|L| = 1" and len(ours) != len(theirs):
-        return f"8 ulp of the entries decide how often L meets {line}"
+    """Why two lists do not tell of the same crossings, those far from -1 left out."""
+    core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
+    if [c.touch for c in core] == [c.touch for c in their_core]:
+        return None
+    for some, others in ((core, theirs), (their_core, ours)):
+        for c in some:
+            if _partner(c, others) is None:
+                return f"{ULP} ulp of the entries decide whether L meets {line} at w = {c.w:.6g} of the s-plane"
     return None
 
 
 def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
     other = min(others, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
-    if other is None or not 0.0 < c.w < math.inf:
+    if other is None or not 0.0 < c.w < math.inf or not c.L:
         return 0.0
     return max(abs(other.w / c.w - 1.0), abs(other.L / c.L - 1.0))
 
@@ -142,12 +148,12 @@ def _by_movement(base: Findings, others: list[Findings], closed: Complex) -> tup
         elif radius[k] <= _SHARP * beyond.min(initial=math.inf):
             at_dc += 1
         else:
-            return unstable, 0, 0, "8 ulp of the entries move a closed-loop pole over the border of stability"
+            return unstable, 0, 0, f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
     shown = _values(base, closed=False)
     spread = _movements(shown, [_values(f, closed=False) for f in others])
     hidden = min(at_dc, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread + 0.0 * shown.real)))
     if hidden > 1:
-        raise InputError("poles at zero frequency are cancelled by zeros: cancel them in the loop first")
+        return unstable, 0, 0, f"{ULP} ulp of the entries decide about several modes at zero frequency"
     return unstable, border + at_dc - hidden, hidden, None
 
 

@@ -37,6 +37,9 @@ class RationalLoop:
         Whether the matrices are those of the z-plane.
     numerator, denominator : array or None
         Coefficients, where the loop was given by them: they are then evaluated directly.
+    in_z_size : array or None
+        Of a loop brought from z: the sizes of the coefficients that it was given by, numerator and denominator,
+        shape (2, n + 1), highest power first, in the same unit. Their rounding is the accuracy of the data.
     """
 
     A: Real
@@ -47,6 +50,7 @@ class RationalLoop:
     in_z: bool = False
     numerator: Real | None = None
     denominator: Real | None = None
+    in_z_size: Real | None = None
 
     @property
     def order(self) -> int:
@@ -214,7 +218,9 @@ def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool =
         warped_den = warped_coefficients(den, n)
         if abs(warped_den[0]) > _AT_MINUS_ONE * np.abs(den).sum():
             loop = from_coefficients(warped_coefficients(num, n), warped_den, None)
-            return replace(loop, period_s=period_s)
+            size = np.zeros((2, n + 1))
+            size[0, n + 1 - num.size :], size[1] = np.abs(num / warped_den[0]), np.abs(den / warped_den[0])
+            return replace(loop, period_s=period_s, in_z_size=size)
     above = np.zeros(n + 1)
     above[n + 1 - num.size :] = num / den[0]
     below = den / den[0]

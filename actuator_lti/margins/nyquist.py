@@ -66,7 +66,7 @@ def nyquist_count(
     F = F[x.argsort()]
     angle, first = 0.0, 1.0 + L_dc.real
     if poles.at_dc:
-        angle, first = _start(loop, float(x.min()), poles.at_dc, poles.cloud)
+        angle, first = _start(loop, float(x.min()), poles.at_dc)
     F = np.concatenate(([first], F, [1.0 + L_end.real]))
     angle += float(np.angle(F[1:] * F[:-1].conj()).sum())
     return poles.unstable - round(angle / np.pi)
@@ -83,9 +83,9 @@ def angle_about(start: complex, stop: complex, about: float) -> float:
     return turn + 2.0 * np.pi * round((about - turn) / (2.0 * np.pi))
 
 
-def _start(loop: RationalLoop, first_x: float, order: int, cloud: float) -> tuple[float, complex]:
+def _start(loop: RationalLoop, first_x: float, order: int) -> tuple[float, complex]:
     """The turn about a pole at zero frequency, and 1 + L where it ends."""
-    r = max(1e-2 * first_x, min(10.0 * cloud, 0.5 * first_x))
+    r = 1e-2 * first_x
     while r > _SMALLEST * first_x:
         real_point = np.array([np.exp(r) if loop.in_z else r + 0j], dtype=complex)
         on_real, on_axis = complex(loop.at(real_point)[0]), complex(loop.response(np.array([r]))[0])

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, delay_margins
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import Crossings, find_crossings
@@ -15,7 +14,7 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.nyquist import nyquist_count
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
-from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound
+from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
 
 __all__ = ["checked_margins", "delay_margins", "rational_extreme"]
 
@@ -24,8 +23,6 @@ _REASON = (
     "of the border"
 )
 _WIDEST = 1e6  # ratio of the poles up to which one eigenvalue problem holds all crossings
-_FLOOR = 30.0  # times the scatter of a multiple pole at zero frequency: below, no crossing is looked for
-_MOST_AT_DC = 2
 _NEAR_ONE = 1e-6
 _BELOW = np.array([0.01, 0.05, 0.2, 0.5])
 _ABOVE = np.array([2.0, 5.0, 20.0, 100.0])
@@ -42,18 +39,20 @@ def checked_margins(loop: RationalLoop) -> StabilityMargins:
     try:
         with np.errstate(all="ignore"):
             return _margins(loop)
-    except (np.linalg.LinAlgError, NumericalError, FloatingPointError) as error:
+    except Doubtful:
+        raise
+    except (ArithmeticError, ValueError, RuntimeError) as error:  # LinAlgError, overflow, a search without end
         raise Doubtful(str(error)) from error
 
 
 def _margins(loop: RationalLoop) -> StabilityMargins:
     if not loop.order or not loop.b.any() or not loop.c.any() or abs(1.0 + loop.d) <= _NEAR_ONE:
         raise Doubtful("no dynamics, or hardly well posed")
-    poles = sorted_poles(loop.A, loop.in_z, gather=loop.numerator is None)
+    poles = sorted_poles(loop.A, loop.in_z)
     closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
-    _trust(poles, closed, loop.in_z)
+    _trust(loop, poles, closed)
     circles = Circles(loop, poles.values)
-    found = find_crossings(loop, circles, _typical(loop, poles), _FLOOR * poles.cloud)
+    found = find_crossings(loop, circles, _typical(loop, poles))
     dc, end = _ends(loop, poles)
     _trust_crossings(loop, found, dc, end)
     count = nyquist_count(loop, found, poles, dc, end)
@@ -79,21 +78,18 @@ def _margins(loop: RationalLoop) -> StabilityMargins:
     )
 
 
-def _trust(poles: SortedPoles, closed: SortedPoles, in_z: bool) -> None:
-    """Poles that are clear of the border, but for one or two at zero frequency, and not too far apart."""
+def _trust(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles) -> None:
+    """Poles that are clear of the border, but for exact ones at zero frequency, and not too far apart."""
     if closed.border_count or closed.doubtful or poles.doubtful:
         raise Doubtful("a pole may lie on either side of the border")
-    if poles.border_count != poles.at_dc or poles.at_dc > _MOST_AT_DC:
+    if poles.border_count != poles.at_dc:
         raise Doubtful("poles on the border")
-    size = _sizes(poles, in_z)
-    if size.size and float(size.max()) > _WIDEST * max(float(size.min()), 1e3 * _FLOOR * poles.cloud):
+    if hardly_placed(loop, poles.values, False) or hardly_placed(loop, closed.values, True):
+        raise Doubtful("rounding of the coefficients moves a pole over the border")
+    size = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
+    size = size[size > 0.0]
+    if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful("poles over too many decades")
-
-
-def _sizes(poles: SortedPoles, in_z: bool) -> Real:
-    """How far each pole is from zero frequency, those there left out."""
-    size = np.abs(poles.values - 1.0) if in_z else np.abs(poles.values)
-    return size[size > 0.0]
 
 
 def _trust_crossings(loop: RationalLoop, found: Crossings, dc: complex, end: complex) -> None:
@@ -103,11 +99,10 @@ def _trust_crossings(loop: RationalLoop, found: Crossings, dc: complex, end: com
         raise Doubtful("the gain is one at an end of the axis")
     if found.gain_x.size % 2 != (sides[0] > 0.0) ^ (sides[1] > 0.0):
         raise Doubtful("the number of gain crossovers does not fit the gain at both ends")
-    at = np.concatenate((found.gain_x, found.real_x))
-    ends = [0.0] if abs(dc) < FAR else []
-    if loop.in_z:
-        ends.append(math.pi)
-    at = np.concatenate((at, ends))
+    ends = [x for x, L in ((0.0, dc), (loop.end, end)) if 0.0 < abs(L) < FAR]
+    if loop.numerator is None and not loop.in_z:
+        ends = [x for x in ends if x < math.inf]  # the direct feed-through is an entry: exact
+    at = np.concatenate((found.gain_x, found.real_x, ends))
     if not (error_bound(loop, at) <= MOST_ERROR).all():
         raise Doubtful("the loop is too badly conditioned")
 
@@ -155,7 +150,6 @@ def _typical(loop: RationalLoop, poles: SortedPoles) -> Real:
     x = np.concatenate((size * 1.03, low * _BELOW, high * _ABOVE))
     if not loop.in_z:
         x = np.concatenate((x, _asymptotic(loop, 100.0 * high)))
-    x = x[x > _FLOOR * poles.cloud]
     return x[x < math.pi] if loop.in_z else x
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 EPS = float(np.finfo(float).eps)
@@ -56,16 +57,43 @@ def _solved(matrix: Complex, right: Real) -> Complex:
 
 
 def error_bound(loop: RationalLoop, x: Real) -> Real:
-    """Relative bound of the error of L at x in double precision."""
+    """Relative error of L at x that one rounding of each entry makes."""
     if not x.size:
         return np.empty(0)
     points = loop.point(x)
     if loop.numerator is None or loop.denominator is None:
         return 1.0 / told_from_zero(loop.A, loop.b, loop.c, loop.d, points)
-    size = np.abs(points)
+    ends = np.isinf(x)
+    points[ends] = 1.0
+    sizes = rounded_size(loop, points)
+    values = [np.where(ends, p[0], np.polyval(p, points)) for p in (loop.numerator, loop.denominator)]
+    if loop.in_z_size is not None:
+        sizes[:, ends] = loop.in_z_size.sum(axis=1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         parts = [
-            np.polyval(np.abs(p), size) / np.abs(np.polyval(p, points))
-            for p in (loop.numerator, loop.denominator)
+            np.where(size > 0.0, size / np.abs(value), 0.0) for size, value in zip(sizes, values, strict=True)
         ]
     return EPS * (parts[0] + parts[1])
+
+
+def rounded_size(loop: RationalLoop, points: Complex) -> Real:
+    """What numerator and denominator would be without any cancellation, shape (2, ...)."""
+    assert loop.numerator is not None
+    assert loop.denominator is not None
+    if loop.in_z_size is None:
+        return np.array([np.polyval(np.abs(p), np.abs(points)) for p in (loop.numerator, loop.denominator)])
+    up, down = np.abs(1.0 + points), np.abs(1.0 - points)
+    n = loop.order
+    k = np.arange(n, -1, -1)[:, None]
+    return np.asarray(loop.in_z_size @ (up**k * down ** (n - k)))
+
+
+def hardly_placed(loop: RationalLoop, poles: Complex, closed: bool) -> bool:
+    """Whether rounding of the given coefficients in z may carry a pole over the border of stability."""
+    if loop.in_z_size is None or loop.numerator is None or loop.denominator is None or not poles.size:
+        return False
+    p = loop.denominator + loop.numerator if closed else loop.denominator
+    size = rounded_size(loop, poles)
+    slope = np.polyval(p[:-1] * np.arange(p.size - 1, 0, -1), poles)
+    radius = ULP * EPS * (size.sum(axis=0) if closed else size[1]) / np.abs(slope)
+    return not bool((np.abs(poles.real) > radius)[poles != 0.0].all())
