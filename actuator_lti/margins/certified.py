@@ -6,7 +6,7 @@ import math
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled
-from actuator_lti.margins.determined import Settled, settled
+from actuator_lti.margins.determined import FAR_DB, Settled, settled
 from actuator_lti.margins.exact_extremes import disk_alpha, modulus_margin
 from actuator_lti.margins.exact_findings import Crossing, Findings, findings
 from actuator_lti.margins.exact_loop import ExactLoop, exact_loop
@@ -103,7 +103,7 @@ def _notes(base: Findings, result: Settled) -> tuple[str, ...]:
         notes.append(f"{base.hidden.right} unstable mode(s) that the loop neither drives nor sees")
     if result.dropped:
         notes.append(
-            f"{result.dropped} crossing(s) of the real axis more than 60 dB from -1 lie below the rounding "
-            "of the data and are left out"
+            f"{result.dropped} crossing(s) of the real axis more than {FAR_DB:g} dB from -1 are left out: "
+            f"{ULP} ulp of the entries decide about them"
         )
     return tuple(notes)

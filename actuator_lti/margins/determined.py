@@ -13,7 +13,8 @@ from actuator_lti.margins.exact_findings import Crossing, Findings
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, Real
 
-_FAR = 1e3  # a real-axis crossing with a gain beyond this (60 dB), or below its inverse, is of no consequence
+FAR_DB = 30.0
+_FAR = 10.0 ** (FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
 _SAME_W = 0.05
 _SAME_GAIN = 0.5
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
@@ -79,9 +80,7 @@ def _far(c: Crossing) -> bool:
 def _partner(c: Crossing, others: tuple[Crossing, ...]) -> Crossing | None:
     """The crossing that is the same one in another list."""
     for other in others:
-        same_w = c.w == other.w or (
-            0.0 < c.w * other.w < math.inf and abs(math.log(c.w / other.w)) < _SAME_W
-        )
+        same_w = c.w == other.w or (0.0 < c.w * other.w < math.inf and abs(math.log(c.w / other.w)) < _SAME_W)
         if same_w and c.touch == other.touch and _same_size(abs(c.L), abs(other.L)):
             return other
     return None
@@ -99,7 +98,9 @@ def _difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: 
     for some, others in ((core, theirs), (their_core, ours)):
         for c in some:
             if _partner(c, others) is None:
-                return f"{ULP} ulp of the entries decide whether L meets {line} at w = {c.w:.6g} of the s-plane"
+                return (
+                    f"{ULP} ulp of the entries decide whether L meets {line} at w = {c.w:.6g} of the s-plane"
+                )
     return None
 
 
@@ -148,7 +149,12 @@ def _by_movement(base: Findings, others: list[Findings], closed: Complex) -> tup
         elif radius[k] <= _SHARP * beyond.min(initial=math.inf):
             at_dc += 1
         else:
-            return unstable, 0, 0, f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+            return (
+                unstable,
+                0,
+                0,
+                f"{ULP} ulp of the entries move a closed-loop pole over the border of stability",
+            )
     shown = _values(base, closed=False)
     spread = _movements(shown, [_values(f, closed=False) for f in others])
     hidden = min(at_dc, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread + 0.0 * shown.real)))

@@ -76,8 +76,8 @@ def findings(loop: ExactLoop, merge: bool = False) -> Findings:
     Parameters
     ----------
     merge : bool
-        Where L stays within `TOUCH` of the line between two crossings, or between one and an end of the axis,
-        take that for a touch (none at an end).
+        Take a gain within `TOUCH` of one at an end of the axis for one, which is no crossing; between two
+        crossings L that stays so close to the line only touches it in any case.
 
     Raises
     ------
@@ -99,8 +99,8 @@ def findings(loop: ExactLoop, merge: bool = False) -> Findings:
         return v.sqrt() * phase(v) / (N.at(v) * D.at(v)).abs_lower()
 
     ends = _touched_ends(loop, gain) if merge else (False, False)
-    gains = _crossings(N, D, gain, off_circle if merge else None, ends)
-    reals = [c for c in _crossings(N, D, phase, off_axis if merge else None) if c.L.real < 0.0]
+    gains = _crossings(N, D, gain, off_circle, ends)
+    reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
     first, last = _end(0.0, loop.N[0], loop.D[0]), _end(math.inf, *loop.at_end)
     reals = [*([first] if first else []), *reals, *([last] if last and loop.degree else [])]
     return Findings(loop, tuple(gains), tuple(reals))
@@ -138,17 +138,16 @@ def _crossings(
     N: Split,
     D: Split,
     p: fmpz_poly,
-    off: Callable[[arb], arb] | None,
+    off: Callable[[arb], arb],
     touched_ends: tuple[bool, bool] = (False, False),
 ) -> list[Crossing]:
-    """The positive roots of p; with ``off``, the distance to the line, touches are merged."""
+    """The positive roots of p, touches merged; ``off`` is the distance to the line."""
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
             roots = all_roots(p)
             places = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
-            if off is not None:
-                places = _merged(places, roots, off, touched_ends)
+            places = _merged(places, roots, off, touched_ends)
             values = [N.at(v) / D.at(v) for v, _ in places]
             if all(L.rel_accuracy_bits() >= _ACCURATE for L in values):
                 return [

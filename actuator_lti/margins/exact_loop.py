@@ -66,7 +66,9 @@ def exact_loop(given: Given) -> ExactLoop:
     N, D = N // hidden, D // hidden
     both = N.content().gcd(D.content()) if N.degree() >= 0 else D.content()
     hidden_degree = hidden.degree() + at_end
-    return ExactLoop(N // both, D // both, hidden, n - hidden_degree, hidden_degree, given.period_s is not None)
+    return ExactLoop(
+        N // both, D // both, hidden, n - hidden_degree, hidden_degree, given.period_s is not None
+    )
 
 
 def _integers(*arrays: Any) -> tuple[list[list[int]], int]:
@@ -110,4 +112,3 @@ def _warped(p: fmpz_poly, degree: int) -> fmpz_poly:
 
 def _primitive(p: fmpz_poly) -> fmpz_poly:
     return p // p.content() if p.content() else p
-

@@ -41,7 +41,11 @@ def checked_margins(loop: RationalLoop) -> StabilityMargins:
             return _margins(loop)
     except Doubtful:
         raise
-    except (ArithmeticError, ValueError, RuntimeError) as error:  # LinAlgError, overflow, a search without end
+    except (
+        ArithmeticError,
+        ValueError,
+        RuntimeError,
+    ) as error:  # LinAlgError, overflow, a search without end
         raise Doubtful(str(error)) from error
 
 

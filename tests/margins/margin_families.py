@@ -109,7 +109,10 @@ def orders_1_to_25(rng: np.random.Generator) -> Loop:
 def hardly_damped(rng: np.random.Generator) -> Loop:
     n = int(rng.integers(2, 9))
     return scaled(
-        rng, roots_of(rng, int(rng.integers(0, n)), 2.0, -6.0), roots_of(rng, n, 2.0, -6.0), rng.random() < 0.3
+        rng,
+        roots_of(rng, int(rng.integers(0, n)), 2.0, -6.0),
+        roots_of(rng, n, 2.0, -6.0),
+        rng.random() < 0.3,
     )
 
 
@@ -155,7 +158,9 @@ def sampled_slowly_moving(rng: np.random.Generator) -> Loop:
         p = np.exp(w * complex(-zeta, math.sqrt(1.0 - min(zeta, 0.999) ** 2)))
         A[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[p.real, p.imag], [-p.imag, p.real]]
     B, C = rng.standard_normal((2 * n, 1)), rng.standard_normal((1, 2 * n))
-    return control.StateSpace(A, B * uniform(rng, -6.0, 0.0), C, [[0.0]], PERIOD_S, remove_useless_states=False)
+    return control.StateSpace(
+        A, B * uniform(rng, -6.0, 0.0), C, [[0.0]], PERIOD_S, remove_useless_states=False
+    )
 
 
 def deadbeat_and_zeros_at_minus_one(rng: np.random.Generator) -> Loop:
