@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 from flint import acb, arb, arb_poly, ctx, fmpz, fmpz_poly
 
@@ -57,13 +59,14 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
         p = p.right_shift(1)
     if p.degree() < 1:
         return []
-    return [(acb(root), times) for root, times in (p // p.content()).complex_roots()]
+    found: Any = (p // p.content()).complex_roots()
+    return [(acb(root), times) for root, times in found]
 
 
 def sign_changes(p: fmpz_poly) -> int:
     """Descartes' bound of the number of positive roots."""
     signs = [c > 0 for c in p.coeffs() if c != 0]
-    return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
+    return sum(a != b for a, b in pairwise(signs))
 
 
 def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.assemble import delay_margins, verdict_of
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, values
@@ -16,7 +17,6 @@ from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.assemble import delay_margins, verdict_of
 from actuator_lti.margins.results import (
     Agreement,
     DiskMargin,

@@ -31,9 +31,10 @@ def stability_margins(
     Rational loops need no grid: crossovers are eigenvalues (Boyd, Balakrishnan, Kabamba 1989), each held by a
     change of sign and polished by Newton. With delays, inside or in series, intervals are split until a bound
     on the change of L shows that nothing hides between two points. Stability is found twice: from closed-loop
-    poles (with delays, by collocation) and from the Nyquist curve alone. What this cannot check, the loop is
-    asked in exact arithmetic; ``.evidence`` says how the answer is known, see `StabilityMargins`. Quoted are, see `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to
-    0 deg with its sign, the smallest delay margin (0 for an unstable loop), the smallest distance to -1.
+    poles (with delays, by collocation) and from the Nyquist curve alone. What double precision cannot check
+    in this way is worked out in exact arithmetic; ``.evidence`` says how the answer is known. Quoted are, see
+    `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
+    smallest delay margin (0 for an unstable loop), the smallest distance to -1.
 
     Parameters
     ----------

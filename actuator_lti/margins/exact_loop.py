@@ -1,4 +1,4 @@
-"""A loop as two polynomials with exact coefficients: the doubles it was given by, as the rationals they are."""
+"""A loop as two polynomials with exact coefficients: its doubles, as the rationals they are."""
 
 from __future__ import annotations
 
@@ -106,8 +106,9 @@ def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:
 
 def _warped(p: fmpz_poly, degree: int) -> fmpz_poly:
     """(1 - s)^degree p((1 + s)/(1 - s)), by way of z = -1 + 2/(1 - s)."""
-    about = p(fmpz_poly([-1, 2])).coeffs()
-    return fmpz_poly(([*about, *[0] * (degree + 1 - len(about))])[::-1])(fmpz_poly([1, -1]))
+    about: list[Any] = list(p(fmpz_poly([-1, 2])).coeffs())
+    about += [0] * (degree + 1 - len(about))
+    return fmpz_poly(about[::-1])(fmpz_poly([1, -1]))
 
 
 def _primitive(p: fmpz_poly) -> fmpz_poly:

@@ -38,8 +38,9 @@ class RationalLoop:
     numerator, denominator : array or None
         Coefficients, where the loop was given by them: they are then evaluated directly.
     in_z_size : array or None
-        Of a loop brought from z: the sizes of the coefficients that it was given by, numerator and denominator,
-        shape (2, n + 1), highest power first, in the same unit. Their rounding is the accuracy of the data.
+        Of a loop brought from z: the sizes of the coefficients that it was given by, numerator and
+        denominator, shape (2, n + 1), highest power first, in the same unit. Their rounding is the accuracy
+        of the data.
     """
 
     A: Real

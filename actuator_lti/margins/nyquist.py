@@ -64,7 +64,7 @@ def nyquist_count(
     x = np.concatenate((found.between_x, found.real_x))
     F = 1.0 + np.concatenate((found.between_L, found.real_L.real))
     F = F[x.argsort()]
-    angle, first = 0.0, 1.0 + L_dc.real
+    angle, first = 0.0, complex(1.0 + L_dc.real)
     if poles.at_dc:
         angle, first = _start(loop, float(x.min()), poles.at_dc)
     F = np.concatenate(([first], F, [1.0 + L_end.real]))

@@ -147,7 +147,7 @@ def _phase_margins(loop: RationalLoop, found: Crossings) -> tuple[PhaseMargin, .
 
 
 def _typical(loop: RationalLoop, poles: SortedPoles) -> Real:
-    """Frequencies at which to look at the signs besides: about every pole, beyond, and about the asymptote."""
+    """Frequencies at which to look at the signs besides: about each pole, beyond, about the asymptote."""
     size = np.abs(np.angle(poles.values)) if loop.in_z else np.abs(poles.values)
     size = size[(size > 0.0) & (size < 3.1)] if loop.in_z else size[size > 0.0]
     low, high = (float(size.min()), float(size.max())) if size.size else (1.0, 1.0)

@@ -47,16 +47,16 @@ class StabilityMargins:
     - ``disk_margin``: balanced (S + T).
 
     For an unstable loop the crossings are still listed: they say how far it is from the border, and their
-    signs (a negative phase margin, a lower gain margin) say in which direction. Where stability is not known
-    (measured data, or a withheld answer), ``stable`` is ``None``; a withheld answer has no figures at all
-    (empty lists, ``None``).
+    signs (a negative phase margin, a lower gain margin) say in which direction. Where stability is not
+    known (measured data, or a withheld answer), ``stable`` is ``None``; a withheld answer has no figures at
+    all (empty lists, ``None``).
 
     How an answer is known (``evidence``):
 
     - ``"certified"``: by exact arithmetic on the given doubles and roots in certified intervals; the same
       for data 8 ulp away.
-    - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is right,
-      no pole lies within its own error of the border, and each figure has a small bound of its error.
+    - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
+      right, no pole lies within its own error of the border, and each figure has a small bound of its error.
     - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it.
 
     Attributes

@@ -1,4 +1,4 @@
-"""Whether figures in double precision can be trusted: told from zero, and with a small bound of their error."""
+"""Whether figures in double precision can be trusted: told from zero, with a small bound of their error."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def _at(num: list[mpf], den: list[mpf], point: mpc) -> mpc:
 
 
 def exact_polynomials(loop: control.LTI) -> tuple[list[mpf], list[mpf]]:
-    """Numerator and denominator of the very doubles (highest power first), by Faddeev and LeVerrier in integers."""
+    """Numerator and denominator of the very doubles (highest power first), by Faddeev and LeVerrier."""
     with mp.workdps(EXACT):
         if hasattr(loop, "num"):
             num, den = (np.trim_zeros(np.asarray(p[0][0]), "f") for p in (loop.num, loop.den))

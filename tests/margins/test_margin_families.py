@@ -1,7 +1,7 @@
 """Harsh families of loops: none wrong where the data determine the answer, hardly any withheld there.
 
-Truth is mpmath at high precision on the exact values of the doubles. What 8 ulp of the entries change, the data
-do not determine: there any answer is allowed, and withholding is.
+Truth is mpmath at high precision on the exact values of the doubles. What 8 ulp of the entries change, the
+data do not determine: there any answer is allowed, and withholding is.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Loops that a margin engine gets wrong (cases J1 to J7), truth by exact arithmetic; and the test for zero."""
+"""Loops that a margin engine gets wrong (J1 to J7), truth by exact arithmetic; and the test for zero."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_J6_a_hidden_mode_at_zero_is_the_only_one_there(certify: bool) -> None:
 
 
 def difference_over(samples: int, form: str) -> control.LTI:
-    """0.2 (1 - z^-samples)/(1 - z^-1)/samples after a lag: zero at multiples of 2 pi/samples, Nyquist if even."""
+    """0.2 (1 - z^-samples)/(1 - z^-1)/samples after a lag: zero at the multiples of 2 pi/samples."""
     num, den = 0.2 * np.ones(samples) / samples, np.polymul([1, -0.3], [1, *[0] * (samples - 1)])
     loop = control.tf(num, den, PERIOD_S)
     if form == "transfer function":
