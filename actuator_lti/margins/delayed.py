@@ -115,9 +115,8 @@ def _assembled(
         method=method,
         agreement=agreement,
         notes=tuple(notes),
+        evidence_reason=_reason(agreement),
     )
-    if not agreement.agree:
-        return replace(result, notes=(*notes, "poles and Nyquist count disagree: no figure is given"))
     phase_margins = _phase_margins(form, gains, (low, high))
     return replace(
         result,
@@ -128,6 +127,12 @@ def _assembled(
         modulus_frequency_rad_s=distances[0][1] * unit,
         disk_margin=DiskMargin(distances[1][0], distances[1][1] * unit),
     )
+
+
+def _reason(agreement: Agreement) -> str:
+    if agreement.unstable_poles is None:
+        return "intervals with a bound that leaves nothing between them; stability by the Nyquist count alone"
+    return "intervals with a bound that leaves nothing between them; poles and Nyquist count agree"
 
 
 def _gain_margins(

@@ -66,8 +66,8 @@ def settled(base: Findings, others: list[Findings]) -> Settled:
         dropped, reals = dropped + len(reals) - len(kept), kept
     moved = 0.0
     for other in others:
-        problem = problem or _difference(base.gains, other.gains, "|L| = 1")
-        problem = problem or _difference(reals, other.reals, "the real axis")
+        problem = problem or difference(base.gains, other.gains, "|L| = 1")
+        problem = problem or difference(reals, other.reals, "the real axis")
         moved = max([moved, *[_movement(c, other.gains) for c in base.gains]])
         moved = max([moved, *[_movement(c, other.reals) for c in reals]])
     return Settled(unstable, border, hidden, base.gains, reals, dropped, moved, problem)
@@ -90,7 +90,7 @@ def _same_size(a: float, b: float) -> bool:
     return a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
 
 
-def _difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: str) -> str | None:
+def difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: str) -> str | None:
     """Why two lists do not tell of the same crossings, those far from -1 left out."""
     core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
     if [c.touch for c in core] == [c.touch for c in their_core]:

@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from actuator_lti.errors import InputError
-from actuator_lti.margins.delay_form import delay_form, from_rational
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.delay_form import DelayForm, delay_form, from_rational
 from actuator_lti.margins.delayed import delayed_margins
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import loop_of
@@ -80,7 +80,7 @@ def stability_margins(
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
-            return delayed_margins(delay_form(system, delay_s), band_rad_s)
+            return _delayed(delay_form(system, delay_s), band_rad_s, certify)
         system = system.to_state_space()
     if not (hasattr(system, "num") or hasattr(system, "A")):
         raise InputError(
@@ -91,7 +91,7 @@ def stability_margins(
         return within(_rational(given, certify), band_rad_s)
     samples = None if given.period_s is None else whole_samples(delay_s / given.period_s)
     if samples is None:
-        return delayed_margins(from_rational(loop_of(given), delay_s), band_rad_s)
+        return _delayed(from_rational(loop_of(given), delay_s), band_rad_s, certify)
     late = _rational(replace(given, samples=samples), certify)
     return replace(within(late, band_rad_s), delay_s=delay_s)
 
@@ -106,6 +106,25 @@ def _rational(given: Given, certify: bool) -> StabilityMargins:
         return checked_margins(loop_of(given, warp=True))
     except Doubtful:
         return certified_margins(given)
+
+
+def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
+    """In double precision, and by certified intervals where the two ways to stability do not both tell."""
+    from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
+
+    found = delayed_margins(form, band)
+    told_twice = found.agreement.agree and None not in (
+        found.agreement.unstable_poles,
+        found.agreement.unstable_nyquist,
+    )
+    if form.sampled or (told_twice and not certify):
+        return found
+    try:
+        return certified_delayed_margins(form, found, band)
+    except (NumericalError, InputError) as error:
+        if not found.agreement.agree:
+            return withheld(found, f"poles and Nyquist count disagree; {error}")
+        return replace(found, evidence_reason=f"{found.evidence_reason}; not certified: {error}")
 
 
 def whole_samples(samples: float) -> int | None:
