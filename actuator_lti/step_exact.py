@@ -216,7 +216,7 @@ def _final(loop: RationalLoop, f: _Fraction, dc: flint.fmpq, seen: list[_Pole], 
         )
     if abs(final) <= _cancelled(loop, f, dc):
         raise NumericalError(
-            f"the final value of the step response, {final:.3g}, is lost in the rounding of the entries: "
+            f"the final value of the step response, {final:.3g}, is zero within the rounding of the entries: "
             "it has no rise, overshoot or settling"
         )
     return final
