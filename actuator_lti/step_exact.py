@@ -15,14 +15,13 @@ import flint
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.exact_fraction import ULPS, Fraction, dc_noise, double, exact_fraction, exact_sum, roots
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step_terms import Term
 
 _EPS = float(np.finfo(float).eps)
 _NEAR_DC = 1e-7  # a pole this near to zero frequency may be one that the response does not show
 _UNSEEN = 1e-9  # what it may move, of the final value, before the rest has settled
-_ULPS = 8.0
-_LOST = 1e3 * _EPS  # cancellation in c A^-1 b of a state space that leaves no figure
 _FIRST_BITS = 128
 _MOST_BITS = 16384
 _SPARE_BITS = 80
@@ -57,15 +56,6 @@ class ExactResponse:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Fraction:
-    """num/den in lowest terms, and the denominator with what was cancelled."""
-
-    num: flint.fmpq_poly
-    den: flint.fmpq_poly
-    whole_den: flint.fmpq_poly
-
-
 def exact_response(system: Any, loop: RationalLoop) -> ExactResponse:
     """Find the exact step response of a stable rational system.
 
@@ -83,7 +73,7 @@ def exact_response(system: Any, loop: RationalLoop) -> ExactResponse:
     NumericalError
         The final value is lost in the rounding of the entries.
     """
-    fraction = _fraction(system, loop)
+    fraction = exact_fraction(system, loop)
     dc = flint.fmpq(1 if loop.in_z else 0)
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
@@ -95,36 +85,12 @@ def exact_response(system: Any, loop: RationalLoop) -> ExactResponse:
     raise NumericalError("the poles of the step response lie too close together to be told apart")
 
 
-def _fraction(system: Any, loop: RationalLoop) -> _Fraction:
-    if hasattr(system, "num"):
-        num, den = _poly(system.num[0][0]), _poly(system.den[0][0])
-    else:
-        n = loop.order
-        A = flint.fmpq_mat(n, n, [_rational(v) for v in loop.A.ravel()])
-        b = flint.fmpq_mat(n, 1, [_rational(v) for v in loop.b])
-        c = flint.fmpq_mat(1, n, [_rational(v) for v in loop.c])
-        den = A.charpoly()
-        num = (
-            (A - b * c).charpoly() - den + _rational(loop.d) * den
-        )  # det(p - A + b c) = den (1 + c (p - A)^-1 b)
-    common = num.gcd(den)
-    return _Fraction(num / common, den / common, den) if num != 0 else _Fraction(num, den, den)
-
-
-def _rational(value: Any) -> flint.fmpq:
-    return flint.fmpq(*float(value).as_integer_ratio())
-
-
-def _poly(highest_first: np.ndarray) -> flint.fmpq_poly:
-    return flint.fmpq_poly([_rational(v) for v in highest_first[::-1]])
-
-
-def _at_precision(loop: RationalLoop, f: _Fraction, dc: flint.fmpq, bits: int) -> ExactResponse | int:
+def _at_precision(loop: RationalLoop, f: Fraction, dc: flint.fmpq, bits: int) -> ExactResponse | int:
     """The response, or the number of bits that it needs."""
     slack = 0.0 if loop.numerator is not None else _NEAR_DC
-    hidden = [p for p, _ in _roots(f.whole_den / f.den)]
+    hidden = [p for p, _ in roots(f.whole_den / f.den)]
     _refuse_unstable([p for p in hidden if not _is(p, dc) and _from_dc(p, loop) > slack], loop.in_z)
-    poles = [(p, _residues(f, p, m)) for p, m in _roots(f.den)]
+    poles = [(p, _residues(f, p, m)) for p, m in roots(f.den)]
     unseen = [] if loop.numerator is not None else _unseen(poles, loop)
     seen = [pole for k, pole in enumerate(poles) if k not in unseen]
     _refuse_unstable([p for p, _ in seen if not _is(p, dc)], loop.in_z)
@@ -143,11 +109,6 @@ def _at_precision(loop: RationalLoop, f: _Fraction, dc: flint.fmpq, bits: int) -
     return ExactResponse(terms, final, first, bits, _notes(loop))
 
 
-def _roots(den: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
-    found: Any = den.numer().complex_roots() if den.degree() > 0 else []
-    return [(p, int(m)) for p, m in found]
-
-
 def _is(p: flint.acb, value: flint.fmpq) -> bool:
     return bool((p - flint.acb(value)).contains(flint.acb(0)))
 
@@ -164,7 +125,7 @@ def _refuse_unstable(roots: list[flint.acb], in_z: bool) -> None:
             raise InputError(_UNSTABLE)
 
 
-def _residues(f: _Fraction, p: flint.acb, m: int) -> list[flint.acb]:
+def _residues(f: Fraction, p: flint.acb, m: int) -> list[flint.acb]:
     """H about the pole p of multiplicity m: coefficients of 1/(x - p), 1/(x - p)^2, ..."""
     if m == 1:
         return [_at(f.num, p) / _at(f.den.derivative(), p)]
@@ -200,10 +161,10 @@ def _unseen(poles: list[_Pole], loop: RationalLoop) -> list[int]:
     return [k for k in near if abs(complex(poles[k][1][0])) <= _UNSEEN * slowest * size]
 
 
-def _final(loop: RationalLoop, f: _Fraction, dc: flint.fmpq, seen: list[_Pole], whole: bool) -> float:
+def _final(loop: RationalLoop, f: Fraction, dc: flint.fmpq, seen: list[_Pole], whole: bool) -> float:
     """H at zero frequency; where poles are left out, by the partial fractions of the others."""
     if whole:
-        final = _double(f.num(dc) / f.den(dc))
+        final = double(f.num(dc) / f.den(dc))
     else:
         n = f.den.degree()
         total = flint.acb(f.num[n] / f.den[n])
@@ -214,36 +175,12 @@ def _final(loop: RationalLoop, f: _Fraction, dc: flint.fmpq, seen: list[_Pole], 
         raise InputError(
             "the final value of the step response is zero: it has no rise, overshoot or settling"
         )
-    if abs(final) <= _cancelled(loop, f, dc):
+    if abs(final) <= dc_noise(loop):
         raise NumericalError(
             f"the final value of the step response, {final:.3g}, is zero within the rounding of the entries: "
             "it has no rise, overshoot or settling"
         )
     return final
-
-
-def _cancelled(loop: RationalLoop, f: _Fraction, dc: flint.fmpq) -> float:
-    """What the rounding of the entries may move the final value by."""
-    x = 1.0 if loop.in_z else 0.0
-    if loop.numerator is not None and loop.denominator is not None:
-        if not loop.in_z:
-            return 0.0  # one coefficient over another
-        return _ULPS * _EPS * float(np.abs(loop.numerator).sum()) / abs(_sum(loop.denominator))
-    M = x * np.eye(loop.order) - loop.A
-    if not loop.order or np.linalg.cond(M) > 1.0 / _LOST:
-        return 0.0
-    X, Y = np.abs(np.linalg.solve(M, loop.b)), np.abs(np.linalg.solve(M.T, loop.c))
-    size = Y @ (x * X + np.abs(loop.A) @ X) + np.abs(loop.c) @ X + Y @ np.abs(loop.b) + abs(loop.d)
-    return _LOST * float(size)
-
-
-def _sum(values: np.ndarray) -> float:
-    """Sum without a rounding but the last."""
-    return _double(sum((_rational(v) for v in values), flint.fmpq(0)))
-
-
-def _double(value: flint.fmpq) -> float:
-    return int(value.p) / int(value.q)
 
 
 def _continuous_term(p: flint.acb, residues: list[flint.acb]) -> Term:
@@ -286,7 +223,7 @@ def _logarithm(p: flint.acb) -> flint.acb:
     return p.log()
 
 
-def _first_samples(f: _Fraction, count: int) -> np.ndarray:
+def _first_samples(f: Fraction, count: int) -> np.ndarray:
     n = f.den.degree()
     num = [f.num[n - k] for k in range(n + 1)]
     den = [f.den[n - k] for k in range(n + 1)]
@@ -297,18 +234,18 @@ def _first_samples(f: _Fraction, count: int) -> np.ndarray:
             forced += num[k]
         past = sum((den[j] * y[k - j] for j in range(1, min(k, n) + 1)), flint.fmpq(0))
         y.append((forced - past) / den[0])
-    return np.array([_double(v) for v in y])
+    return np.array([double(v) for v in y])
 
 
 def _notes(loop: RationalLoop) -> tuple[str, ...]:
     """Say where the last digits of the coefficients decide about the final value."""
     if not loop.in_z or loop.numerator is None or loop.denominator is None:
         return ()
-    sums = [(abs(_sum(p)), float(np.abs(p).sum())) for p in (loop.numerator, loop.denominator)]
-    moved = _ULPS * _EPS * sum(whole / total for total, whole in sums)
+    sums = [(abs(exact_sum(p)), float(np.abs(p).sum())) for p in (loop.numerator, loop.denominator)]
+    moved = ULPS * _EPS * sum(whole / total for total, whole in sums)
     if moved < 0.01:
         return ()
     return (
-        f"{_ULPS:g} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
+        f"{ULPS:g} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
         "the figures are those of the coefficients as given; a state space would hold the system better",
     )

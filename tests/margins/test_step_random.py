@@ -53,12 +53,12 @@ def test_J8() -> None:
 def test_sampled_systems_as_coefficients_and_as_companion_matrices() -> None:
     rng = np.random.default_rng(8)
     compared = undetermined = 0
-    for _ in range(100):
+    for _ in range(70):
         poles = stable_poles(rng, 8, True)
         den = np.real(np.poly(poles))
         num = np.real(np.poly(zeros(rng, len(poles) - 1, True))) * 10.0 ** rng.uniform(-3, 3)
         num = np.atleast_1d(num)
-        count = min(int(60 / -math.log(max(*np.abs(poles), 0.1))) + 60, 12_000)
+        count = min(int(60 / -math.log(max(*np.abs(poles), 0.1))) + 60, 6_000)
         y, final = recursion(num, den, count)
         truth = sampled_figures(y)
         if abs(truth.last - 1.0) > 1e-3:
@@ -76,7 +76,7 @@ def test_sampled_systems_as_coefficients_and_as_companion_matrices() -> None:
             assert f.settling_time_s == truth.settling
             assert f.overshoot_percent == pytest.approx(truth.overshoot_percent, rel=1e-8, abs=1e-6)
             assert f.final_value == pytest.approx(final, rel=1e-9)
-    assert compared >= 130
+    assert compared >= 90
     assert undetermined <= 0.05 * compared
 
 
