@@ -24,7 +24,7 @@ from actuator_lti.errors import InputError, NumericalError
 
 DESIGNS = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
 FORMS = ("sampled", "continuous", "ideal")
-RANDOM = 120
+RANDOM = 60
 POPULATION = 24
 
 
