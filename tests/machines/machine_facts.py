@@ -104,7 +104,10 @@ class Facts:
             self.discrete[f"many {name} {loop}"] = [
                 found.stable(loop).tolist(), gain.found.tolist(), phase.found.tolist()
             ]  # fmt: skip
-            table = [found.quantity(q, loop) for q in ("gain_margin", "phase_margin", "modulus_margin", "bandwidth")]
+            table = [
+                found.quantity(q, loop)
+                for q in ("gain_margin", "phase_margin", "modulus_margin", "bandwidth")
+            ]
             self.figures[f"many {name} {loop}"] = np.nan_to_num(np.concatenate(table), posinf=1e300).tolist()
 
 

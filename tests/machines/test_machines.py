@@ -24,7 +24,11 @@ def facts(kind: str | None) -> dict[str, Any]:
     environment = {name: value for name, value in os.environ.items() if name not in _ASKED}
     environment |= kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
-        [sys.executable, "-W", "error", str(SCRIPT)], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-W", "error", str(SCRIPT)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert not done.stderr
