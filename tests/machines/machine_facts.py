@@ -120,8 +120,8 @@ class Facts:
         rng = np.random.default_rng(3)
         path = "control.position.gain"
         factors = rng.uniform(0.2, 5.0, POPULATION)
-        values = {path: parameter_value(design, path) * factors, "motor.resistance":
-                  parameter_value(design, "motor.resistance") * rng.uniform(0.7, 1.3, POPULATION)}  # fmt: skip
+        resistance = parameter_value(design, "motor.resistance") * rng.uniform(0.7, 1.3, POPULATION)
+        values = {path: parameter_value(design, path) * factors, "motor.resistance": resistance}
         found = linear_figures(Population(design, values, POPULATION))
         for loop in found.loops:
             gain, phase = found.gain_crossovers(loop), found.phase_crossovers(loop)
