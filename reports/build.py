@@ -45,6 +45,7 @@ def design_report(
     from analyses.loop_survey import survey_loops
     from analyses.requirements import evaluate_requirements
     from reports.provenance import provenance
+    from reports.sections import answer
 
     survey = survey_loops(design, progress)
     verdicts = evaluate_requirements(design, survey.figures)
@@ -56,8 +57,10 @@ def design_report(
         *first,
         *loops,
         *(part for part in validation if part not in first),
-        *closing_sections(design, head, origin, warnings_of(design)),
+        *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
+    items = [item for block in doc.walk(requirements) for item in block.get("items", ())]
+    sections.insert(0, answer.section(survey.figures, items, sections))
     return doc.document(
         title=design.title or design.name,
         subtitle=design.description,
@@ -97,12 +100,18 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
 
 
 def closing_sections(
-    design: Design, head: Mapping[str, Any], origin: Mapping[str, Any], warnings: Sequence[str]
+    design: Design,
+    head: Mapping[str, Any],
+    origin: Mapping[str, Any],
+    warnings: Sequence[str],
+    *,
+    checked: bool = True,
 ) -> list[doc.Section]:
-    """Make the sections that every report of a design ends with."""
-    from reports.sections import parameters, provenance
+    """Make the sections that every report of a design ends with; ``checked``: by simulation too."""
+    from reports.sections import answer, parameters, provenance
 
-    return [parameters.section(design, warnings), provenance.section(head, origin)]
+    findings = () if checked else (answer.unchecked(),)
+    return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
 
 
 def design_head(design: Design) -> dict[str, Any]:
@@ -117,7 +126,7 @@ def design_head(design: Design) -> dict[str, Any]:
 
 
 def write_report(
-    made: Mapping[str, Any], folder: str | Path, *, processes: int = 1, progress: Progress | None = None
+    made: Mapping[str, Any], folder: str | Path, *, progress: Progress | None = None
 ) -> tuple[Path, Path]:
     """Write ``report.html`` and ``report.json``; both or neither.
 
@@ -129,7 +138,7 @@ def write_report(
     from reports.html import page
 
     content = doc.dumps(made)
-    html = page(doc.loads(content), processes=processes, progress=progress)
+    html = page(doc.loads(content), progress=progress)
     paths = (Path(folder) / "report.html", Path(folder) / "report.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths
