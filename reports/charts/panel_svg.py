@@ -61,7 +61,7 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     """Write grid, ticks, labels and title."""
     xs, ys = (
         panel.x.named_ticks(max(3, int(frame.width / (40 if panel.x.log else 58)))),
-        panel.y.named_ticks(_room_y(panel, frame)),
+        panel.y.named_ticks(room_y(panel, frame.height)),
     )
     px, py = frame.x(panel.x, [v for v, _ in xs]), frame.y(panel.y, [v for v, _ in ys])
     across = "".join(f"M{x:.1f} {frame.top:.1f}V{frame.bottom:.1f}" for x in px) if panel.x.grid else ""
@@ -94,8 +94,9 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     return "".join(parts)
 
 
-def _room_y(panel: Panel, frame: Frame) -> int:
-    return max(2, int(frame.height / 24)) if panel.y.ticks is None else 99
+def room_y(panel: Panel, height: float) -> int:
+    """Say how many ticks a panel of that height has room for."""
+    return min(max(2, int(height / 24)), 7) if panel.y.ticks is None else 99
 
 
 def _item(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> tuple[str, str]:

@@ -12,7 +12,7 @@ from itertools import accumulate
 
 from reports.charts.chart import Chart, Column, Curve, Item, Look, Note, Panel
 from reports.charts.labels import LINE_EM, text_width
-from reports.charts.panel_svg import LABEL, TICK, TITLE, panel_svg
+from reports.charts.panel_svg import LABEL, TICK, TITLE, panel_svg, room_y
 from reports.charts.pen import Frame, Pen
 
 FONT = "DejaVu Sans"
@@ -71,15 +71,15 @@ def paper_svg(chart: Chart, prefix: str) -> str:
 
 def _column(column: Column, width: float, height: float, pen: Pen) -> str:
     """Write the panels of a column on common edges."""
-    left = max((_left(panel) for panel in column.panels), default=30.0)
     above = [_above(panel) for panel in column.panels]
     below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
     head = 16.0 if column.title else 0.0
     free = height - head - sum(above) - sum(below)
+    tall = [free * share / sum(column.heights) for share in column.heights]
+    left = max((_left(panel, high) for panel, high in zip(column.panels, tall, strict=True)), default=30.0)
     parts = []
     if column.title:
         parts.append(pen.words(column.title, left, 12.0, size=TITLE, bold=True))
-    tall = [free * share / sum(column.heights) for share in column.heights]
     tops = accumulate((a + t + b for a, t, b in zip(above, tall, below, strict=True)), initial=head)
     for k, (panel, top) in enumerate(zip(column.panels, tops, strict=False)):
         frame = Frame(left, top + above[k], width - GAP, top + above[k] + tall[k])
@@ -95,8 +95,8 @@ def _hides(column: Column, k: int) -> bool:
     return k + 1 < len(column.panels) and column.panels[k].x is column.panels[-1].x
 
 
-def _left(panel: Panel) -> float:
-    ticks = panel.y.named_ticks()
+def _left(panel: Panel, height: float) -> float:
+    ticks = panel.y.named_ticks(room_y(panel, height))
     widest = max((text_width(words, TICK) for _, words in ticks), default=0.0)
     lines = panel.y.label.count("\n") + 1 if panel.y.label else 0
     return 8.0 + widest + lines * LINE_EM * LABEL + (4.0 if lines else 0.0)

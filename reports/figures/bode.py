@@ -19,7 +19,11 @@ RED, GREEN = style.RED, style.GREEN
 def draw(data: dict[str, Any]) -> Chart:
     """Draw the two panels and the margins."""
     small = bool(data.get("small"))
-    chart = Chart(width=style.HALF, height=280.0 if small else 410.0, loop=data.get("loop", ""))
+    chart = Chart(
+        width=style.SMALL if small else style.HALF,
+        height=280.0 if small else 410.0,
+        loop=data.get("loop", ""),
+    )
     top, bottom = chart.column(1.15, 1.0)
     curves(data, top, bottom)
     top.rule_y(0.0, colour=style.INK)
@@ -54,9 +58,9 @@ def _gain_margins(data: dict[str, Any], top: Panel, shown: int) -> None:
         seen = min(max(-db, low), high)
         top.curve([f, f], [0.0, seen], colour=RED, width=2.6, read=False)
         top.points([f], [seen], marker="s", colour=RED, size=6.0, read=False)
-        if k < shown:
-            beyond = "" if low < -db < high else " (off scale)"
-            top.note(f"GM {_signed(db)} dB{beyond}\n{style.hertz(f)}", (f, seen))
+        if k < shown and (k == 0 or low < -db < high):
+            off = "" if low < -db < high else " (off scale)"
+            top.note(f"GM {_signed(db)} dB{off}\n{style.hertz(f)}", (f, seen))
 
 
 def _phase_margins(data: dict[str, Any], top: Panel, bottom: Panel, shown: int) -> None:
@@ -70,7 +74,7 @@ def _phase_margins(data: dict[str, Any], top: Panel, bottom: Panel, shown: int) 
             continue
         phase = _at(f, data["frequency_hz"], data["series"][0]["phase_deg"])
         border = 180.0 * (2 * round(((phase - deg) / 180.0 - 1) / 2) + 1)
-        thin = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
+        thin: dict[str, Any] = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
         top.points([f], [0.0], colour=GREEN, size=6.5, read=False)
         top.curve([f, f], [0.0, top_low], **thin)
         bottom.curve([f, f], [high, phase], **thin)

@@ -16,7 +16,11 @@ from reports.numbers import seconds
 def draw(data: dict[str, Any]) -> Chart:
     """Draw the responses and the figures read from the first."""
     small = bool(data.get("small"))
-    chart = Chart(width=style.HALF, height=280.0 if small else 225.0, loop=data.get("loop", ""))
+    chart = Chart(
+        width=style.SMALL if small else style.HALF,
+        height=280.0 if small else 225.0,
+        loop=data.get("loop", ""),
+    )
     panel = chart.panel()
     scale = style.time_axis(panel, data["time_s"][-1])
     for k, series in enumerate(data["series"]):

@@ -12,9 +12,10 @@ from reports.charts.chart import Chart, Panel
 from reports.charts.paint import BLUE, BROWN, GREEN, INK, MUTED, ORANGE, PURPLE, RED, SERIES, SKY, series
 from reports.numbers import hertz, time_unit, to_minus
 
-HALF, WIDE = 430.0, 900.0
+SMALL, HALF, WIDE = 340.0, 430.0, 900.0
 __all__ = [
-    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "WIDE",
+    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "SMALL",
+    "WIDE",
     "Chart", "Panel", "bound", "differences", "frequency", "hertz", "known", "phase_axis", "powers", "series",
     "time_axis", "time_unit", "to_minus",
 ]  # fmt: skip

@@ -50,20 +50,15 @@ def section(result: LargeSignals) -> dict[str, Any]:
 
 def _result(found: AmplitudeBode, scale: float, unit: str) -> str:
     """Say how far the bandwidth falls with the amplitude."""
-    amplitude = max(zip(found.amplitude_rad, found.fractions, strict=True), default=(math.nan, 0.0))
-    k = int(np.argmin(np.abs(found.all_amplitude_rad - amplitude[0])))
-    value, size = (
-        found.minus3db_hz[k],
-        f"{scale * amplitude[0]:.3g} {unit} ({100.0 * amplitude[1]:.0f} % of full deflection)",
-    )
-    linear = found.linear_minus3db_hz
+    largest, fraction = max(zip(found.amplitude_rad, found.fractions, strict=True), default=(math.nan, 0.0))
+    value = found.minus3db_hz[int(np.argmin(np.abs(found.all_amplitude_rad - largest)))]
+    part = "full deflection" if fraction == 1.0 else f"{100.0 * fraction:.0f} % of full deflection"
+    size, linear = f"{part} ({scale * largest:.3g} {unit})", found.linear_minus3db_hz
     if linear is None or not math.isfinite(linear):
         return "The linear loop has no −3 dB bandwidth in the range of the map."
     if not math.isfinite(value):
-        return (
-            f"At {size} the gain is below −3 dB from {found.frequency_hz[0]:.3g} Hz on; the linear bandwidth "
-            f"is {linear:.3g} Hz."
-        )
+        start = found.frequency_hz[0]
+        return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to below {start:.3g} Hz at {size}."
     return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
 
 

@@ -60,7 +60,9 @@ def _result(rows: Sequence[Mapping[str, Any]], unit: str) -> str:
     if not rows:
         return ""
     row = max(rows, key=lambda row: float(row["amplitude"]))
-    size = f"{row['amplitude']:.3g} {unit} ({row['fraction']:.0f} % of full deflection)"
+    full = row["fraction"] == 100.0
+    part = "full deflection" if full else f"{row['fraction']:.0f} % of full deflection"
+    size = f"{part} ({row['amplitude']:.3g} {unit})"
     if row["hz"] is None:
         return f"A sine of {size} stays linear over the whole frequency range."
     return f"A sine of {size} stays linear up to {row['hz']:.3g} Hz; above, the {_noun(row['limiter'])} acts."

@@ -305,6 +305,7 @@
     settle(panel) {
       panel.update();
       this.root.classList.toggle("moved", this.panels.some((p) => !p.whole));
+      this.pinned = null;
       this.readout.hidden = true;
     }
     reset() {
@@ -467,6 +468,9 @@
     }
     // shows a crossing: a frequency in every panel that has one
     mark(hertz) {
+      const first = this.panels.find((p) => p.x.log && p.x.unit === "Hz");
+      const [at] = first.place(first.x.px(hertz), 0);
+      if (at < first.left || at > first.right) this.reset();
       for (const p of this.panels) {
         p.clear();
         if (p.x.log && p.x.unit === "Hz") p.cursor(p.x.px(hertz), "crossing");
@@ -494,15 +498,18 @@
   for (const row of document.querySelectorAll("tr[data-loop][data-hz]")) {
     const own = charts.filter((c) => c.loop === row.dataset.loop && c.panels.some((p) => p.x.log && p.x.unit === "Hz"));
     if (!own.length) continue;
-    const show = () => own.forEach((c) => c.mark(+row.dataset.hz)), hide = () => own.forEach((c) => c.hide());
+    let kept = false;
+    const show = () => own.forEach((c) => c.mark(+row.dataset.hz));
+    const hide = () => { if (!kept) own.forEach((c) => c.hide()); };
     const button = html("button", "find", "show");
     button.type = "button";
     button.setAttribute("aria-label", "Show this crossing in the figures");
     row.querySelector("th").append(" ", button);
-    row.addEventListener("pointerenter", show);
+    row.addEventListener("pointerenter", () => { kept = false; show(); });
     row.addEventListener("pointerleave", hide);
     button.addEventListener("focus", show);
     button.addEventListener("click", () => {
+      kept = true;
       const main = own.find((c) => c.root.closest("section[id^=loop]")) || own[0];
       main.root.scrollIntoView({ block: "center", behavior: "auto" });
       show();
