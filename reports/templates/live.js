@@ -2,7 +2,9 @@
 // Keeps the figures of a page alive: read-out, zoom, pan, curves on and off, crossings shown, curves redrawn.
 // The SVG is the data: a panel says its axes (data-x, data-y: kind, ends, pixels), a curve is its path.
 (() => {
-  const NS = "http://www.w3.org/2000/svg";
+  const first = document.querySelector(".plot");
+  if (!first) return;
+  const NS = first.namespaceURI;
   const make = (name, attributes, parent) => {
     const made = document.createElementNS(NS, name);
     for (const key in attributes) made.setAttribute(key, attributes[key]);
