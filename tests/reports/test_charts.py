@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from xml.etree import ElementTree
@@ -37,7 +38,7 @@ def test_linear_ticks_lie_inside_and_say_their_value(low: float, span: float, ro
         return
     ticks = linear_ticks(low, high, room)
     assert 1 <= len(ticks) <= room + 2 or len(ticks) == 0
-    step = min((b - a for (a, _), (b, _) in zip(ticks, ticks[1:], strict=False)), default=span)
+    step = min((b - a for (a, _), (b, _) in itertools.pairwise(ticks)), default=span)
     for value, words in ticks:
         assert low - 1e-6 * span <= value <= high + 1e-6 * span
         assert "e" not in words
@@ -83,7 +84,7 @@ def test_gaps_break_a_line() -> None:
 
 
 def test_the_points_of_a_curve_are_where_its_values_are() -> None:
-    """Read pixels back by the axes that stand in the picture: the values again, to a thousandth of the frame."""
+    """Read pixels back by the axes in the picture: the values again, to a thousandth of the frame."""
     chart = Chart(width=400, height=300)
     panel = chart.panel()
     f = np.geomspace(0.1, 1000.0, 50)
@@ -92,7 +93,9 @@ def test_the_points_of_a_curve_are_where_its_values_are() -> None:
     svg = page_svg(chart, "f", "")
     x_axis, y_axis = (re.search(rf'data-{k}="(\w+) ([^"]*)"', svg) for k in "xy")
     path = re.search(r'class="curve" d="([^"]*)"', svg)
-    assert x_axis is not None and y_axis is not None and path is not None
+    assert x_axis is not None
+    assert y_axis is not None
+    assert path is not None
     low, high, a, b = map(float, x_axis.group(2).split())
     bottom, top, c, d = map(float, y_axis.group(2).split())
     for (x, y), hz in zip(re.findall(r"[ML]([-\d.]+) ([-\d.]+)", path.group(1)), f, strict=True):
@@ -131,7 +134,8 @@ def test_words_keep_off_curves_and_each_other_where_there_is_room(seed: int) -> 
     dense_x = np.linspace(0.0, 400.0, 4000)
     dense_y = np.interp(dense_x, x, y)
     for k, (x0, y0, x1, y1) in enumerate(boxes):
-        assert x0 >= 0.0 and y0 >= 0.0 and x1 <= 400.0 and y1 <= 300.0
+        assert 0.0 <= x0 < x1 <= 400.0
+        assert 0.0 <= y0 < y1 <= 300.0
         assert not ((dense_x > x0) & (dense_x < x1) & (dense_y > y0) & (dense_y < y1)).any()
         for a0, b0, a1, b1 in boxes[:k]:
             assert x1 <= a0 or a1 <= x0 or y1 <= b0 or b1 <= y0
