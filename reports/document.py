@@ -17,6 +17,8 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
 from reports.document_schema import SCHEMA, VERSION, validate
+from reports.findings import Finding
+from reports.findings import plain as plain_findings
 from reports.verdict_summary import summary
 
 Block = dict[str, Any]
@@ -66,7 +68,7 @@ def column(
     ----------
     format : str
         ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
-        ``"fix:1"`` (decimals) or ``"yesno"``.
+        ``"fix:1"`` (decimals), ``"int"`` (a count) or ``"yesno"``.
     """
     side = align or ("left" if format in ("text", "yesno") else "right")
     return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
@@ -163,10 +165,30 @@ def details(title: str, blocks: Sequence[Block]) -> Block:
 
 
 def section(
-    id: str, title: str, blocks: Sequence[Block], *, intro: str = "", status: str = "info"
+    id: str,
+    title: str,
+    blocks: Sequence[Block],
+    *,
+    result: str = "",
+    intro: str = "",
+    status: str = "info",
+    findings: Iterable[Finding] = (),
 ) -> Section:
-    """Make a section; ``id`` is its anchor."""
-    return {"id": id, "title": title, "intro": intro, "status": status, "blocks": list(blocks)}
+    """Make a section.
+
+    Parameters
+    ----------
+    id : str
+        Its anchor.
+    result : str
+        One sentence that says what was found; it comes first.
+    intro : str
+        How it was found.
+    findings : iterable of Finding
+        What the first screen has to say of it.
+    """
+    made = {"id": id, "title": title, "result": result, "intro": intro, "status": status}
+    return {**made, "blocks": list(blocks), "findings": plain_findings(findings)}
 
 
 def document(

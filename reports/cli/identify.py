@@ -287,5 +287,5 @@ def _write(
         kind="identification",
     )
     with progress("drawing figures", quiet=quiet) as bar:
-        write_pages(document, out, "identification", processes=1, progress=bar)
+        write_pages(document, out, "identification", progress=bar)
     write_text(out / f"{drive.name}-identified.toml", write_design(identified))
