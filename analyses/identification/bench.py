@@ -1,0 +1,162 @@
+"""From bench records to a design that may be written: inputs, joint fit, refinement, verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.inverse import JointModel, fit_records, held_out_residual
+from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.refinement import refine_records
+from analyses.identification.resimulation import Resimulated, resimulate
+from analyses.identification.rows import recipe_for
+from analyses.identification.to_design import (
+    INERTIAS,
+    KEYS,
+    design_with_estimate,
+    joint_estimate,
+    refined_estimate,
+    with_fixed,
+)
+from analyses.identification.verdict import (
+    RESIDUAL_LIMIT,
+    Item,
+    held_out_item,
+    inputs_item,
+    residual_item,
+    simulated_item,
+    size_item,
+)
+from analyses.identification.verdict import passed as all_passed
+from analyses.records.consistency import Finding, check_record
+from analyses.records.prepare import period_of, prepared
+from analyses.records.record import Record
+
+NAMES_OF_KEYS = {
+    ("symmetric", key): name for name, key in KEYS.items() if not name.endswith(("_forward", "_reverse"))
+} | {("per-direction", key): name for name, key in KEYS.items() if name not in ("viscous", "dry", "offset")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchSettings:
+    """What was asked of an identification; ``fixed`` by key of the design, in SI."""
+
+    form: FrictionForm = "symmetric"
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    inertia_to: str = INERTIAS[0]
+    refine: bool = False
+    residual_limit: float = RESIDUAL_LIMIT
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchResult:
+    """Everything that the records told: the fit, the design that would be written, and whether it may be."""
+
+    records: tuple[Record, ...]
+    validation: tuple[Record, ...]
+    findings: Mapping[str, tuple[Finding, ...]]
+    model: JointModel
+    refined: OutputErrorResult | None
+    design: Design
+    text: str
+    resimulated: tuple[Resimulated, ...]
+    items: tuple[Item, ...]
+    settings: BenchSettings
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all_passed(self.items)
+
+
+def identify_bench(
+    design: Design,
+    records: Sequence[Record],
+    *,
+    validation: Sequence[Record] = (),
+    settings: BenchSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> BenchResult:
+    """Identify a drive from records of its motion, and hold the design that comes of it against them.
+
+    Raises
+    ------
+    InputError
+        If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
+    """
+    settings = BenchSettings() if settings is None else settings
+    used = tuple(prepared(record) for record in records)
+    unseen = tuple(prepared(record) for record in validation)
+    findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
+    start = with_fixed(design, settings.fixed)
+    model = fit_records(
+        start, used, form=settings.form, recipe=_recipe(used[0], settings), fixed=_held(start, settings)
+    )
+    source = f"identified from {', '.join(record.name for record in records)}"
+    estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
+    made = design_with_estimate(start, estimate)
+    refined = None
+    if settings.refine:
+        refined = refine_records(made, used, estimate.paths, progress=progress)
+        made = design_with_estimate(made, refined_estimate(refined, f"{source}, refined by simulation"))
+    text = write_design(made)
+    again = resimulate(read_design_text(text), (*used, *unseen), settings.form)
+    return BenchResult(
+        records=used,
+        validation=unseen,
+        findings=findings,
+        model=model,
+        refined=refined,
+        design=made,
+        text=text,
+        resimulated=again,
+        items=_items(design, findings, model, unseen, again, settings, start),
+        settings=settings,
+    )
+
+
+def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:
+    if settings.cutoff_hz is None and settings.decimation is None:
+        return None
+    return recipe_for(period_of(record), settings.cutoff_hz, settings.decimation)
+
+
+def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
+    """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
+    held = {}
+    for path, value in settings.fixed.items():
+        name = NAMES_OF_KEYS.get((settings.form, path))
+        if path in INERTIAS:
+            held["inertia"] = design.inertia_kgm2
+        elif name is not None:
+            held[name] = value
+        else:
+            known = sorted({key for form, key in NAMES_OF_KEYS if form == settings.form} | set(INERTIAS))
+            raise InputError(f"--fix {path}: can be fixed here: {', '.join(known)}")
+    return held
+
+
+def _items(
+    design: Design,
+    findings: Mapping[str, tuple[Finding, ...]],
+    model: JointModel,
+    unseen: Sequence[Record],
+    again: Sequence[Resimulated],
+    settings: BenchSettings,
+    start: Design,
+) -> tuple[Item, ...]:
+    limit = settings.residual_limit
+    items = [inputs_item(name, found) for name, found in findings.items()]
+    items.append(size_item(design, model))
+    items.append(residual_item(model.relative_residual, limit))
+    for record in unseen:
+        residual = held_out_residual(start, model, record)
+        items.append(held_out_item(record.name, residual, model.relative_residual, limit))
+    items += [simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
+    return tuple(items)
