@@ -127,7 +127,7 @@ def _used(design: Design, record: Record, measured: Mapping[str, FloatArray]) ->
     if command is not None:
         used[command[0]] = "command"
     used |= {name: "load" for name in (LOADS[design.axis],) if name in record.signals}
-    used |= {name: text for name, text in (("supply", "supply"), ("enable", "enabled part"))}
+    used |= {"supply": "supply", "enable": "enabled part"}
     if "force" in measured and "force" not in record.signals:
         used["voltage"] = "force, by the source's gain"
     return {name: text for name, text in used.items() if name in record.signals}

@@ -26,7 +26,8 @@ REST_TIME_S = 0.03
 class Rows:
     """Regressors ``w`` by ``names`` and drive ``y`` after decimation, rows at rest left out.
 
-    ``sine`` and ``cosine`` of the output angle keep all rows. ``used`` tells for each signal what it was used for.
+    ``sine`` and ``cosine`` of the output angle keep all rows. ``used`` tells what each signal was
+    used for.
     """
 
     record: str

@@ -221,7 +221,7 @@ def _held(
     names = [name for name in NAMES if name not in held]
     if not names:
         raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
-    if kept is None:
+    if kept is None or not points:
         _check_count(points, len(names))
     x, _ = _table(points)
     _, left = told_apart(x[:, [NAMES.index(name) for name in names]], names)

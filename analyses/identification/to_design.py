@@ -102,8 +102,8 @@ def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, f
     if not left > 0.0:
         other = INERTIAS[1 - INERTIAS.index(key)]
         raise InputError(
-            f"identified inertia {total_kgm2:.4g} at the motor in all, but the design's inertias beside {key} "
-            f"alone make {rest:.4g}: correct them, or write it to {other}",
+            f"identified inertia {total_kgm2:.4g} at the motor in all, but the design's inertias "
+            f"beside {key} alone make {rest:.4g}: correct them, or write it to {other}",
             where=design.origin or design.name,
         )
     return left, scale

@@ -1,4 +1,4 @@
-"""The signals that the analyses know: one table of names, SI units, meanings, and what recorders call them."""
+"""The signals that the analyses know: one table of names, SI units, meanings, and other names for them."""
 
 from __future__ import annotations
 

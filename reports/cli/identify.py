@@ -51,7 +51,7 @@ InertiaOption = Annotated[
     typer.Option(
         "--inertia-to",
         metavar="KEY",
-        help="Where the identified inertia goes, less the design's others: motor.rotor_inertia or load.inertia.",
+        help="Where the inertia goes, less the design's others: motor.rotor_inertia or load.inertia.",
     ),
 ]
 BenchOption = Annotated[

@@ -57,9 +57,8 @@ def _intro(result: BenchResult) -> str:
     many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
     rest = sum(record.rows_at_rest for record in model.records)
     return (
-        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at {recipe.cutoff_hz:g} Hz "
-        "(Butterworth of "
-        f"order {recipe.filter_order}, forward and backward), differentiated twice, the first "
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at "
+        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the first "
         f"{recipe.skip_samples} samples dropped, decimated by {recipe.decimation}"
         f"{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by least squares. "
         "Relative residual "
@@ -116,8 +115,8 @@ def refined_table(result: BenchResult) -> dict[str, Any]:
         for path, value in refined.values.items()
     ]
     note = (
-        "Simulation with each record's own command: the relative error of the signal that is fitted falls from "
-        f"{100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in {refined.iterations} "
+        "Simulation with each record's own command: the relative error of the signal that is fitted falls "
+        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in {refined.iterations} "
         "iterations. These values are the design's."
     )
     return doc.table("Refined by simulation", columns, rows, note)
