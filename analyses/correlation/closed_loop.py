@@ -16,7 +16,7 @@ from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.identification.differentiation import filtered_motion
 from analyses.records.consistency import Finding, check_record
 from analyses.records.prepare import prepared
-from analyses.records.record import InputColumn, Record
+from analyses.records.record import Record
 
 if TYPE_CHECKING:
     from nonlinear import State
@@ -55,7 +55,7 @@ class CorrelationResult:
     notes: tuple[str, ...]
     counts: str
     sha256: str
-    inputs: tuple[InputColumn, ...] = ()
+    source: Record
     used: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
@@ -115,7 +115,7 @@ def correlate_record(
         notes=tuple(notes),
         counts=str(record.counts),
         sha256=record.sha256,
-        inputs=record.inputs,
+        source=record,
         used=_used(design, record, measured),
         findings=findings,
     )

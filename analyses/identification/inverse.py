@@ -241,18 +241,20 @@ def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) ->
 
 
 def _singles(
-    blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed]
+    blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed], values: FloatArray
 ) -> list[dict[str, tuple[float, float]]]:
-    """Each record fitted alone: value and standard error of what it tells."""
+    """Each record fitted alone: value and standard error of what it tells, the rest held at ``values``."""
     out = []
     for block in blocks:
         columns = [block.names.index(name) for name in free]
         kept, _ = told_apart(block.w[:, columns], free)
         own = tuple(free[k] for k in kept)
-        rest = {name: fixed.get(name, Fixed(value=0.0, reason="")) for name in block.names if name not in own}
-        if len(own) < len(free):  # the rest is at the value of the others: it would move what is told
-            continue
-        found = _joint([block], own, {k: v for k, v in rest.items() if k in fixed}, np.ones(1))
+        rest = {
+            name: Fixed(value=float(value), reason="told by other records")
+            for name, value in zip(free, values, strict=True)
+            if name not in own
+        }
+        found = _joint([block], own, {**fixed, **rest}, np.ones(1))
         std = np.sqrt(np.diag(found.correlated))
         out.append({n: (float(v), float(s)) for n, v, s in zip(own, found.values, std, strict=True)})
     return out
@@ -268,7 +270,7 @@ def _model(
 ) -> JointModel:
     covariance, between, singles = solution.correlated, dict.fromkeys(free, 0.0), []
     if len(blocks) > 1:
-        singles = _singles(blocks, free, fixed)
+        singles = _singles(blocks, free, fixed, solution.values)
         scatter = by_record(singles, free)
         between = {name: scatter[name][0] for name in free}
         extra = [scatter[name][0] ** 2 / max(scatter[name][1], 1) for name in free]
@@ -290,7 +292,7 @@ def _model(
         records=tuple(_part(block, rest) for block, rest in zip(blocks, rests, strict=True)),
         recipe=blocks[0].recipe,
         condition=solution.condition,
-        singles={name: tuple(one[name][0] for one in singles) for name in free},
+        singles={name: tuple(one[name][0] if name in one else np.nan for one in singles) for name in free},
     )
 
 

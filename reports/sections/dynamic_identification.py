@@ -58,7 +58,8 @@ def _intro(result: BenchResult) -> str:
     rest = sum(record.rows_at_rest for record in model.records)
     return (
         f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at "
-        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the first "
+        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), "
+        "differentiated twice, the first "
         f"{recipe.skip_samples} samples dropped, decimated by {recipe.decimation}"
         f"{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by least squares. "
         "Relative residual "
@@ -116,8 +117,8 @@ def refined_table(result: BenchResult) -> dict[str, Any]:
     ]
     note = (
         "Simulation with each record's own command: the relative error of the signal that is fitted falls "
-        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in {refined.iterations} "
-        "iterations. These values are the design's."
+        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
+        f"{refined.iterations} iterations. These values are the design's."
     )
     return doc.table("Refined by simulation", columns, rows, note)
 
@@ -154,8 +155,8 @@ def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
         own = {f"r{k}": value for k, value in enumerate(model.singles.get(name, ())[:6])}
         rows.append({"name": label, "between": model.between[name], "unit": unit, **own})
     note = (
-        "Standard deviation of one record beyond its own error. Only records that tell all parameters alone "
-        "are listed."
+        "Standard deviation of one record beyond its own error. What a record does not tell alone is held at "
+        "the joint value there."
     )
     return doc.table("Records alone", columns, rows, note)
 

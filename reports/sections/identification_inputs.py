@@ -12,6 +12,7 @@ from analyses.records.naming import MEANINGS
 from reports import document as doc
 
 if TYPE_CHECKING:
+    from analyses.correlation.closed_loop import CorrelationResult
     from analyses.identification.campaign import CampaignResult
     from analyses.identification.verdict import Item
     from analyses.records.consistency import Finding
@@ -90,6 +91,11 @@ def campaign_table(result: CampaignResult) -> dict[str, Any]:
 def input_table(record: Record, used: Mapping[str, str]) -> dict[str, Any]:
     """The columns of one record."""
     return _table(f"Inputs: {record.name}", input_rows(record, used))
+
+
+def result_input_table(result: CorrelationResult) -> dict[str, Any]:
+    """The columns of a record that a model was held against."""
+    return input_table(result.source, result.used)
 
 
 def _table(caption: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
