@@ -48,7 +48,7 @@ class StaticThreshold:
 def torque_gain_Nm_rad(design: Design) -> float:
     """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
     control, motor = design.controller, design.motor
-    gain = control.position.gain * design.total_ratio
+    gain = control.position_loop.gain * design.total_ratio
     if control.velocity is not None:
         gain *= control.velocity.gain
     if motor.source_gain_Nm_V is not None:

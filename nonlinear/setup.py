@@ -63,7 +63,7 @@ def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> Non
 
 def check_frequency(design: Design, command: Command) -> None:
     """Refuse a command that the position loop, sampled every n_p ticks, cannot follow in principle."""
-    nyquist = 0.5 / (design.controller.period_s * design.controller.position.every)
+    nyquist = 0.5 / (design.controller.period_s * design.controller.position_loop.every)
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
         raise InputError(f"{message} of the position loop, {nyquist:g} Hz", where=design.name)

@@ -65,7 +65,7 @@ def variable_paths(design: Design) -> tuple[str, ...]:
     for gear in design.gears:
         paths += [f"gear.{gear.name}.{key}" for key in _GEAR]
     paths += [path for path in _CONTROL if _nominal(design, path) is not None]
-    if design.controller.position.feedforward:
+    if design.controller.position_loop.feedforward:
         paths.append("control.position.feedforward")
     return tuple(paths)
 
@@ -80,7 +80,7 @@ def _nominal(design: Design, path: str) -> float | None:
         gear = named.get(section.removeprefix("gear."))
         return None if gear is None else getattr(gear, _GEAR[key])
     if path == "control.position.feedforward":
-        return design.controller.position.feedforward
+        return design.controller.position_loop.feedforward
     owner = design.controller if section == "control" else getattr(design.controller, section.split(".")[1])
     return None if owner is None else getattr(owner, _CONTROL[path])
 
@@ -211,7 +211,7 @@ class Population:
         return np.array(
             [
                 design.motor.has_electrical_dynamics, current_kind, velocity_kind, every,
-                control.position.every, difference if velocity is not None else 0,
+                control.position_loop.every, difference if velocity is not None else 0,
                 filtered and velocity is not None,
             ],
             dtype=np.int64,

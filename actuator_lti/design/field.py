@@ -8,7 +8,7 @@ from typing import Literal
 
 from actuator_lti.design.model import Axis, Design
 
-Kind = Literal["quantity", "integer", "quantities", "choice", "text"]
+Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text"]
 
 BIG = 1e12
 SMALL = 1e-18
@@ -75,6 +75,8 @@ class Field:
 
     def allowed(self, unit: str) -> str:
         """The allowed range in words."""
+        if self.kind == "flag":
+            return "true or false"
         if self.choices:
             return " or ".join(f'"{choice}"' for choice in self.choices)
         shown = "" if unit == "1" else f" {unit}"

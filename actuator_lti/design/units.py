@@ -50,6 +50,9 @@ watt = joule / second = W
 volt = watt / ampere = V
 ohm = volt / ampere = Ω = Ohm
 henry = volt * second / ampere = H
+farad = ampere * second / volt = F
+kelvin = [temperature] = K
+celsius = [celsius] = degC
 degree = 0.017453292519943295 * radian = deg
 turn = 6.283185307179586 * radian = rev = _ = revolution
 rpm = 0.10471975511965977 * radian / second
@@ -95,7 +98,9 @@ def _tidy(unit: str) -> str:
     text = unit.strip()
     for old, new in (("²", "^2"), ("³", "^3"), ("·", "*"), ("⋅", "*"), ("×", "*"), ("μ", "µ"), ("**", "^")):
         text = text.replace(old, new)
-    text = text.replace("°", " deg").replace("%", " percent").replace("\N{OHM SIGN}", "Ω")
+    text = (
+        text.replace("°C", " degC").replace("°", " deg").replace("%", " percent").replace("\N{OHM SIGN}", "Ω")
+    )
     return _RUN_TOGETHER.sub(r"\1*\2", _BARE_POWER.sub(r"^\1", text)).rstrip()
 
 

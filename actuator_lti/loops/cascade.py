@@ -58,7 +58,7 @@ class Cascade:
             return PI(control.current.gain_V_A, control.current.integral_time_s, self.period_s(stage))
         if stage == "velocity" and control.velocity is not None:
             return PI(control.velocity.gain, control.velocity.integral_time_s, self.period_s(stage))
-        return PI(control.position.gain, None, self.period_s(stage))
+        return PI(control.position_loop.gain, None, self.period_s(stage))
 
     def producer(self, signal: str) -> str:
         """The stage that updates a break point (``"output"`` is read by the position stage)."""
@@ -117,7 +117,7 @@ def cascade(
         target[stage] = inner
         inner = signals.get(stage, "")
     every = {"current": 1, "velocity": control.velocity.every if control.velocity else 1}
-    every["position"] = control.position.every
+    every["position"] = control.position_loop.every
     if every["position"] % every["velocity"]:
         raise InputError(f"control.position.every = {every['position']}: a multiple of {every['velocity']}")
     return Cascade(design, plant, stages, {stage: every[stage] for stage in stages}, target)

@@ -85,7 +85,7 @@ def reference_to_output(wired: Cascade, delays: str) -> Any:
     flow = FlowProgram(wired, "position", None, delays).flow()
     system = delay_system(flow, "ref", "th", scale=1 / wired.ratio)
     rate = delay_system(flow, "ref_rate", "th", scale=1 / wired.ratio)
-    if wired.design.controller.position.feedforward == 0.0:
+    if wired.design.controller.position_loop.feedforward == 0.0:
         total = system
     elif system.delay_free:
         B, D = system.B1 + system.A @ rate.B1, system.D11 + system.C1 @ rate.B1

@@ -126,7 +126,7 @@ class _Run:
         return self.after_delay(target, self.at_cut(target, value))
 
     def position(self) -> np.ndarray:
-        cascade, position = self.cascade, self.cascade.design.controller.position
+        cascade, position = self.cascade, self.cascade.design.controller.position_loop
         fed_back = cascade.ratio * self.at_cut("output", self.row["th"] / cascade.ratio)
         value = position.gain * self.at_cut("e_th", cascade.ratio * self.row["in:ref"] - fed_back)
         value = value + position.feedforward * cascade.ratio * self.row["in:ref_rate"]

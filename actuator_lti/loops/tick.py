@@ -92,7 +92,7 @@ class TickProgram:
             if encoder.speed == "difference":
                 names += ["acc", *(f"D{j}" for j in range(1, encoder.difference_samples))]
             names += ["filter"] if encoder.filter_time_s > 0 else []
-        if self.outer == "position" and cascade.design.controller.position.feedforward != 0.0:
+        if self.outer == "position" and cascade.design.controller.position_loop.feedforward != 0.0:
             names.append("ref_prev")
         return tuple(names)
 
@@ -129,7 +129,7 @@ class _Run:
         return value
 
     def position(self) -> np.ndarray | None:
-        cascade, position = self.cascade, self.cascade.design.controller.position
+        cascade, position = self.cascade, self.cascade.design.controller.position_loop
         reference = cascade.ratio * self.row["in:ref"]
         fed_back = cascade.ratio * self.at_cut("output", self.row["th"] / cascade.ratio)
         self.signals["th"] = self.row["th"]

@@ -81,7 +81,7 @@ def sweep_from_rest(
     described : bool
         Whether there is dry friction to be described.
     """
-    tick_s, n = design.controller.period_s, design.controller.position.every
+    tick_s, n = design.controller.period_s, design.controller.position_loop.every
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")

@@ -154,7 +154,7 @@ class _Work:
             if self.figures[name].stable:
                 every = rig(self.design, name).hold_ticks
                 self.settle[name] = settling_ticks_of(loop.closed_loop, every, self.design.name)
-        if self.design.controller.position.feedforward != 0.0:
+        if self.design.controller.position_loop.feedforward != 0.0:
             self.notes.append("the loops are tested without the feed-forward, which is no part of them")
         return loops
 

@@ -25,7 +25,7 @@ def test_F3_second_order_with_delay(inner: bool) -> None:
     else:
         b = closed_loop_bandwidth(SECOND, delay_s=0.002)
     assert b.minus3db_hz == pytest.approx(38.1605894854, rel=1e-9)
-    assert b.minus90deg_hz == pytest.approx(25.4421530721, rel=1e-9)  # cases.md prints 25.4421, cut off
+    assert b.minus90deg_hz == pytest.approx(25.4421530721, rel=1e-9)  # the source prints 25.4421, cut off
     assert b.resonance_peak_db == pytest.approx(20 * math.log10(1 / math.sqrt(0.75)), abs=1e-9)
     assert b.resonance_hz == pytest.approx(30 * math.sqrt(0.5), rel=1e-6)
 
