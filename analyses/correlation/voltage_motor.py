@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.least_squares import between_records, correlated_covariance
+from analyses.identification.least_squares import by_record, correlated_covariance
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -89,12 +89,15 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
     if len(steps) == 1:
         return joint
     alone = [_fit([step], estimator_rad_s) for step in steps]
-    gain = between_records([m.gain_rad_sV for m in alone], [m.gain_std for m in alone])
-    time = between_records([m.time_constant_s for m in alone], [m.time_constant_std_s for m in alone])
+    told = [
+        {"gain": (m.gain_rad_sV, m.gain_std), "time": (m.time_constant_s, m.time_constant_std_s)}
+        for m in alone
+    ]
+    scatter = by_record(told, ("gain", "time"))
     return replace(
         joint,
-        gain_std=float(np.hypot(joint.gain_std, gain / np.sqrt(len(steps)))),
-        time_constant_std_s=float(np.hypot(joint.time_constant_std_s, time / np.sqrt(len(steps)))),
+        gain_std=float(np.hypot(joint.gain_std, scatter["gain"][1])),
+        time_constant_std_s=float(np.hypot(joint.time_constant_std_s, scatter["time"][1])),
     )
 
 

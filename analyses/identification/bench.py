@@ -28,6 +28,7 @@ from analyses.identification.verdict import (
     held_out_item,
     inputs_item,
     residual_item,
+    rows_item,
     simulated_item,
     size_item,
 )
@@ -99,8 +100,13 @@ def identify_bench(
         start, used, form=settings.form, recipe=_recipe(used[0], settings), fixed=_held(start, settings)
     )
     source = f"identified from {', '.join(record.name for record in records)}"
-    estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
-    made = design_with_estimate(start, estimate)
+    items = _fit_items(design, findings, model, settings.residual_limit)
+    try:
+        estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
+        made = design_with_estimate(start, estimate)
+    except InputError as error:
+        reasons = "; ".join(item.reason for item in items if item.passed is False)
+        raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
     refined = None
     if settings.refine:
         refined = refine_records(made, used, estimate.paths, progress=progress)
@@ -116,7 +122,7 @@ def identify_bench(
         design=made,
         text=text,
         resimulated=again,
-        items=_items(design, findings, model, unseen, again, settings, start),
+        items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
         settings=settings,
     )
 
@@ -142,21 +148,27 @@ def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
     return held
 
 
-def _items(
-    design: Design,
-    findings: Mapping[str, tuple[Finding, ...]],
-    model: JointModel,
-    unseen: Sequence[Record],
-    again: Sequence[Resimulated],
-    settings: BenchSettings,
-    start: Design,
+def _fit_items(
+    design: Design, findings: Mapping[str, tuple[Finding, ...]], model: JointModel, limit: float
 ) -> tuple[Item, ...]:
-    limit = settings.residual_limit
-    items = [inputs_item(name, found) for name, found in findings.items()]
-    items.append(size_item(design, model))
-    items.append(residual_item(model.relative_residual, limit))
-    for record in unseen:
-        residual = held_out_residual(start, model, record)
-        items.append(held_out_item(record.name, residual, model.relative_residual, limit))
-    items += [simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
-    return tuple(items)
+    return (
+        *(inputs_item(name, found) for name, found in findings.items()),
+        size_item(design, model),
+        rows_item(model.rows_used, len(model.names)),
+        residual_item(model.relative_residual, limit),
+    )
+
+
+def _held_out(
+    start: Design, model: JointModel, unseen: Sequence[Record], settings: BenchSettings
+) -> tuple[Item, ...]:
+    fit, limit = model.relative_residual, settings.residual_limit
+    return tuple(
+        held_out_item(record.name, held_out_residual(start, model, record), fit, limit) for record in unseen
+    )
+
+
+def _again(again: Sequence[Resimulated], settings: BenchSettings) -> tuple[Item, ...]:
+    return tuple(
+        simulated_item(one.record, one.relative_error, settings.residual_limit, one.how) for one in again
+    )

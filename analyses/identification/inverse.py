@@ -273,7 +273,7 @@ def _model(
         singles = _singles(blocks, free, fixed, solution.values)
         scatter = by_record(singles, free)
         between = {name: scatter[name][0] for name in free}
-        extra = [scatter[name][0] ** 2 / max(scatter[name][1], 1) for name in free]
+        extra = [scatter[name][1] ** 2 for name in free]
         covariance = covariance + np.diag(extra)
     columns = [blocks[0].names.index(name) for name in free]
     rests = [_target(block, fixed) - block.w[:, columns] @ solution.values for block in blocks]

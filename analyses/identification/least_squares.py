@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from analyses.identification.means import correlation_time
 
@@ -135,7 +136,9 @@ def _block_sums(w: FloatArray, residual: FloatArray, ends: Sequence[int]) -> Flo
 
 
 def between_records(values: Sequence[float], stds: Sequence[float]) -> float:
-    """Standard deviation between records beyond their own errors (DerSimonian and Laird); 0 for one record.
+    """Standard deviation between records beyond their own errors (Mandel and Paule); 0 for one record.
+
+    The scatter with which ``sum((x - mean)^2 / (std^2 + scatter^2))`` is one less than the number of records.
 
     Examples
     --------
@@ -144,22 +147,34 @@ def between_records(values: Sequence[float], stds: Sequence[float]) -> float:
     >>> between_records([1.0, 1.1], [1.0, 1.0])
     0.0
     """
-    x, s = np.asarray(values, dtype=float), np.maximum(np.asarray(stds, dtype=float), 1e-300)
+    x, s = np.asarray(values, dtype=float), np.asarray(stds, dtype=float)
     if len(x) < 2:
         return 0.0
-    weight = (s.min() / s) ** 2
-    mean = float(weight @ x / weight.sum())
-    q = float(weight @ (x - mean) ** 2) / s.min() ** 2
-    spread = (weight.sum() - (weight @ weight) / weight.sum()) / s.min() ** 2
-    return float(np.sqrt(max(q - (len(x) - 1), 0.0) / spread))
+
+    def excess(variance: float) -> float:
+        weight = 1.0 / np.maximum(s**2 + variance, 1e-300)
+        mean = float(weight @ x / weight.sum())
+        return float(weight @ (x - mean) ** 2) - (len(x) - 1)
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    return float(np.sqrt(brentq(excess, 0.0, float(np.ptp(x)) ** 2 * len(x), xtol=1e-300, rtol=1e-12)))
+
+
+def scatter_of_joint(stds: Sequence[float], scatter: float) -> float:
+    """What a scatter between records does to their joint value, each weighed by its own error."""
+    weight = (np.min(stds) / np.maximum(np.asarray(stds, dtype=float), 1e-300)) ** 2
+    return float(scatter * np.sqrt(weight @ weight) / weight.sum())
 
 
 def by_record(
     estimates: Sequence[Mapping[str, tuple[float, float]]], names: Sequence[str]
-) -> dict[str, tuple[float, int]]:
-    """For each parameter: the standard deviation between records, and how many tell it."""
+) -> dict[str, tuple[float, float]]:
+    """For each parameter: the scatter between the records that tell it, and of their joint value."""
     out = {}
     for name in names:
         own = [one[name] for one in estimates if name in one]
-        out[name] = (between_records([v for v, _ in own], [s for _, s in own]), len(own))
+        stds = [s for _, s in own]
+        scatter = between_records([v for v, _ in own], stds)
+        out[name] = (scatter, scatter_of_joint(stds, scatter) if scatter else 0.0)
     return out

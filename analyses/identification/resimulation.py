@@ -15,6 +15,8 @@ from analyses.identification.refinement import has_command, output_name
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
+MOST_TICKS = 2_000_000
+
 
 @dataclass(frozen=True, kw_only=True)
 class Resimulated:
@@ -40,10 +42,11 @@ def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) ->
 
 def _simulated(design: Design, record: Record) -> Resimulated:
     name = output_name(design, record)
-    found = correlate_record(design, record)[name]
-    return Resimulated(
-        record=record.name, signal=name, relative_error=found.relative_error, how=f"{name}, simulated"
-    )
+    rows = int(MOST_TICKS * design.controller.period_s / record.period_s)
+    part = record if len(record) <= rows else record.slice(0, max(rows, 2))
+    how = f"{name}, simulated" if part is record else f"{name}, its first {len(part)} rows simulated"
+    found = correlate_record(design, part)[name]
+    return Resimulated(record=record.name, signal=name, relative_error=found.relative_error, how=how)
 
 
 def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:

@@ -13,6 +13,7 @@ from analyses.records.factors import named_factor
 RESIDUAL_LIMIT = 0.20
 """Largest relative residual that is taken without being told to."""
 LARGEST_FACTOR = 3.0
+ROWS_EACH = 10
 HELD_OUT_FACTOR = 1.5
 HELD_OUT_EXTRA = 0.02
 
@@ -50,6 +51,15 @@ def residual_item(residual: float, limit: float) -> Item:
         value=residual,
         limit=limit,
         reason="" if residual <= limit else "the model does not explain these records",
+    )
+
+
+def rows_item(rows: int, parameters: int) -> Item:
+    """Whether there are enough rows for an error that can be trusted."""
+    enough = rows >= ROWS_EACH * parameters
+    why = f"{rows} rows for {parameters} parameters, {ROWS_EACH * parameters} wanted: take a longer record"
+    return Item(
+        id="rows", label="Rows enough for the parameters", passed=enough, reason="" if enough else why
     )
 
 
