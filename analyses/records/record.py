@@ -117,7 +117,7 @@ class Record:
             If the error exceeds ``resample_tolerance`` of the range of a signal.
         """
         period = self.period_s if period_s is None else period_s
-        grid = np.arange(self.time_s[0], self.time_s[-1] + 0.5 * period, period)
+        grid = np.arange(self.time_s[0], self.time_s[-1] + 1e-6 * period, period)
         cut = {name: np.interp(grid, self.time_s, values) for name, values in self.signals.items()}
         steps = np.diff(self.time_s)
         longest = int(np.argmax(steps))
