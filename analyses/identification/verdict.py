@@ -58,9 +58,8 @@ def rows_item(rows: int, parameters: int) -> Item:
     """Whether there are enough rows for an error that can be trusted."""
     enough = rows >= ROWS_EACH * parameters
     why = f"{rows} rows for {parameters} parameters, {ROWS_EACH * parameters} wanted: take a longer record"
-    return Item(
-        id="rows", label="Rows enough for the parameters", passed=enough, reason="" if enough else why
-    )
+    label = "Rows enough for the parameters"
+    return Item(id="rows", label=label, passed=enough, reason="" if enough else why)
 
 
 def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:

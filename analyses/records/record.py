@@ -122,7 +122,7 @@ class Record:
         steps = np.diff(self.time_s)
         longest = int(np.argmax(steps))
         gap = float(steps[longest] / self.period_s)
-        errors = {name: _line_error(values, gap) for name, values in self.signals.items()}
+        errors = {name: _line_error(self.time_s, values, gap) for name, values in self.signals.items()}
         worst = max(errors, key=lambda name: errors[name])
         note = (
             f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
@@ -135,13 +135,14 @@ class Record:
         return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
 
 
-def _line_error(values: FloatArray, gap: float) -> float:
+def _line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
     """How far straight lines over a gap are from a signal, as a share of its range (95 % point)."""
     span = max(2, round(gap))
     reach = float(np.ptp(values))
     if len(values) <= span or reach == 0.0:
         return 0.0 if reach == 0.0 else 1.0
     half = span // 2
-    line = values[:-span] + (values[span:] - values[:-span]) * (half / span)
+    share = (time_s[half : half + len(values) - span] - time_s[:-span]) / (time_s[span:] - time_s[:-span])
+    line = values[:-span] + (values[span:] - values[:-span]) * share
     error = float(np.quantile(np.abs(values[half : half + len(line)] - line), 0.95)) / reach
     return error if gap >= 1.5 else 0.25 * error
