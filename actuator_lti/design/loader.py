@@ -84,7 +84,10 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     InputError
         As :func:`load_design`.
     """
-    return design_from_tree(parse_toml(text, origin), origin)
+    tree = parse_toml(text, origin)
+    if not tree:
+        raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
+    return design_from_tree(tree, origin)
 
 
 def design_from_tree(tree: dict[str, Any], origin: str) -> Design:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 import unicodedata
 from pathlib import Path
@@ -64,13 +65,35 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     try:
         tree = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not TOML: {shown(str(error), 200)[1:-1]}", where=where) from None
+        raise InputError(
+            f"not TOML: {shown(str(error), 200)[1:-1]}{_hint(text, error)}", where=where
+        ) from None
     except RecursionError:
         raise InputError(f"nested too deeply; allowed: {MAX_DEPTH} levels", where=where) from None
     except (ValueError, OverflowError) as error:
         raise InputError(f"not TOML: {shown(str(error), 200)[1:-1]}", where=where) from None
     _walk(tree, where)
     return tree
+
+
+_UNQUOTED = re.compile(
+    r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9][0-9.,eE+-]*\s*[A-Za-zµΩ%/°][^#\"\n]*?)\s*(#.*)?$"
+)
+_COMMA = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9]+,[0-9]+)\s*(#.*)?$")
+
+
+def _hint(text: str, error: tomllib.TOMLDecodeError) -> str:
+    """What the line at fault most likely wants: quotes around a quantity, a decimal point."""
+    place = re.search(r"line ([0-9]+)", str(error))
+    lines = text.splitlines()
+    if place is None or not 0 < int(place[1]) <= len(lines):
+        return ""
+    line = lines[int(place[1]) - 1]
+    if found := _COMMA.match(line):
+        return f"; use a decimal point: {found[1]} = {found[2].replace(',', '.')}"
+    if found := _UNQUOTED.match(line):
+        return f'; put a quantity in quotes: {found[1]} = "{shown(found[2].replace(",", "."))[1:-1]}"'
+    return ""
 
 
 def _refuse_long_keys(text: str, where: str) -> None:

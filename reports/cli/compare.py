@@ -90,27 +90,14 @@ def _study(path: str, changes: list[str]) -> Study:
     from dataclasses import replace
 
     from actuator_lti.design import load_design, with_overrides
-    from actuator_lti.errors import InputError
     from analyses.slugs import slug
     from analyses.study import Variant, is_study, load_study, study_of
+    from reports.cli.drive import read_changes
 
     plan = load_study(path) if is_study(path) else study_of(load_design(path))
     assert plan.base.design is not None
     extra = []
     for words in dict.fromkeys(changes):
-        key, equals, value = words.partition("=")
-        if not equals:
-            raise InputError(f"--set {words!r}: allowed: KEY=VALUE")
-        overrides = {key.strip(): _value(value.strip())}
+        overrides = read_changes([words])
         extra.append(Variant(words, slug(words), with_overrides(plan.base.design, overrides), overrides))
     return replace(plan, variants=(*plan.variants, *extra))
-
-
-def _value(words: str) -> str | float | int:
-    """A plain number where it is one, else the text with its unit."""
-    for kind in (int, float):
-        try:
-            return kind(words)
-        except ValueError:
-            continue
-    return words

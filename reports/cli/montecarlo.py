@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
@@ -56,6 +57,7 @@ _SUBTITLE = "What the tolerances do to the requirements: odds, distributions, wo
 
 def montecarlo(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     samples: SamplesOption = 10_000,
     seed: SeedOption = 0,
     out: OutOption = Path("out/montecarlo"),
@@ -76,14 +78,13 @@ def montecarlo(
 
     Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
     """
-    from actuator_lti.design import load_design
     from analyses.engine import Engine
     from analyses.monte_carlo import MonteCarloSettings, StepCheck, monte_carlo, sample_folder
     from analyses.sampling import read_table
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     table = None if from_samples is None else read_table(from_samples, _varying(drive))
     check = None if step is None else StepCheck(_angle(step, drive), duration, load)
     settings = MonteCarloSettings(samples, seed, operating_point, load, check, table, worst)  # type: ignore[arg-type]

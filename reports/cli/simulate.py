@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption, QuietOption
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ EnergyOption = Annotated[bool, typer.Option("--energy", help="Say where the elec
 
 def simulate(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     command: CommandOption = "step",
     amplitude: AmplitudeOption = 1.0,
     frequency: FrequencyOption = 1.0,
@@ -85,12 +87,11 @@ def simulate(
     quiet: QuietOption = False,
 ) -> None:
     """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks."""
-    from actuator_lti.design import load_design
     from nonlinear import commands
     from nonlinear import simulate as run_simulation
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     wanted = build_command(
         drive,
         command,

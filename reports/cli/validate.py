@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption
 from reports.cli.targets import folder_for_results
 
@@ -29,6 +30,7 @@ QuickOption = Annotated[
 
 def validate(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: FolderOption = None,
     as_json: JsonOption = False,
     quick: QuickOption = False,
@@ -39,13 +41,12 @@ def validate(
     Exit status 1 if a prediction fails where it should hold, or if a command within full deflection makes the
     drive diverge. Predictions that cannot hold (friction, a limit) are shown with the reason.
     """
-    from actuator_lti.design import load_design
     from analyses.validation import QUICK, Settings
     from analyses.validation import validate as run
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     with progress(f"validating {drive.name}", quiet=quiet) as report:
         found = run(drive, QUICK if quick else Settings(), report)
     made = _document(found)
