@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import JointModel, fit_records, held_out_residual
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.refinement import refine_records
@@ -21,6 +23,7 @@ from analyses.identification.to_design import (
     joint_estimate,
     refined_estimate,
     with_fixed,
+    with_structure,
 )
 from analyses.identification.verdict import (
     RESIDUAL_LIMIT,
@@ -34,7 +37,7 @@ from analyses.identification.verdict import (
 )
 from analyses.identification.verdict import passed as all_passed
 from analyses.records.consistency import Finding, check_record
-from analyses.records.prepare import period_of, prepared
+from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
 NAMES_OF_KEYS = {
@@ -44,9 +47,14 @@ NAMES_OF_KEYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class BenchSettings:
-    """What was asked of an identification; ``fixed`` by key of the design, in SI."""
+    """What was asked of an identification; ``fixed`` by key of the design, in SI.
 
-    form: FrictionForm = "symmetric"
+    ``form`` "map": friction maps with break points are tried, and one is taken where it is clearly better.
+    ``gravity``: a pendulum at the output is looked for (it is where the design has one).
+    """
+
+    form: FrictionForm | Literal["map"] = "symmetric"
+    gravity: bool = False
     cutoff_hz: float | None = None
     decimation: int | None = None
     fixed: Mapping[str, float] = field(default_factory=dict)
@@ -69,6 +77,7 @@ class BenchResult:
     resimulated: tuple[Resimulated, ...]
     items: tuple[Item, ...]
     settings: BenchSettings
+    laws: tuple[LawChoice, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -96,14 +105,12 @@ def identify_bench(
     unseen = tuple(prepared(record) for record in validation)
     findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
     start = with_fixed(design, settings.fixed)
-    model = fit_records(
-        start, used, form=settings.form, recipe=_recipe(used[0], settings), fixed=_held(start, settings)
-    )
+    model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
     items = _fit_items(design, findings, model, settings.residual_limit)
     try:
         estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
-        made = design_with_estimate(start, estimate)
+        made = design_with_estimate(with_structure(start, model), estimate)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
@@ -112,7 +119,7 @@ def identify_bench(
         refined = refine_records(made, used, estimate.paths, progress=progress)
         made = design_with_estimate(made, refined_estimate(refined, f"{source}, refined by simulation"))
     text = write_design(made)
-    again = resimulate(read_design_text(text), (*used, *unseen), settings.form)
+    again = resimulate(read_design_text(text), (*used, *unseen), model.form)
     return BenchResult(
         records=used,
         validation=unseen,
@@ -124,26 +131,41 @@ def identify_bench(
         resimulated=again,
         items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
         settings=settings,
+        laws=laws,
     )
+
+
+def _fitted(
+    start: Design, used: Sequence[Record], settings: BenchSettings
+) -> tuple[JointModel, tuple[LawChoice, ...]]:
+    """The joint model, and the friction laws that were tried."""
+    recipe, fixed = _recipe(used[0], settings), _held(start, settings)
+    gravity = settings.gravity or start.load.gravity is not None
+    if settings.form == "map":
+        found = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
+        return found.model, found.laws
+    model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
+    return model, ()
 
 
 def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:
     if settings.cutoff_hz is None and settings.decimation is None:
         return None
-    return recipe_for(period_of(record), settings.cutoff_hz, settings.decimation)
+    return recipe_for(record, settings.cutoff_hz, settings.decimation)
 
 
 def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
     """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
     held = {}
+    form = "symmetric" if settings.form == "map" else settings.form
     for path, value in settings.fixed.items():
-        name = NAMES_OF_KEYS.get((settings.form, path))
+        name = NAMES_OF_KEYS.get((form, path))
         if path in INERTIAS:
             held["inertia"] = design.inertia_kgm2
         elif name is not None:
             held[name] = value
         else:
-            known = sorted({key for form, key in NAMES_OF_KEYS if form == settings.form} | set(INERTIAS))
+            known = sorted({key for own, key in NAMES_OF_KEYS if own == form} | set(INERTIAS))
             raise InputError(f"--fix {path}: can be fixed here: {', '.join(known)}")
     return held
 

@@ -29,15 +29,25 @@ MAX_CONDITION = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """The choices of the identification; the defaults are the published ones for EMPS."""
+    """The choices of the identification; the defaults are the published ones for EMPS.
+
+    ``skip_end_samples`` are left out at the end of a record that ends in motion: there the filter, which has
+    no further samples, bends the position. The published recipe keeps them.
+    """
 
     cutoff_hz: float = 100.0
     filter_order: int = 4
     skip_samples: int = 49
     decimation: int = 10
+    skip_end_samples: int = 0
 
     def __post_init__(self) -> None:
-        for name, low in (("filter_order", 1), ("skip_samples", 0), ("decimation", 1)):
+        for name, low in (
+            ("filter_order", 1),
+            ("skip_samples", 0),
+            ("skip_end_samples", 0),
+            ("decimation", 1),
+        ):
             if getattr(self, name) < low:
                 raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
 

@@ -46,7 +46,8 @@ class JointModel:
     """The inverse dynamic model of all records together.
 
     ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
-    and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor.
+    and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor. With
+    ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry.
 
     Attributes
     ----------
@@ -74,6 +75,7 @@ class JointModel:
     recipe: Recipe
     condition: float
     singles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    knots_rad_s: tuple[float, ...] | None = None
 
     def __getitem__(self, name: str) -> float:
         if name in self.names:
@@ -99,6 +101,7 @@ def fit_records(
     recipe: Recipe | None = None,
     fixed: Mapping[str, float] | None = None,
     gravity: bool = False,
+    knots_rad_s: Sequence[float] | None = None,
 ) -> JointModel:
     """Fit one inverse dynamic model to all records.
 
@@ -117,6 +120,8 @@ def fit_records(
         Parameters held at a value (by the names of the model).
     gravity : bool
         Whether a moment ``m g l sin(output angle + offset)`` is to be found.
+    knots_rad_s : sequence of float, optional
+        Speeds (from 0) of a friction map in the place of dry and viscous friction.
 
     Raises
     ------
@@ -132,16 +137,20 @@ def fit_records(
     model: JointModel | None = None
     for _ in range(GRAVITY_ROUNDS if gravity else 1):
         blocks = [
-            record_rows(design, record, form, recipe, gravity=gravity, moment=moment)
+            record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots_rad_s)
             for record, moment in zip(records, moments, strict=True)
         ]
-        model = _fitted(design, blocks, form, held)
+        model = replace(_fitted(design, blocks, form, held), knots_rad_s=_as_knots(knots_rad_s))
         if gravity:
             moments = [
                 model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine for block in blocks
             ]
     assert model is not None
     return model
+
+
+def _as_knots(knots_rad_s: Sequence[float] | None) -> tuple[float, ...] | None:
+    return None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
 
 
 def _fitted(
@@ -185,7 +194,7 @@ def _kept(one: NotTold) -> str:
 
 def _negative(names: tuple[str, ...], solution: Solution) -> list[str]:
     """Parameters that no drive has negative, where the records give them so."""
-    signed = ("offset", "moment_slope", "gravity_sin", "gravity_cos")
+    signed = ("offset", "gravity_sin", "gravity_cos")
     return [
         name for name, value in zip(names, solution.values, strict=True) if value < 0.0 and name not in signed
     ]
@@ -194,7 +203,7 @@ def _negative(names: tuple[str, ...], solution: Solution) -> list[str]:
 def default_value(design: Design, name: str) -> float:
     """The design's own value of a parameter of the model, at the motor."""
     friction = design.friction
-    return {
+    own = {
         "inertia": design.inertia_kgm2,
         "viscous": friction.viscous(1),
         "dry": friction.dry_Nm(0.0, 1),
@@ -204,8 +213,13 @@ def default_value(design: Design, name: str) -> float:
         "viscous_reverse": friction.viscous(-1),
         "dry_reverse": friction.dry_Nm(0.0, -1),
         "load_coefficient": friction.load_coefficient,
-        "moment_slope": design.load.moment_slope_Nm_rad,
-    }.get(name, 0.0)
+    }
+    gravity = design.load.gravity
+    if gravity is not None:
+        own["gravity_sin"] = gravity.peak_Nm * float(np.cos(gravity.offset_rad))
+        own["gravity_cos"] = gravity.peak_Nm * float(np.sin(gravity.offset_rad))
+    own |= {f"map_{k}": point.torque_Nm for k, point in enumerate(friction.map(1))}
+    return own.get(name, 0.0)
 
 
 def _target(block: Rows, fixed: Mapping[str, Fixed]) -> FloatArray:
@@ -308,11 +322,13 @@ def _part(block: Rows, rest: FloatArray) -> RecordFit:
     )
 
 
-def held_out_residual(design: Design, model: JointModel, record: Record, *, gravity: bool = False) -> float:
+def held_out_residual(design: Design, model: JointModel, record: Record) -> float:
     """Relative residual of a record that the model has not seen."""
-    block = record_rows(design, record, model.form, None, gravity=gravity)
+    gravity = "gravity_sin" in (*model.names, *model.fixed)
+    knots = model.knots_rad_s
+    block = record_rows(design, record, model.form, None, gravity=gravity, knots_rad_s=knots)
     if gravity:
         moment = model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine
-        block = record_rows(design, record, model.form, None, gravity=gravity, moment=moment)
+        block = record_rows(design, record, model.form, None, gravity=True, moment=moment, knots_rad_s=knots)
     rest = block.y - block.w @ np.array([model[name] for name in block.names])
     return float(np.linalg.norm(rest) / np.linalg.norm(block.y))

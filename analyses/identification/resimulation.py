@@ -50,7 +50,9 @@ def _simulated(design: Design, record: Record) -> Resimulated:
 
 
 def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:
-    rows = record_rows(design, record, form, None)
+    points = design.friction.map(1)
+    knots = [point.speed_rad_s for point in points] if points else None
+    rows = record_rows(design, record, form, None, knots_rad_s=knots)
     values = np.array([default_value(design, name) for name in rows.names])
     error = float(np.linalg.norm(rows.y - rows.w @ values) / np.linalg.norm(rows.y))
     return Resimulated(

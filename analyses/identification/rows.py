@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.differentiation import Motion, decimated, filtered_motion
 from analyses.identification.dynamic import NAMES, FrictionForm, Recipe, base_columns
+from analyses.identification.hats import hats
 from analyses.records.consistency import place_of
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
@@ -20,6 +21,7 @@ FloatArray = NDArray[np.float64]
 
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
+END_SHARE = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,20 +45,25 @@ class Rows:
     notes: tuple[str, ...]
 
 
-def recipe_for(period_s: float, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
+def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
     """The published recipe, moved to another sampling period.
 
-    100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; the first
-    49 ms dropped.
-
-    Examples
-    --------
-    >>> recipe_for(1e-3) == Recipe()
-    True
+    100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
+    at the start and, where a record ends in motion, at the end. The record of the EMPS benchmark has the
+    published recipe to the letter, which keeps the end.
     """
-    cutoff = min(100.0, 0.1 / period_s) if cutoff_hz is None else cutoff_hz
-    factor = max(1, round(1.0 / (cutoff * period_s))) if decimation is None else decimation
-    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=max(round(0.049 / period_s), 5))
+    period = period_of(record)
+    if cutoff_hz is None and decimation is None and is_benchmark(record):
+        return Recipe()
+    cutoff = min(100.0, 0.1 / period) if cutoff_hz is None else cutoff_hz
+    factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation
+    skip = max(round(0.049 / period), 5)
+    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip)
+
+
+def is_benchmark(record: Record) -> bool:
+    """Whether a record is that of the EMPS benchmark, which carries its force gain."""
+    return "gtau" in record.constants
 
 
 def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool]:
@@ -109,10 +116,34 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
 
 
-def moment_of(design: Design, record: Record) -> tuple[FloatArray, str] | None:
-    """The recorded load at the output and its signal; None without one."""
+def moment_of(
+    design: Design, record: Record, output_angle: FloatArray, *, gravity: bool = True
+) -> tuple[FloatArray, str]:
+    """The moment at the output and the signal that it comes from.
+
+    Without a recorded one, that of the design's own slope and (with ``gravity``) pendulum at the recorded
+    angle; the signal is then empty.
+    """
     name = "load_force" if design.axis == "linear" else "torque"
-    return (record[name], name) if name in record.signals else None
+    if name in record.signals:
+        return record[name], name
+    load = design.load
+    moment = load.moment_slope_Nm_rad * output_angle
+    if gravity and load.gravity is not None:
+        moment = moment + load.gravity.peak_Nm * np.sin(output_angle + load.gravity.offset_rad)
+    return np.asarray(moment), ""
+
+
+def _friction_columns(
+    motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
+) -> tuple[list[str], FloatArray]:
+    """Names and columns of inertia, friction and offset."""
+    if knots_rad_s is None:
+        return list(NAMES[form]), base_columns(motion, form)
+    side = np.sign(motion.velocity)
+    table = hats(np.abs(motion.velocity), knots_rad_s) * side[:, None]
+    names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
+    return names, np.column_stack([motion.acceleration, table, np.ones_like(side)])
 
 
 def record_rows(
@@ -123,6 +154,7 @@ def record_rows(
     *,
     gravity: bool = False,
     moment: FloatArray | None = None,
+    knots_rad_s: Sequence[float] | None = None,
 ) -> Rows:
     """Make the rows of one record.
 
@@ -130,27 +162,35 @@ def record_rows(
     ----------
     gravity : bool
         Adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output.
+    knots_rad_s : sequence of float, optional
+        Speeds of a friction map, which takes the place of the form's dry and viscous friction.
     moment : array, optional
         That moment after decimation, as found so far, for the load's share of the friction.
     """
     record = prepared(record)
-    recipe = recipe_for(period_of(record)) if recipe is None else recipe
+    recipe = recipe_for(record) if recipe is None else recipe
     motion, place = motion_of(design, record, recipe)
-    drive, source, told, back_emf = drive_of(design, record)
-    names, columns = list(NAMES[form]), base_columns(motion, form)
-    used = {place: "motion", source: f"drive: {told}"}
+    drive, driven_by, told, back_emf = drive_of(design, record)
+    names, columns = _friction_columns(motion, form, knots_rad_s)
+    used = {place: "motion", driven_by: f"drive: {told}"}
     if back_emf:
         drive = drive - _damping(design) * motion.velocity
-    load = moment_of(design, record)
     angle = motion.position / design.total_ratio
     free = design.load.path == "back-drivable"
-    known = np.zeros(len(drive)) if load is None else load[0]
-    if load is not None:
-        used[load[1]] = "load" + (", its friction and its torque M/N" if free else ", its friction")
-        drive = drive + known / design.total_ratio if free else drive
+    if gravity and not free:
+        raise InputError(
+            'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
+        )
+    known, source = moment_of(design, record, angle, gravity=not gravity)
+    if source:
+        used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
+    if free:
+        drive = drive + known / design.total_ratio
     sines = np.column_stack([np.sin(angle), np.cos(angle)])
-    table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])[recipe.skip_samples :]
-    moving = ~_at_rest(motion.velocity, period_of(record))[recipe.skip_samples :]
+    table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
+    moving = ~_at_rest(motion.velocity, period_of(record))
+    used_part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
+    table, moving = table[used_part], moving[used_part]
     rows = decimated(table, recipe.decimation)
     keep = _kept_rows(moving, recipe.decimation)
     width = columns.shape[1]
@@ -175,6 +215,13 @@ def record_rows(
         used=used,
         notes=(*record.notes, f"{place} and {told}"),
     )
+
+
+def _end_skip(motion: Motion, recipe: Recipe) -> int:
+    """Samples to leave out at the end: those of the recipe, where the record ends in motion."""
+    speed = np.abs(motion.velocity)
+    moving = float(speed[-1]) > END_SHARE * float(np.max(speed))
+    return recipe.skip_end_samples if moving and len(speed) > 4 * recipe.skip_end_samples else 0
 
 
 def _damping(design: Design) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.design import with_values
 from actuator_lti.design.fields import field_of
-from actuator_lti.design.model import Correlation, Design, Tolerance
+from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from analyses.identification.inverse import JointModel
@@ -57,6 +57,12 @@ KEYS = {
     "load_coefficient": "friction.load_coefficient",
 }
 """The design's key of each parameter of an inverse model; the inertia has a choice."""
+PLAIN_KEYS = (
+    "friction.viscous",
+    "friction.dry_torque",
+    "friction.viscous_reverse",
+    "friction.dry_torque_reverse",
+)
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
@@ -73,22 +79,67 @@ def joint_estimate(
     InputError
         If the design's other inertias alone exceed the identified one.
     """
+    found = dict(zip(model.names, model.values.tolist(), strict=True))
     paths: list[str] = []
     values: list[float] = []
-    scales: list[float] = []
-    for name, value in zip(model.names, model.values, strict=True):
+    slopes = np.zeros((0, len(model.names)))
+
+    def add(path: str, value: float, **slope: float) -> None:
+        nonlocal slopes
+        paths.append(path)
+        values.append(value)
+        row = [slope.get(name, 0.0) for name in model.names]
+        slopes = np.vstack([slopes, row])
+
+    for name, value in found.items():
         if name == "inertia":
-            given, scale = inertia_share(design, float(value), inertia_to)
-            paths.append(inertia_to)
-            values.append(given)
-            scales.append(scale)
+            given, scale = inertia_share(design, value, inertia_to)
+            add(inertia_to, given, inertia=scale)
         elif name in KEYS:
-            paths.append(KEYS[name])
-            values.append(float(value))
-            scales.append(1.0)
-    rows = [k for k, name in enumerate(model.names) if name == "inertia" or name in KEYS]
-    covariance = model.covariance[np.ix_(rows, rows)] * np.outer(scales, scales)
+            add(KEYS[name], value, **{name: 1.0})
+        elif name.startswith("map_"):
+            add(f"friction.point.{int(name[4:]) + 1}.torque", value, **{name: 1.0})
+    if {"gravity_sin", "gravity_cos"} <= set(found):
+        _add_gravity(design, found["gravity_sin"], found["gravity_cos"], add)
+    covariance = slopes @ model.covariance @ slopes.T
     return Estimate(paths=tuple(paths), values=np.array(values), covariance=covariance, source=source)
+
+
+def _add_gravity(design: Design, a: float, b: float, add: Callable[..., None]) -> None:
+    """Mass and offset of the pendulum of ``a sin(phi) + b cos(phi)``; the arm is the design's, or 1 m."""
+    peak = float(np.hypot(a, b))
+    arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
+    per_mass = Gravity(mass_kg=1.0, arm_m=arm).peak_Nm
+    add(
+        "load.gravity.mass",
+        peak / per_mass,
+        gravity_sin=a / peak / per_mass,
+        gravity_cos=b / peak / per_mass,
+    )
+    add("load.gravity.offset", float(np.arctan2(b, a)), gravity_sin=-b / peak**2, gravity_cos=a / peak**2)
+
+
+def with_structure(design: Design, model: JointModel) -> Design:
+    """The design with the parts that a model's values need: a friction map, a pendulum."""
+    friction, load = design.friction, design.load
+    gone = [path for path in design.parameters if path.startswith("friction.point.")]
+    if model.knots_rad_s is not None:
+        points = tuple(
+            FrictionPoint(speed_rad_s=_short(speed), torque_Nm=max(model[f"map_{k}"], 0.0))
+            for k, speed in enumerate(model.knots_rad_s)
+        )
+        friction = replace(friction, points=points, dry_torque_Nm=0.0, viscous_Nms_rad=0.0)
+        friction = replace(friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
+        gone += [path for path in design.parameters if path in PLAIN_KEYS]
+    elif friction.points and "dry" in model.names:
+        friction = replace(friction, points=())
+    if "gravity_sin" in model.names and load.gravity is None:
+        load = replace(load, gravity=Gravity(mass_kg=1.0, arm_m=1.0))
+    if friction is design.friction and load is design.load:
+        return design
+    kept = {path: one for path, one in design.parameters.items() if path not in gone}
+    pairs = tuple(c for c in design.correlations if not {c.first, c.second} & set(gone))
+    return replace(design, friction=friction, load=load, parameters=FrozenMap(kept), correlations=pairs)
 
 
 def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, float]:
@@ -153,6 +204,8 @@ def design_with_estimate(design: Design, estimate: Estimate, *, name: str | None
     try:
         changed = with_values(design, values)
     except InputError as error:
+        if not error.message.startswith(estimate.paths):
+            raise
         raise InputError(
             f"identified {error.message}; the record does not tell it: it takes a longer motion,"
             " at several speeds in both directions"

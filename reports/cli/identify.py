@@ -68,7 +68,15 @@ DesignOption = Annotated[
     ),
 ]
 FrictionOption = Annotated[
-    str, typer.Option("--friction", metavar="FORM", help="Of records: symmetric or per-direction.")
+    str,
+    typer.Option(
+        "--friction",
+        metavar="FORM",
+        help="Of records: symmetric, per-direction, or map (over the speed, where it is clearly better).",
+    ),
+]
+GravityOption = Annotated[
+    bool, typer.Option("--gravity", help="Of records: look for a pendulum at the output, m g l sin(angle).")
 ]
 RefineOption = Annotated[
     bool,
@@ -119,6 +127,7 @@ def identify(
     seed: SeedOption = 0,
     force: ForceOption = False,
     friction: FrictionOption = "symmetric",
+    gravity: GravityOption = False,
     refine: RefineOption = False,
     cutoff: CutoffOption = None,
     decimation: DecimationOption = None,
@@ -165,6 +174,8 @@ def identify(
         as_json=as_json,
         quiet=quiet,
     )
+    if friction not in ("symmetric", "per-direction", "map"):
+        raise InputError(f"--friction {friction}: symmetric, per-direction or map")
     if example:
         _print_example()
     elif bool(given) == (virtual_bench is not None):
@@ -178,6 +189,7 @@ def identify(
     else:
         settings = {
             "form": friction,
+            "gravity": gravity,
             "cutoff_hz": cutoff,
             "decimation": decimation,
             "inertia_to": inertia_to,

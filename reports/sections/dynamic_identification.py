@@ -34,6 +34,8 @@ def section(result: BenchResult, axis: str) -> dict[str, Any]:
     blocks = [verdict_block(result.items), parameter_table(result, axis)]
     if result.refined is not None:
         blocks.append(refined_table(result))
+    if result.laws:
+        blocks.append(law_table(result, axis))
     blocks += fixed_blocks(result.model, axis)
     if len(result.records) > 1:
         blocks.append(scatter_table(result.model, axis))
@@ -69,6 +71,8 @@ def _intro(result: BenchResult) -> str:
 
 def _label(name: str, axis: str) -> tuple[str, str]:
     side = 2 if axis == "linear" else 0
+    if name.startswith("map_"):
+        return f"Friction map, point {int(name[4:]) + 1}", "N" if axis == "linear" else "N m"
     label, unit = LABELS[name][side : side + 2]
     return label, unit
 
@@ -121,6 +125,35 @@ def refined_table(result: BenchResult) -> dict[str, Any]:
         f"{refined.iterations} iterations. These values are the design's."
     )
     return doc.table("Refined by simulation", columns, rows, note)
+
+
+def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
+    """The friction laws that were tried, by the Bayesian criterion."""
+    unit = "m/s" if axis == "linear" else "rad/s"
+    columns = [
+        doc.column("name", "Law"),
+        doc.column("breaks", f"Break points, {unit}"),
+        doc.column("parameters", "Parameters", format="short:3"),
+        doc.column("residual", "Relative residual", "%", format="sig:4"),
+        doc.column("criterion", "Criterion", format="fix:1"),
+        doc.column("taken", "Taken"),
+    ]
+    rows = [
+        {
+            "name": law.name,
+            "breaks": ", ".join(f"{speed:.4g}" for speed in law.breaks_rad_s) or "–",
+            "parameters": law.parameters,
+            "residual": 100.0 * law.relative_residual,
+            "criterion": law.criterion,
+            "taken": "yes" if law.taken else "no",
+        }
+        for law in result.laws
+    ]
+    note = (
+        "Criterion: n ln(mean square of the residual) + p ln n (Bayesian information criterion), n the rows "
+        "worth one independent one, less that of the plain law. A map is taken where it is below -6."
+    )
+    return doc.table("Friction laws", columns, rows, note)
 
 
 def fixed_blocks(model: JointModel, axis: str) -> list[dict[str, Any]]:

@@ -64,7 +64,8 @@ def _named(path: Path) -> Path:
     savemat(path / "s.mat", {"X": TABLE})
     (path / "r.toml").write_text(
         'file = "s.mat"\nmatrix = "X"\nnames = ["a", "b", "c"]\ntime = { column = "a", unit = "ms" }\n'
-        'signals.motor_angle = { column = "b", unit = "deg" }\nsignals.current = { column = 3, unit = "mA" }\n'
+        'signals.motor_angle = { column = "b", unit = "deg" }\n'
+        'signals.current = { column = 3, unit = "mA" }\n'
     )
     return path / "r.toml"
 
@@ -127,7 +128,8 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path: 
 def test_rms_and_phase_values_become_peak_between_lines(options: str, factor: float, tmp_path: Path) -> None:
     (tmp_path / "r.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
     (tmp_path / "r.toml").write_text(
-        f'file = "r.csv"\ntime = {{ column = "t" }}\nsignals.voltage = {{ column = "u", unit = "V"{options} }}\n'
+        'file = "r.csv"\ntime = { column = "t" }\n'
+        f'signals.voltage = {{ column = "u", unit = "V"{options} }}\n'
     )
     record = open_record(tmp_path / "r.toml")
     assert record["voltage"] == pytest.approx(factor * np.arange(9.0))
