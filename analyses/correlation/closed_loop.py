@@ -153,7 +153,7 @@ def measured_signals(
     for name in [name for name, values in found.items() if not np.any(values)]:
         del found[name]
         notes.append(f"{name} is zero throughout: not compared")
-    gain = design.motor.source_gain_Nm_V
+    gain = design.effective_motor.source_gain_Nm_V
     if design.axis == "linear":
         place, rate = "position", "velocity"
         if "force" not in found and "voltage" in found and gain is not None:
@@ -216,7 +216,7 @@ def model_signals(
         initial=_initial(design, measured),
         progress=progress,
     )
-    gain = design.motor.source_gain_Nm_V
+    gain = design.effective_motor.source_gain_Nm_V
     series = {
         "angle": run.motor_angle_rad,
         "output_angle": run.output_angle_rad,

@@ -70,7 +70,7 @@ def identify_campaign(
     InputError
         Without a torque constant, or with too few usable runs; the reasons of those set aside are told.
     """
-    constant = design.motor.torque_constant_Nm_A
+    constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         raise InputError(
             "motor.torque_constant: the design has none, so currents cannot become torques", design.name

@@ -27,7 +27,7 @@ def steady_current_error(
     """
     from nonlinear import commands, simulate
 
-    constant = design.motor.torque_constant_Nm_A
+    constant = design.effective_motor.torque_constant_Nm_A
     duration = RUN_UP_S + STEADY_S
     period = design.controller.period_s
     if constant is None or duration / period > MOST_TICKS:

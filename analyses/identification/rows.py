@@ -75,7 +75,7 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
     InputError
         If the record holds no drive signal that the design makes a torque of.
     """
-    motor, signals = design.motor, record.signals
+    motor, signals = design.effective_motor, record.signals
     constant, gain, ohm = motor.torque_constant_Nm_A, motor.source_gain_Nm_V, motor.resistance_ohm
     if "force" in signals and design.axis == "linear":
         return record["force"], "force", "recorded force", False
@@ -226,7 +226,7 @@ def _end_skip(motion: Motion, recipe: Recipe) -> int:
 
 def _damping(design: Design) -> float:
     """What the back-EMF of a motor on a voltage adds to the viscous friction, kM kE / R."""
-    motor = design.motor
+    motor = design.effective_motor
     constant, back, ohm = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad, motor.resistance_ohm
     assert constant is not None
     assert ohm is not None

@@ -236,7 +236,7 @@ def _signals(table: Table) -> tuple[SignalColumn, ...]:
                 unit=unit,
                 scale=one.number("scale", 1.0) or 0.0,
                 offset=one.number("offset", 0.0) or 0.0,
-                value=one.text("value", "peak", ("peak", "rms")),
+                value=one.text("value", "dc", ("dc", "rms", "peak")),
                 between=one.text("between", "line-line", ("line-line", "phase")),
             )
         )

@@ -141,7 +141,7 @@ def _reduction(design: Design, record: Record) -> Finding | None:
 
 
 def _electrical(design: Design, record: Record) -> Finding | None:
-    motor = design.motor
+    motor = design.effective_motor
     if motor.resistance_ohm is None or motor.back_emf_constant_Vs_rad is None:
         return None
     if not {"voltage", "current", "speed"} <= set(record.signals):
@@ -222,7 +222,7 @@ def _largest(values: FloatArray) -> float:
 def _current_limit(design: Design, record: Record) -> Finding | None:
     if "current" not in record.signals:
         return None
-    motor, limits = design.motor, design.limits
+    motor, limits = design.effective_motor, design.limits
     limit = limits.peak_current_A
     if not isfinite(limit) and motor.resistance_ohm is not None:
         limit = 2.0 * limits.voltage_V / motor.resistance_ohm
@@ -233,7 +233,7 @@ def _speed_limit(design: Design, record: Record) -> Finding | None:
     name, unit = ("velocity", "m/s") if design.axis == "linear" else ("speed", "rad/s")
     if name not in record.signals:
         return None
-    kE = design.motor.back_emf_constant_Vs_rad
+    kE = design.effective_motor.back_emf_constant_Vs_rad
     limit = min(design.limits.speed_rad_s, inf if kE is None else design.limits.voltage_V / kE)
     return _within(f"{name} against its limit", name, _largest(record[name]), limit, unit)
 

@@ -19,6 +19,8 @@ _PLAIN = {
     6.0: "6 (rpm read as deg/s, or the reverse)",
     sqrt(2.0): "root 2 (rms read as peak, or the reverse)",
     sqrt(3.0): "root 3 (line to line read as phase, or the reverse)",
+    sqrt(1.5): "root 3/2 (rms of AC read as the equivalent DC, or the reverse)",
+    2.0 / sqrt(3.0): "2/root 3 (peak of AC read as the equivalent DC, or the reverse)",
     1.3558179483314: "1.356 (lbf ft read as N m, or the reverse)",
     141.61193227806: "141.6 (ozf in read as N m, or the reverse)",
 }

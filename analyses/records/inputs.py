@@ -78,4 +78,4 @@ def _signal(column: str, why: dict[str, str]) -> SignalColumn | None:
     if found is None:
         why[column] = "no name and unit that are known together"
         return None
-    return SignalColumn(name=found.name, column=column, unit=parts.unit, value="rms" if parts.rms else "peak")
+    return SignalColumn(name=found.name, column=column, unit=parts.unit, value="rms" if parts.rms else "dc")

@@ -11,7 +11,11 @@ from analyses.records.record import RESAMPLE_TOLERANCE
 Policy = Literal["error", "drop"]
 
 MISSING_TEXTS = ("", "nan", "NaN", "NAN", "na", "NA", "N/A", "null", "NULL", "-")
-TO_PEAK = 2.0**0.5
+AC_FORMS = {
+    "A": {"dc": 1.0, "rms": 1.5**0.5, "peak": 0.75**0.5},
+    "V": {"dc": 1.0, "rms": 2.0**0.5, "peak": 1.0},
+}
+"""Factors to the equivalent DC motor (`Design.effective_motor`): i from a line current, u from line-line."""
 TO_LINE = 3.0**0.5
 
 
@@ -104,9 +108,9 @@ class TimeColumn:
 class SignalColumn:
     """One signal: its name in the analyses, its column (name, or number from 1), its unit.
 
-    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. The model counts peak values, and
-    voltages between lines: ``value = "rms"`` multiplies by the root of 2, ``between = "phase"`` (phase to
-    star point, of a voltage) by the root of 3.
+    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. The model has the equivalent DC
+    motor: of an AC motor ``value`` tells whether a line current or a voltage was written as ``rms`` or
+    ``peak``, and ``between = "phase"`` that a voltage is that of a phase to the star point.
     """
 
     name: str
@@ -114,11 +118,11 @@ class SignalColumn:
     unit: str = "1"
     scale: float = 1.0
     offset: float = 0.0
-    value: str = "peak"
+    value: str = "dc"
     between: str = "line-line"
 
     def __post_init__(self) -> None:
-        for key, allowed in (("value", ("peak", "rms")), ("between", ("line-line", "phase"))):
+        for key, allowed in (("value", ("dc", "rms", "peak")), ("between", ("line-line", "phase"))):
             if getattr(self, key) not in allowed:
                 told = " or ".join(f'"{choice}"' for choice in allowed)
                 raise InputError(f'signals.{self.name}.{key} = "{getattr(self, key)}": {told}')
@@ -126,7 +130,7 @@ class SignalColumn:
     @property
     def note(self) -> str:
         """What is done beside the conversion of the unit; empty for nothing."""
-        parts = ["rms, times root 2"] if self.value == "rms" else []
+        parts = [] if self.value == "dc" else [f"{self.value} of AC, as the equivalent DC motor has it"]
         parts += ["of a phase, times root 3"] if self.between == "phase" else []
         parts += [f"scale {self.scale:g}"] if self.scale != 1.0 else []
         parts += [f"offset {self.offset:g}"] if self.offset != 0.0 else []

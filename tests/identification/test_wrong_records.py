@@ -143,7 +143,7 @@ def test_every_column_is_accounted_for(
         ('signals.banana = { column = "current_A", unit = "A" }', "signals.banana: no signal that is known"),
         ('signals.curent = { column = "current_A", unit = "A" }', 'did you mean "current"?'),
         ('signals.current = { column = "current_A", unit = "V" }', "must be a unit like A"),
-        ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of peak, rms"),
+        ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
     ],
 )
 def test_a_signal_that_nothing_reads_is_refused(
