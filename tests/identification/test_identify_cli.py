@@ -82,7 +82,7 @@ def test_emps_on_the_command_line(
     assert found["rows_in"] == 24841
     assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.28, abs=0.05)
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
-    signals = json.loads(out)[0]["signals"]
+    signals = json.loads(out)["records"][0]["signals"]
     assert status == 0
     assert 100.0 * signals["force"]["relative_error"] < 5.848
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
