@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, log, pi, prod, sin
-from typing import Literal
+from math import inf, log, pi, prod, sin, sqrt
+from typing import Any, Literal
 
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
@@ -21,6 +21,7 @@ LoadPath = Literal["self-locking", "back-drivable"]
 SpeedSource = Literal["ideal", "difference", "tracking"]
 Sensor = Literal["motor", "output"]
 Direction = Literal["both", "forward", "reverse"]
+MotorConstants = Literal["dc", "rms-line", "peak-phase"]
 AntiWindup = Literal["conditional", "clamped", "back-calculation"]
 FilterKind = Literal["lowpass", "notch", "leadlag", "biquad"]
 FilterPlace = Literal["torque", "speed"]
@@ -44,6 +45,7 @@ class Motor:
     torque_constant_Nm_A: float | None = None
     back_emf_constant_Vs_rad: float | None = None
     source_gain_Nm_V: float | None = None
+    constants: MotorConstants = "dc"
 
     @property
     def has_electrical_dynamics(self) -> bool:
@@ -59,6 +61,22 @@ class Gear:
     ratio: float
     input_inertia_kgm2: float = 0.0
     output_inertia_kgm2: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screw:
+    """A screw, rack or belt between a rotary motor and a linear axis: travel per revolution.
+
+    It lets the motor's data sheet stand in its own units: with p = lead/2 pi a torque T is the force T/p, an
+    angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
+    """
+
+    lead_m: float
+
+    @property
+    def travel_m_rad(self) -> float:
+        """p, travel per radian."""
+        return self.lead_m / (2.0 * pi)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -249,7 +267,7 @@ class CurrentLoop:
     """
 
     gain_V_A: float
-    integral_time_s: float | None
+    integral_time_s: float | None = None
     back_emf_feedforward: float = 0.0
     resistance_feedforward: float = 0.0
     anti_windup: AntiWindup = "conditional"
@@ -406,6 +424,11 @@ class Temperature:
     thermal_time_s: float | None = None
 
 
+def default_deflection(axis: Axis) -> float:
+    """Full deflection where a design states none: 10 deg, or 0.01 m on a linear axis."""
+    return 0.01 if axis == "linear" else 0.17453292519943295
+
+
 @dataclass(frozen=True, kw_only=True)
 class Validation:
     """What the validator and the report are to look at: deflections (output side) and hinge moments."""
@@ -528,6 +551,7 @@ class Design:
     friction: Friction = field(default_factory=Friction)
     encoder: Encoder = field(default_factory=Encoder)
     output_encoder: OutputEncoder = field(default_factory=OutputEncoder)
+    screw: Screw | None = None
     coupling: Coupling | None = None
     command: Command = field(default_factory=Command)
     supply: Supply | None = None
@@ -542,6 +566,37 @@ class Design:
     revision: str = ""
     description: str = ""
     origin: str = ""
+
+    def with_values(self, values: Mapping[str, Any]) -> Design:
+        """A copy with some keys changed, as a design file would write them.
+
+        Parameters
+        ----------
+        values : mapping of dotted key to value
+            Text with its unit (``"90 1/s"``), or a number in SI; other keys take text, lists and tables.
+            A changed value says in its source what it was; a tolerance in percent follows it.
+
+        Returns
+        -------
+        Design
+            Checked like a file.
+
+        Raises
+        ------
+        InputError
+            For an unknown key, a wrong unit, or values that contradict each other.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> design = load_design("ilr33-amber")
+        >>> better = design.with_values({"control.position.gain": "90 1/s", "limits.voltage": 24.0})
+        >>> better.controller.position.gain, better.parameters["limits.voltage"].source
+        (90.0, 'changed from 12 V')
+        """
+        from actuator_lti.design.writing import with_overrides, with_units
+
+        return with_overrides(self, with_units(self, values))
 
     @property
     def total_ratio(self) -> float:
@@ -567,18 +622,18 @@ class Design:
 
     @property
     def angle_quantum_rad(self) -> float | None:
-        """One encoder count at the motor, in rad (linear axis: counts per metre, so in m); None without."""
-        return self._quantum(self.encoder.counts_per_rev)
+        """One encoder count at the motor, in rad (linear axis: in m, of a screw's lead or of a metre)."""
+        return self._quantum(self.encoder.counts_per_rev, self.screw.lead_m if self.screw else 1.0)
 
     @property
     def output_quantum_rad(self) -> float | None:
         """One count of the output's encoder at the output shaft, in rad or m; None without."""
         return self._quantum(self.output_encoder.counts_per_rev)
 
-    def _quantum(self, counts: int | None) -> float | None:
+    def _quantum(self, counts: int | None, travel_m: float = 1.0) -> float | None:
         if counts is None:
             return None
-        return (1.0 if self.axis == "linear" else 2.0 * pi) / counts
+        return (travel_m if self.axis == "linear" else 2.0 * pi) / counts
 
     @property
     def inertia_kgm2(self) -> float:
@@ -598,22 +653,41 @@ class Design:
 
     @property
     def effective_motor(self) -> Motor:
-        """The motor at its winding and magnet temperature; the data-sheet motor where none is stated."""
-        heat, motor = self.temperature, self.motor
-        if heat is None or motor.resistance_ohm is None:
+        """The motor as the model has it: one constant k, phase-phase R and L, at its temperature.
+
+        An AC servo motor becomes the DC motor of the same torque, losses and voltage limit, with u the peak
+        line-line voltage and i = sqrt(3/2) I_rms = (sqrt(3)/2) I_peak: then P = k i w, R and L are the
+        line-line values, and the bus voltage limits u.
+        """
+        motor = self.motor
+        if motor.resistance_ohm is None:
             return motor
-        magnet = 1.0 + heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
-        winding = 1.0 + heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
+        torque, voltage, impedance = _EQUIVALENT[motor.constants]
+        winding = magnet = 1.0
+        if self.temperature is not None:
+            heat = self.temperature
+            magnet += heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
+            winding += heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
         return replace(
             motor,
-            resistance_ohm=motor.resistance_ohm * winding,
-            torque_constant_Nm_A=_times(motor.torque_constant_Nm_A, magnet),
-            back_emf_constant_Vs_rad=_times(motor.back_emf_constant_Vs_rad, magnet),
+            resistance_ohm=_times(motor.resistance_ohm, impedance * winding),
+            inductance_H=_times(motor.inductance_H, impedance),
+            torque_constant_Nm_A=_times(motor.torque_constant_Nm_A, torque * magnet),
+            back_emf_constant_Vs_rad=_times(motor.back_emf_constant_Vs_rad, voltage * magnet),
+            constants="dc",
         )
 
 
+# factors on kM, on kE, and on R and L, from the data sheet to the equivalent DC motor
+_EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
+    "dc": (1.0, 1.0, 1.0),
+    "rms-line": (1.0 / sqrt(1.5), sqrt(2.0), 1.0),
+    "peak-phase": (2.0 / sqrt(3.0), sqrt(3.0), 2.0),
+}
+
+
 def _times(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor
+    return value if value is None or factor == 1.0 else value * factor
 
 
 def _train_inertia(gears: tuple[Gear, ...]) -> float:

@@ -29,9 +29,7 @@ _GAINS = np.geomspace(1.0, 1e4, 401)
 _DELAY_STEPS_A_TICK = 4
 
 
-def phase_blocks(
-    program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0
-) -> list[Block]:
+def phase_blocks(program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0) -> list[Block]:
     """From an input held `every` ticks to a signal, one block for each such time within one period."""
     ticks = [program.tick(k) for k in range(program.ticks)]
     return [

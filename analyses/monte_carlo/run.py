@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
+from actuator_lti.bounds import SAMPLES
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 _WORST_KEPT = 8
-MOST_SAMPLES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,11 @@ class MonteCarloSettings:
     chunk: int = CHUNK
 
     def __post_init__(self) -> None:
-        if not 1 <= self.samples <= MOST_SAMPLES:
-            raise InputError(f"samples = {self.samples}: from 1 to {MOST_SAMPLES}")
+        SAMPLES.check(self.samples)
+        if self.samples < 1:
+            raise InputError(f"samples = {self.samples}: at least 1")
+        if self.seed < 0:
+            raise InputError(f"seed = {self.seed}: 0 or more")
         if not 1 <= self.chunk <= 1_000_000:
             raise InputError(f"chunk = {self.chunk}: from 1 to 1000000")
 

@@ -77,6 +77,11 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
         values[path] = nominal * 10 ** rng.uniform(-decades, decades, count)
     if design.command.filter_time_s:
         values["control.period"] = np.minimum(values["control.period"], 3e-4)
+    for path in values:  # what a filter may be is bounded by its period
+        if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
+            velocity = design.controller.velocity
+            assert velocity is not None
+            values[path] = np.minimum(values[path], 2.5 / (velocity.every * values["control.period"]))
     return values
 
 
