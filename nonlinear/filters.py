@@ -10,7 +10,9 @@ from actuator_lti.errors import InputError
 Section = tuple[float, float, float, float, float]
 
 
-def tustin(b: tuple[float, float, float], a: tuple[float, float, float], w0: float, period_s: float) -> Section:
+def tustin(
+    b: tuple[float, float, float], a: tuple[float, float, float], w0: float, period_s: float
+) -> Section:
     """``(b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0)`` sampled by ``s = c (z - 1)/(z + 1)``, exact at w0.
 
     ``c = w0/tan(w0 T/2)``; coefficients are those of falling powers of s.

@@ -191,7 +191,9 @@ def _position(design: Design, row: Floats) -> None:
     row[at.DERIVATIVE] = loop.gain * loop.derivative_time_s
     row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
     row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
-    row[at.ACCELERATION_FEEDFORWARD] = loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+    row[at.ACCELERATION_FEEDFORWARD] = (
+        loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+    )
     if loop.sensor == "output":
         row[at.OUTPUT_SENSOR] = 1.0
         quantum = design.output_quantum_rad
@@ -202,7 +204,9 @@ def _torque_gain(row: Floats) -> float:
     """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
     if row[at.SOURCE]:
         return float(row[at.SOURCE_GAIN])
-    return float(row[at.TORQUE_CONSTANT] if row[at.HAS_CURRENT] else row[at.TORQUE_CONSTANT] / row[at.RESISTANCE])
+    return float(
+        row[at.TORQUE_CONSTANT] if row[at.HAS_CURRENT] else row[at.TORQUE_CONSTANT] / row[at.RESISTANCE]
+    )
 
 
 def _encoder(design: Design, row: Floats, period_s: float) -> None:

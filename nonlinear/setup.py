@@ -40,6 +40,13 @@ class Tables:
             self.known[id(key)] = place
         return place
 
+    def append(self, other: Tables) -> int:
+        """Append all series of another set; returns where they begin."""
+        base = self.size
+        self.parts.extend(other.parts)
+        self.size += other.size
+        return base
+
     def joined(self) -> Floats:
         """One array for the kernel."""
         return np.concatenate(self.parts) if self.parts else np.zeros(1)

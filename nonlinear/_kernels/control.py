@@ -6,10 +6,17 @@ It is a function of its own: with measurements written into ``io`` it runs witho
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar, woven
 from nonlinear._kernels.estimate import measured_speed
 from nonlinear._kernels.filters import chain
-from nonlinear._kernels.position import limited, outer_rare, probed_output, put_current, put_outer, put_voltage
+from nonlinear._kernels.position import (
+    limited,
+    outer_rare,
+    probed_output,
+    put_current,
+    put_outer,
+    put_voltage,
+)
 from nonlinear._kernels.probes import PROBE_Y
 from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
 
@@ -113,7 +120,7 @@ def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     put_voltage(p, s, io, out)
 
 
-@inlined
+@woven
 def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:

@@ -123,6 +123,7 @@ from __future__ import annotations
     GRAVITY_ANGLE,  # offset
     COMMAND,  # first of SIGNAL_SIZE numbers
 ) = range(109)
+COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
 SIGNAL_SIZE = 8
@@ -261,6 +262,7 @@ TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
     S_EVENTS,  # in all
     S_MAX_EVENTS,  # most in one tick
 ) = range(50)
+STATE_NAMES = frozenset(name for name in dir() if name.startswith("S_"))
 S_NOISE = S_MAX_EVENTS + 1  # four random streams of two numbers: current, angle, output angle, jitter
 NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)
 S_ENERGY = S_NOISE + 8

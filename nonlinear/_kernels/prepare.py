@@ -6,10 +6,8 @@ import math
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import entry, scalar
-from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.expm import transition
 from nonlinear._kernels.modal import COMPLEX, describe
-from nonlinear._kernels.smooth import prepare_tanh
 
 
 @entry
@@ -57,18 +55,18 @@ def any_of(p, first, count):  # type: ignore[no-untyped-def]
 @scalar
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
-    more = max(any_of(p, layout.POSITION_INTEGRAL, int(2)), any_of(p, layout.OUTPUT_SENSOR, int(4)))
+    more = max(any_of(p, layout.POSITION_INTEGRAL, 2), any_of(p, layout.OUTPUT_SENSOR, 4))
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, int(1))))
+    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, 1)))
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
     p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
-    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, int(2)), any_of(p, layout.TORQUE_FILTERS, int(1)))
-    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, int(1)))
-    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, int(2)), any_of(p, layout.CURRENT_WINDUP, int(1)))
+    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, 2), any_of(p, layout.TORQUE_FILTERS, 1))
+    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, 1))
+    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, 2), any_of(p, layout.CURRENT_WINDUP, 1))
     p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
     more = max(p[layout.SUPPLY], p[layout.OUTPUT_SENSOR])
-    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, int(5)))
+    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, 5))
     tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
     varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
     p[layout.RARE_LOAD] = 1.0 if varying else 0.0
@@ -102,11 +100,10 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
 
 @entry
 def prepare(p, s):  # type: ignore[no-untyped-def]
-    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space."""
+    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space.
+
+    With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`.
+    """
     prepare_periods(p)
     prepare_gates(p)
     prepare_plant(p, s)
-    if p[layout.WITH_ENERGY] > 0.0:
-        prepare_forms(p, s)
-    if p[layout.LAW] > 0.0:
-        prepare_tanh(p, s)

@@ -1,4 +1,4 @@
-"""What lies between the plant and the controller's eyes: noise, resolution, jitter, and the supply's voltage."""
+"""What lies between plant and controller: noise, resolution, jitter, and the supply's voltage."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def slopes(p, s):  # type: ignore[no-untyped-def]
 
 @scalar
 def supply(p, s):  # type: ignore[no-untyped-def]
-    """Bus voltage of this tick (model.md section 6), from voltage and current of the motor; also its energies."""
+    """Bus voltage of this tick from voltage and current of the motor (model.md section 6)."""
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
     power, Ts = s[layout.S_VOLTAGE] * s[layout.S_CURRENT], p[layout.PERIOD]
     i_b = power / U if U > 0.0 else 0.0
