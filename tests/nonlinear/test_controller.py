@@ -60,46 +60,82 @@ def some_drive(rng: np.random.Generator) -> Design:
         pick(True, True, False),
     )
     cascade = CurrentLoop(
-        gain_V_A=wide, integral_time_s=pick(None, 20 * Ts), back_emf_feedforward=pick(0.0, 0.7), resistance_feedforward=pick(0.0, 0.5),
-        anti_windup=pick(*laws), tracking_time_s=pick(None, 7 * Ts),
-    )  # fmt: skip
+        gain_V_A=wide,
+        integral_time_s=pick(None, 20 * Ts),
+        back_emf_feedforward=pick(0.0, 0.7),
+        resistance_feedforward=pick(0.0, 0.5),
+        anti_windup=pick(*laws),
+        tracking_time_s=pick(None, 7 * Ts),
+    )
     velocity = VelocityLoop(
-        gain=0.05 * wide, integral_time_s=pick(None, 50 * Ts), every=n_v, anti_windup=pick(*laws), tracking_time_s=pick(None, 9 * Ts),
+        gain=0.05 * wide,
+        integral_time_s=pick(None, 50 * Ts),
+        every=n_v,
+        anti_windup=pick(*laws),
+        tracking_time_s=pick(None, 9 * Ts),
         filters=some_filters(rng, n_v * Ts),
-    )  # fmt: skip
+    )
     T_p = Ts * n_v * int(pick(1, 3))
     position = PositionLoop(
-        gain=0.02 / Ts if has_velocity else 0.3, every=round(T_p / Ts), feedforward=pick(0.0, 0.6), sensor=pick("motor", "output"),
-        integral_time_s=pick(None, 30 * T_p), derivative_time_s=pick(0.0, 3 * T_p), derivative_filter_s=pick(0.0, 2 * T_p),
-        acceleration_feedforward=pick(0.0, 0.5), friction_feedforward=pick(0.0, 0.2),
-    )  # fmt: skip
+        gain=0.02 / Ts if has_velocity else 0.3,
+        every=round(T_p / Ts),
+        feedforward=pick(0.0, 0.6),
+        sensor=pick("motor", "output"),
+        integral_time_s=pick(None, 30 * T_p),
+        derivative_time_s=pick(0.0, 3 * T_p),
+        derivative_filter_s=pick(0.0, 2 * T_p),
+        acceleration_feedforward=pick(0.0, 0.5),
+        friction_feedforward=pick(0.0, 0.2),
+    )
     T_o = T_p if has_position else (n_v * Ts if has_velocity else Ts)
     shaped = has_position or has_velocity
     rate = 2e-4 / T_o if has_position else 0.4
     command = Command(
-        filter_time_s=pick(0.0, 3 * T_o, 0.2 * T_o), filter_order=pick(1, 2), filter_damping=0.8,
-        rate_rad_s=pick(inf, rate) if shaped else inf, acceleration_rad_s2=pick(inf, 0.1 * rate / T_o) if shaped else inf,
-    )  # fmt: skip
+        filter_time_s=pick(0.0, 3 * T_o, 0.2 * T_o),
+        filter_order=pick(1, 2),
+        filter_damping=0.8,
+        rate_rad_s=pick(inf, rate) if shaped else inf,
+        acceleration_rad_s2=pick(inf, 0.1 * rate / T_o) if shaped else inf,
+    )
     if command.acceleration_rad_s2 < inf:
         command = replace(command, jerk_rad_s3=pick(inf, command.acceleration_rad_s2 / (4.3 * T_o)))
     limits = Limits(
-        voltage_V=20.0, speed_rad_s=pick(inf, 300.0), acceleration_rad_s2=pick(inf, 20.0 / T_p), peak_current_A=pick(inf, 5.0),
-    )  # fmt: skip
+        voltage_V=20.0,
+        speed_rad_s=pick(inf, 300.0),
+        acceleration_rad_s2=pick(inf, 20.0 / T_p),
+        peak_current_A=pick(inf, 5.0),
+    )
     if has_current and np.isfinite(limits.peak_current_A):
         limits = replace(
-            limits, continuous_current_A=2.0, peak_time_s=pick(None, 30 * Ts), release=0.8, overload=pick("thermal", "excess"),
-        )  # fmt: skip
+            limits,
+            continuous_current_A=2.0,
+            peak_time_s=pick(None, 30 * Ts),
+            release=0.8,
+            overload=pick("thermal", "excess"),
+        )
     encoder = Encoder(
-        counts_per_rev=pick(None, 4096), speed=pick("ideal", "difference", "tracking"), difference_samples=int(pick(1, 3)),
-        filter_time_s=pick(0.0, 4 * Ts), bandwidth_rad_s=0.2 / (n_v * Ts),
-    )  # fmt: skip
+        counts_per_rev=pick(None, 4096),
+        speed=pick("ideal", "difference", "tracking"),
+        difference_samples=int(pick(1, 3)),
+        filter_time_s=pick(0.0, 4 * Ts),
+        bandwidth_rad_s=0.2 / (n_v * Ts),
+    )
     control = replace(
-        base.controller, period_s=Ts, computing_delay_s=0.0, position=position if has_position else None,
-        velocity=velocity if has_velocity else None, current=cascade if has_current else None,
-    )  # fmt: skip
+        base.controller,
+        period_s=Ts,
+        computing_delay_s=0.0,
+        position=position if has_position else None,
+        velocity=velocity if has_velocity else None,
+        current=cascade if has_current else None,
+    )
     return replace(
-        base, controller=control, limits=limits, encoder=encoder, command=command, output_encoder=OutputEncoder(counts_per_rev=pick(None, 10**6)),
-    )  # fmt: skip
+        base,
+        controller=control,
+        limits=limits,
+        encoder=encoder,
+        command=command,
+        output_encoder=OutputEncoder(counts_per_rev=pick(None, 10**6)),
+    )
 
 
 def some_measurements(rng: np.random.Generator, design: Design) -> np.ndarray:
