@@ -166,11 +166,14 @@ def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> t
         x[failed] = start[failed]
     else:
         failed |= ~small
+    value = L - slope * step
     for k in np.flatnonzero(failed):
         x[k] = _bracketed(loop, float(low[k]), float(high[k]), bool(k < gains))
     if failed.any():
-        _, slope = loop.response_and_slope(x)
-    value = loop.sharp_response(x)  # the last step, with L to the last digit
+        value, slope = loop.response_and_slope(x)
+    if not loop.in_z:
+        return x, value
+    value = loop.sharp_response(x)  # near z = 1 the last digits of z are all there is: one more step with them
     step = _newton_step(value, slope, gains)
     return x - step, value - slope * step
 

@@ -159,9 +159,9 @@ def _eigen(A: Real, vectors: bool) -> tuple[Complex, Real, Real]:
 
 def _complex_vectors(packed: Real, im: Real) -> Complex:
     out = packed.astype(complex)
-    for k in np.flatnonzero(im > 0.0):
-        out[:, k] = packed[:, k] + 1j * packed[:, k + 1]
-        out[:, k + 1] = out[:, k].conj()
+    k = np.flatnonzero(im > 0.0)
+    out[:, k] += 1j * packed[:, k + 1]
+    out[:, k + 1] = out[:, k].conj()
     return out
 
 
