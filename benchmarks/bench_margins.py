@@ -45,9 +45,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
             yield _row(f"order {ORDER}, state space, {kind}, certified", loops, certified, CERTIFIED_S)
 
 
-def _row(
-    name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float
-) -> Row:
+def _row(name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float) -> Row:
     times = [_best(partial(margins, loop), 3) for loop in loops]
     kinds = [stability_margins(loop).evidence for loop in loops]
     return Row(

@@ -173,7 +173,9 @@ def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> t
         value, slope = loop.response_and_slope(x)
     if not loop.in_z:
         return x, value
-    value = loop.sharp_response(x)  # near z = 1 the last digits of z are all there is: one more step with them
+    value = loop.sharp_response(
+        x
+    )  # near z = 1 the last digits of z are all there is: one more step with them
     step = _newton_step(value, slope, gains)
     return x - step, value - slope * step
 
