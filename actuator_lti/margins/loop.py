@@ -94,10 +94,11 @@ class RationalLoop:
             return L, turn * (d_num / below - L * (d_den / below))
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
-        matrix = self._resolvent(p)
+        matrix: Complex = self._resolvent(p)
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
-        return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
+        response: Complex = self.d + first[..., 0] @ self.c
+        return response, -turn * (second[..., 0] @ self.c)
 
     def sharp_response(self, x: Real) -> Complex:
         """L on the border, with the residual of the solution in extended precision."""
