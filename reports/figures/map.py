@@ -9,7 +9,7 @@ Data: ``frequency_hz`` (cell centres), ``amplitude`` (cell centres, in ``unit``)
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import cycle, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
