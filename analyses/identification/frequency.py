@@ -1,4 +1,4 @@
-"""Frequency response of a drive from a record of a periodic excitation: lines, means over periods, their noise."""
+"""Frequency response from a record of a periodic excitation: lines, their means over periods, their noise."""
 
 from __future__ import annotations
 
@@ -41,7 +41,12 @@ class Lines:
 
 
 def excited_lines(
-    record: Record, names: tuple[str, ...], period_s: float, *, skip_periods: int = 1, top_hz: float | None = None
+    record: Record,
+    names: tuple[str, ...],
+    period_s: float,
+    *,
+    skip_periods: int = 1,
+    top_hz: float | None = None,
 ) -> Lines:
     """The lines of a periodic excitation.
 
@@ -128,9 +133,7 @@ def period_of_excitation(record: Record, name: str) -> float:
     """
     from scipy.fft import irfft, next_fast_len, rfft
 
-    values = record[name] - np.polyval(
-        np.polyfit(record.time_s, record[name], 1), record.time_s
-    )
+    values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
     n = len(values)
     size = next_fast_len(2 * n, real=True)
     spectrum = rfft(values, size)

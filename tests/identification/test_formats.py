@@ -125,7 +125,9 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path: 
         (', value = "rms", between = "phase"', np.sqrt(6.0)),
     ],
 )
-def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(options: str, factor: float, tmp_path: Path) -> None:
+def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
+    options: str, factor: float, tmp_path: Path
+) -> None:
     (tmp_path / "r.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
     (tmp_path / "r.toml").write_text(
         'file = "r.csv"\ntime = { column = "t" }\n'
