@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 STAMP := $(VENV)/.installed
 
-.PHONY: report test check bench clean install browser
+.PHONY: report test machines check bench clean install browser
 
 install: $(STAMP)
 
@@ -19,6 +19,17 @@ report: $(STAMP)
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2
+
+# The tests of margins, loops and many designs again, as on processors with other linear algebra kernels.
+MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
+  tests/margins/test_delay_margins.py tests/margins/test_step_random.py tests/margins/test_bandwidth.py \
+  tests/loops/test_loops_forms.py tests/loops/test_loops_published.py tests/study/test_compiled_figures.py
+
+machines: $(STAMP)
+	set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
+	  echo "OPENBLAS_CORETYPE=$$kernel"; \
+	  OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q -n 2 $(MACHINE_TESTS); \
+	done
 
 check: $(STAMP)
 	$(BIN)/ruff check .

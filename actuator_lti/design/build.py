@@ -12,12 +12,12 @@ from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
 from actuator_lti.design.model import Screw
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
-from actuator_lti.design.reading import shown
 from actuator_lti.design.refusals import nearest
 from actuator_lti.design.sections import Section, children
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 

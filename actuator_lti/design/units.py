@@ -15,8 +15,8 @@ from functools import lru_cache
 from math import isfinite
 from typing import Any
 
-from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _DEFINITIONS = """
 tera- = 1e12 = T-

@@ -192,11 +192,7 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
         stiffness_Nm_rad=fit["stiffness"],
         viscous_Nms_rad=fit["load_viscous"],
         guard_samples=round(GUARD / (cutoff * period)),
-        resolution_rad=float(
-            np.hypot(
-                _resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"])
-            )
-        ),
+        resolution_rad=float(np.hypot(*steps)),
         smooth_samples=0.5 / (cutoff * period),
     )
 

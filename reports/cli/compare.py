@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.options import JsonOption, OutOption, QuietOption
+from reports.cli.options import (
+    JsonOption,
+    OutOption,
+    QuietOption,
+    SchedulerOption,
+    TlsOption,
+    WorkersOption,
+)
 
 if TYPE_CHECKING:
     from analyses.study import Study
@@ -32,11 +39,17 @@ def compare(
     change: VariantOption = None,
     validation: ValidateOption = None,
     out: OutOption = Path("out/compare"),
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
     example: ExampleOption = False,
 ) -> None:
-    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what."""
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what.
+
+    What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+    """
     from actuator_lti.errors import InputError
 
     if example:
@@ -45,6 +58,7 @@ def compare(
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
 
+    from analyses.engine import Engine
     from analyses.variants import compare as compared
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
@@ -56,7 +70,13 @@ def compare(
     plan = _study(study, change or [])
     assert plan.base.design is not None
     with progress(f"comparing {plan.name}", quiet=quiet) as computing:
-        found = compared(plan, validation=validation, progress=computing)
+        found = compared(
+            plan,
+            validation=validation,
+            progress=computing,
+            engine=Engine(workers, scheduler, tls=tls) if workers or scheduler else None,
+            folder=out / "designs",
+        )
     made = study_document(
         plan.base.design,
         sections(found),

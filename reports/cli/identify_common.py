@@ -79,7 +79,7 @@ def finish(
         kind="identification",
     )
     with progress("drawing figures", quiet=common.quiet) as bar:
-        write_pages(document, common.out, "identification", processes=1, progress=bar)
+        write_pages(document, common.out, "identification", progress=bar)
     if not (passed(items) or common.accept):
         return None
     path = common.out / f"{base.name}-identified.toml"

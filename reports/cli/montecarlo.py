@@ -16,6 +16,9 @@ from reports.cli.options import (
     OperatingPointOption,
     OutOption,
     QuietOption,
+    SchedulerOption,
+    TlsOption,
+    WorkersOption,
 )
 
 if TYPE_CHECKING:
@@ -24,12 +27,6 @@ if TYPE_CHECKING:
 
 SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", help="Number of samples.")]
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Seed, 0 or more.")]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
-]
 TableOption = Annotated[
     Path | None,
     typer.Option("--from-samples", metavar="FILE", help="CSV or Parquet of identified parameters, SI."),
@@ -63,6 +60,7 @@ def montecarlo(
     out: OutOption = Path("out/montecarlo"),
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     from_samples: TableOption = None,
     step: StepOption = None,
     duration: DurationOption = 0.5,
@@ -93,7 +91,9 @@ def montecarlo(
         return
     folder = sample_folder(drive, settings, out)
     with progress(f"sampling {drive.name}", quiet=quiet) as shown:
-        result = monte_carlo(drive, folder, settings, engine=Engine(workers, scheduler), progress=shown)
+        result = monte_carlo(
+            drive, folder, settings, engine=Engine(workers, scheduler, tls=tls), progress=shown
+        )
     leave_with(_written(drive, result, out, at_least, as_json, quiet))
 
 

@@ -58,4 +58,14 @@ OperatingPointOption = Annotated[
         "--operating-point", metavar="POINT", help="Friction: sliding, rest or describing-function."
     ),
 ]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
+]
+TlsOption = Annotated[
+    Path | None,
+    typer.Option("--tls", metavar="DIR", help="ca.pem, cert.pem and key.pem for a tls:// scheduler."),
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]

@@ -174,6 +174,7 @@ def build_command(
     """
     import numpy as np
 
+    from actuator_lti.bounds import TONES
     from actuator_lti.errors import InputError
     from nonlinear import commands
 
@@ -187,6 +188,7 @@ def build_command(
     if kind in ("stepped-sine", "multisine"):
         if count < 1 or frequency <= 0.0 or last <= 0.0:
             raise InputError(f"--count {count}, --frequency {frequency:g}, --to {last:g}: must be positive")
+        TONES.check(count)
         grid = np.geomspace(frequency, last, count)
         if kind == "stepped-sine":
             return commands.stepped_sine(peak, grid.tolist(), cycles, period)
