@@ -166,7 +166,7 @@ def test_bad_input_is_one_line_and_status_2(
         ("torque_accuracy = 0.005", "torque_acuracy = 0.005", 'did you mean "torque_accuracy"'),
         ('speed = "105 rad/s"', 'speed = "105 N"', "run[1].speed"),
         ('id = "02"', 'id = "01"', "given twice"),
-        ("[campaign]", "[campaign", "is no TOML"),
+        ("[campaign]", "[campaign", "not TOML"),
     ],
 )
 def test_a_bad_campaign_file_is_one_line_with_its_key(
