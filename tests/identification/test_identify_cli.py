@@ -137,7 +137,7 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
     ("arguments", "reason"),
     [
         (("identify",), "give one of"),
-        (("identify", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("identify", "nowhere.toml"), "nowhere.toml: no such file"),
         (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read"),
         (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
