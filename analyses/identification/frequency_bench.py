@@ -8,16 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_lti.design import write_design
+from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError
 from analyses.identification.differentiation import filtered_motion
-from analyses.identification.frequency import Lines, excited_lines, period_of_excitation
+from analyses.identification.frequency import (
+    Lines,
+    excited_lines,
+    period_of_excitation,
+    response,
+)
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
 from analyses.identification.to_design import Estimate, design_with_estimate
-from analyses.identification.two_mass import TwoMass, fit_two_mass, start_of
-from analyses.identification.verdict import Item, inputs_item
+from analyses.identification.two_mass import TwoMass, angle_responses, fit_two_mass, start_of
+from analyses.identification.verdict import RESIDUAL_LIMIT, Item, inputs_item, simulated_item
 from analyses.identification.verdict import passed as all_passed
 from analyses.records.consistency import Finding, check_record
 from analyses.records.prepare import prepared
@@ -113,7 +118,7 @@ def identify_frequency(
     records = [record] if play_record is None else [record, play_record]
     findings = {one.name: check_record(design, one) for one in records}
     items = [inputs_item(name, found) for name, found in findings.items()]
-    items.append(_misfit_item(fit))
+    items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name)]
     return FrequencyResult(
         record=record,
         play_record=play_record,
@@ -217,6 +222,25 @@ def _misfit_item(fit: TwoMass) -> Item:
         passed=good,
         reason="" if good else "play, friction or another resonance: excite on one flank, in motion",
     )
+
+
+def _written_item(written: Design, lines: Lines, record: str) -> Item:
+    """The response of the design as it was written against the measured lines."""
+    coupling, friction = written.coupling, written.load.friction
+    assert coupling is not None
+    values = {
+        "motor_inertia": written.motor_side_inertia_kgm2,
+        "load_inertia": written.load_side_inertia_kgm2,
+        "stiffness": coupling.stiffness_Nm_rad,
+        "damping": coupling.damping_Nms_rad,
+        "viscous": written.friction.viscous_Nms_rad,
+        "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
+    }
+    model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling)
+    measured, relative = response(lines, "angle", lines.names[0])
+    weight = 1.0 / np.maximum(relative, 1e-3)
+    error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))
+    return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")
 
 
 def _made(

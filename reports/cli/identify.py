@@ -96,6 +96,10 @@ FrictionOption = Annotated[
 GravityOption = Annotated[
     bool, typer.Option("--gravity", help="Of records: look for a pendulum at the output, m g l sin(angle).")
 ]
+ElectricalOption = Annotated[
+    bool,
+    typer.Option("--electrical", help="Of records: R, kE and kM from u = R i + kE w first (L if it shows)."),
+]
 RefineOption = Annotated[
     bool,
     typer.Option("--refine", help="Of records: refine by simulation; the design gets the refined values."),
@@ -149,6 +153,7 @@ def identify(
     force: ForceOption = False,
     friction: FrictionOption = "symmetric",
     gravity: GravityOption = False,
+    electrical: ElectricalOption = False,
     refine: RefineOption = False,
     cutoff: CutoffOption = None,
     decimation: DecimationOption = None,
@@ -216,6 +221,7 @@ def identify(
         settings = {
             "form": friction,
             "gravity": gravity,
+            "electrical": electrical,
             "cutoff_hz": cutoff,
             "decimation": decimation,
             "inertia_to": inertia_to,

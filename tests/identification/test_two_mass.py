@@ -208,6 +208,8 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     found = json.loads(capsys.readouterr().out)
     assert status in (0, None)
     assert found["values"]["Resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
+    checks = {check["id"]: check for check in found["checks"]}
+    assert checks["written-sweep.csv"]["value"] < 0.05
     written = load_design(next((tmp_path / "o").glob("*.toml")))
     assert written.coupling is not None
     assert written.coupling.stiffness_Nm_rad == pytest.approx(400.0, rel=2e-3)
