@@ -24,8 +24,12 @@ COLOURS = {
     "acceleration": style.ORANGE,
     "current": style.GREEN,
     "voltage": style.RED,
+    "torque-command": style.SKY,
+    "overload": style.INK,
+    "profile": style.MUTED,
 }
-LINES = {"speed": 0, "acceleration": 1, "current": 2, "voltage": 3}
+LIMITERS = [name for name in COLOURS if name not in ("friction", "stiction")]
+LINES = {name: k for k, name in enumerate(LIMITERS)}
 WORDS = {
     "friction": "dry friction",
     "stiction": "stiction",
@@ -33,6 +37,9 @@ WORDS = {
     "acceleration": "acceleration limit",
     "current": "current limit",
     "voltage": "voltage limit",
+    "torque-command": "limit in front of the torque filters",
+    "overload": "overload protection",
+    "profile": "profile of the command",
     "none": "linear",
 }
 GLYPHS: dict[str, dict[str, Any]] = {
