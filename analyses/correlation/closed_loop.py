@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -165,7 +165,6 @@ def check_simulated(design: Design) -> None:
     """
     parts = {
         "coupling": design.coupling is not None,
-        "load.gravity": design.load.gravity is not None,
         "friction.point": bool(design.friction.points),
         "load.friction": design.load.friction is not None,
     }
@@ -241,6 +240,9 @@ def model_signals(
     design = _with_supply(design, record, notes)
     time = record.time_s - record.time_s[0]
     load = _load(design, record, time, notes)
+    if LOADS[design.axis] in record.signals and design.load.gravity is not None:
+        notes.append("the recorded load holds all of it: the design's load.gravity is not added")
+        design = replace(design, load=replace(design.load, gravity=None))
     period = design.controller.period_s
     run = simulate(
         design,

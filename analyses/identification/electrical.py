@@ -48,7 +48,9 @@ class ElectricalFit:
         return float(np.sqrt(self.covariance[k, k]))
 
 
-def fit_electrical(design: Design, records: Sequence[Record]) -> ElectricalFit:
+def fit_electrical(
+    design: Design, records: Sequence[Record], *, only: tuple[str, ...] | None = None
+) -> ElectricalFit:
     """Fit the voltage equation to records of voltage, current and motion.
 
     All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts later
@@ -63,10 +65,19 @@ def fit_electrical(design: Design, records: Sequence[Record]) -> ElectricalFit:
     """
     control = design.controller
     late = control.computing_delay_s + 0.5 * control.period_s
-    found = _fitted([_rows(design, record, late) for record in records])
+    found = _fitted([_rows(design, record, late) for record in records], only=only or NAMES)
     early = _fitted([_rows(design, record, 0.0) for record in records], only=found.names)
     moved = found.values - early.values
-    return replace(found, covariance=found.covariance + np.outer(moved, moved) / 3.0)
+    whole = replace(found, covariance=found.covariance + np.outer(moved, moved) / 3.0)
+    if only is not None or "inductance" not in whole.names:
+        return whole
+    value, std = whole["inductance"], whole.std("inductance")
+    if value > SHOWN * std:
+        return whole
+    rest = tuple(name for name in whole.names if name != "inductance")
+    told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
+    again = fit_electrical(design, records, only=rest)
+    return replace(again, not_shown={**again.not_shown, "inductance": told})
 
 
 def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> ElectricalFit:
@@ -85,14 +96,6 @@ def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> Elec
             names = [names[k] for k in kept]
             continue
         found = solve(w, u, ends)
-        std = np.sqrt(np.diag(found.correlated))
-        if "inductance" in names and only == NAMES:
-            k = names.index("inductance")
-            if not found.values[k] > SHOWN * std[k]:
-                told = f"{found.values[k]:.2g} H with a standard error of {std[k]:.2g} H"
-                not_shown["inductance"] = f"the records do not show it ({told})"
-                names.remove("inductance")
-                continue
         break
     for name in ("resistance", "back_emf"):
         if name in not_shown:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
-from actuator_lti.design.model import Design, Gravity
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.bench import BenchSettings, identify_bench
 from analyses.identification.electrical import electrical_estimate, fit_electrical
@@ -158,15 +158,14 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
 
 
 def test_a_part_that_the_simulator_leaves_out_is_not_passed_over() -> None:
-    """Until it is simulated: the record's motion under the written design needs the recorded torque."""
+    """Until it is simulated: the record's motion under the written design needs the recorded force."""
     from analyses.correlation import correlate_record
 
-    design = replace(_joint(), load=replace(_joint().load, gravity=Gravity(mass_kg=1.0, arm_m=0.3)))
-    record = _pendulum_record(0.02, drive="current")
-    record = replace(record, signals={**record.signals, "reference": record["output_angle"]})
-    with pytest.raises(InputError, match=r"load\.gravity: is not simulated yet"):
-        correlate_record(design, record)
-    result = identify_bench(design, [record], settings=BenchSettings(inertia_to="load.inertia"))
+    record = _axis_record("map")
+    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
+    result = identify_bench(load_design("emps"), [record], settings=BenchSettings(form="map"))
+    with pytest.raises(InputError, match=r"friction\.point: is not simulated yet"):
+        correlate_record(result.design, record)
     again = result.resimulated[0]
     assert "torque needed for its motion" in again.how
     assert again.relative_error < 1.5 * result.model.relative_residual
