@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +35,17 @@ UNITS = {
     "voltage": "V",
     "force": "N",
 }
-COMMANDS = {"rotary": ("reference",), "linear": ("position_reference",)}
+COMMANDS = {
+    ("rotary", "position"): "reference",
+    ("linear", "position"): "position_reference",
+    ("rotary", "velocity"): "speed_reference",
+    ("linear", "velocity"): "velocity_reference",
+    ("rotary", "current"): "current_reference",
+    ("linear", "current"): "current_reference",
+    ("rotary", "voltage"): "voltage_reference",
+    ("linear", "voltage"): "voltage_reference",
+}
+"""The signal that commands a drive, by its axis and its outermost stage."""
 VELOCITY_CUTOFF_HZ = 100.0
 
 
@@ -81,7 +91,8 @@ def correlate_record(
     ----------
     design : Design
     record : Record
-        Needs the command: ``reference`` (output angle, rad) or ``position_reference`` (m, linear axis). A
+        Needs the command of the design's outermost stage: ``reference`` (output angle, rad) or
+        ``position_reference`` (m, linear axis) of a position loop, else that of speed, current or voltage. A
         ``torque`` signal is the hinge moment at the output, a ``supply`` signal the bus voltage (its median
         becomes the voltage limit). Compared are, where recorded: angle, output_angle or position, speed or
         velocity, current, voltage, force. The force of a drive with an ideal source is its gain times the
@@ -133,12 +144,33 @@ def _used(design: Design, record: Record, measured: Mapping[str, FloatArray]) ->
     return {name: text for name, text in used.items() if name in record.signals}
 
 
+def command_name(design: Design) -> str:
+    """The signal that commands a design's drive: that of its outermost stage."""
+    return COMMANDS[design.axis, design.controller.outermost]
+
+
 def command_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
     """The command of a record that the design's drive takes: its signal and values; None without one."""
-    for name in COMMANDS[design.axis]:
-        if name in record.signals:
-            return name, record[name]
-    return None
+    name = command_name(design)
+    return (name, record[name]) if name in record.signals else None
+
+
+def check_simulated(design: Design) -> None:
+    """Refuse a design with parts that the simulator leaves out.
+
+    Raises
+    ------
+    InputError
+        Naming the part.
+    """
+    parts = {
+        "coupling": design.coupling is not None,
+        "friction.point": bool(design.friction.points),
+        "load.friction": design.load.friction is not None,
+    }
+    for name, there in parts.items():
+        if there:
+            raise InputError(f"{name}: is not simulated yet: no record can be held to it", design.name)
 
 
 def measured_signals(
@@ -201,12 +233,16 @@ def model_signals(
 
     command = command_of(design, record)
     if command is None:
-        wanted = COMMANDS[design.axis][0]
+        wanted = command_name(design)
         raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
+    check_simulated(design)
     notes = [] if notes is None else notes
     design = _with_supply(design, record, notes)
     time = record.time_s - record.time_s[0]
     load = _load(design, record, time, notes)
+    if LOADS[design.axis] in record.signals and design.load.gravity is not None:
+        notes.append("the recorded load holds all of it: the design's load.gravity is not added")
+        design = replace(design, load=replace(design.load, gravity=None))
     period = design.controller.period_s
     run = simulate(
         design,
