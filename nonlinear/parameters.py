@@ -111,9 +111,9 @@ def _controllers(design: Design, row: Floats) -> None:
     Ts = controller.period_s
     row[at.PERIOD] = Ts
     row[at.DELAY_TICKS], row[at.DELAY_FRACTION] = split_delay(controller.computing_delay_s, Ts)
-    row[at.EVERY_POSITION] = controller.position.every
-    row[at.POSITION_GAIN] = controller.position.gain
-    row[at.FEEDFORWARD] = controller.position.feedforward
+    row[at.EVERY_POSITION] = controller.position_loop.every
+    row[at.POSITION_GAIN] = controller.position_loop.gain
+    row[at.FEEDFORWARD] = controller.position_loop.feedforward
     row[at.EVERY_VELOCITY] = 1
     row[at.FILTER_COEFFICIENT] = 1.0
     row[at.DIFFERENCE_SAMPLES] = 1

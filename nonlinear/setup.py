@@ -9,6 +9,7 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -48,7 +49,8 @@ def ticks_of(duration_s: float, period_s: float) -> int:
     """Number of ticks in a duration, rounded; refuses a duration without any."""
     if not isfinite(duration_s):
         raise InputError(f"duration_s = {duration_s}: must be a finite number of seconds")
-    ticks = round(duration_s / period_s)
+    ticks = round(min(duration_s / period_s, 1e18))
+    RUN_TICKS.check(ticks, name=f"duration_s = {duration_s:g}")
     if ticks < 1:
         raise InputError(f"duration_s = {duration_s:g}: must hold at least one tick of {period_s:g} s")
     return ticks
@@ -63,7 +65,7 @@ def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> Non
 
 def check_frequency(design: Design, command: Command) -> None:
     """Refuse a command that the position loop, sampled every n_p ticks, cannot follow in principle."""
-    nyquist = 0.5 / (design.controller.period_s * design.controller.position.every)
+    nyquist = 0.5 / (design.controller.period_s * design.controller.position_loop.every)
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
         raise InputError(f"{message} of the position loop, {nyquist:g} Hz", where=design.name)

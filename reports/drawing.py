@@ -6,21 +6,26 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from analyses.isolation import Missing, caught, note
 from reports.figures.registry import draw_svg
 
 Progress = Callable[[int, int], None]
+PLACEHOLDER = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 420 60" role="img" aria-label="no figure">'
+    '<text x="10" y="36" font-size="12" fill="currentColor">This figure could not be drawn; the exit status '
+    "was 3.</text></svg>"
+)
 
 
 def draw_all(
     blocks: Sequence[Mapping[str, Any]], progress: Progress | None = None, page: bool = True
 ) -> list[str]:
-    """Draw figure blocks, in order.
+    """Draw figure blocks, in order; one that fails is a notice in its place, and is noted.
 
     Parameters
     ----------
     blocks : sequence of mapping
-        Figure blocks of a document; their data pass through JSON, so that a page equals one made of
-        report.json.
+        Figure blocks of a document.
     progress : callable, optional
         Called with (drawn, in all).
     page : bool
@@ -28,8 +33,19 @@ def draw_all(
     """
     drawn: list[str] = []
     for k, block in enumerate(blocks):
-        data = json.loads(json.dumps(block["data"], allow_nan=False))
-        drawn.append(draw_svg(block["figure"], data, prefix=f"f{k + 1}", page=page, alt=block["alt"]))
+        svg, missing = _drawn(block, f"f{k + 1}", page)
+        drawn.append(svg or PLACEHOLDER)
+        note([missing] if missing else [])
         if progress is not None:
             progress(len(drawn), len(blocks))
     return drawn
+
+
+def _drawn(block: Mapping[str, Any], prefix: str, page: bool) -> tuple[str | None, Missing | None]:
+    """Draw one figure; its data pass through JSON, so that a page equals one made of report.json."""
+
+    def draw() -> str:
+        data = json.loads(json.dumps(block["data"], allow_nan=False))
+        return draw_svg(block["figure"], data, prefix=prefix, page=page, alt=block["alt"])
+
+    return caught(f"figure {prefix[1:]} ({block['figure']})", draw)

@@ -5,46 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
+from math import inf
 from typing import Any
 
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.model import Design, Parameter
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.design.reading import shown
+from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.errors import InputError
-
-SECTIONS = (
-    "motor", "load", "friction", "encoder", "limits", "control", "control.current", "control.velocity",
-    "control.position", "validation",
-)  # fmt: skip
-
-
-def section_of(design: Design, section: str) -> Any:
-    """The part of a design that a section of the file becomes; None if the design has none."""
-    if section.startswith("gear."):
-        name = section.removeprefix("gear.")
-        return next((gear for gear in design.gears if gear.name == name), None)
-    if section.startswith("control"):
-        _, _, loop = section.partition(".")
-        return getattr(design.controller, loop) if loop else design.controller
-    return getattr(design, section)
+from actuator_lti.reading import shown
 
 
 def paths_of(design: Design) -> tuple[str, ...]:
     """Dotted paths of all numeric keys that this design has a value for."""
-    sections = [(name, name) for name in SECTIONS]
-    sections[1:1] = [(f"gear.{gear.name}", "gear.*") for gear in design.gears]
-    found: list[str] = []
-    for section, template in sections:
-        part = section_of(design, section)
-        found += [
-            f"{section}.{field.key}"
-            for field in fields_in(template)
-            if field.kind in ("quantity", "integer") and getattr(part, field.attribute, None) is not None
-        ]
-    return tuple(found)
+    return tuple(
+        f"{path}.{field.key}"
+        for section, path, part in parts_of(design)
+        if not (section.rare and part == section.kind())
+        for field in fields_in(section.template)
+        if field.kind in ("quantity", "integer") and _has_value(getattr(part, field.attribute))
+    )
+
+
+def _has_value(value: float | None) -> bool:
+    return value is not None and value != inf
 
 
 def located(design: Design, path: str) -> tuple[Field, Any]:
@@ -60,7 +46,7 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
         near = get_close_matches(path, paths_of(design), 1, 0.5)
         hint = f' (nearest known: "{near[0]}")' if near else ""
         raise InputError(f"{shown(path)}: unknown parameter{hint}; allowed: a numeric key of the design file")
-    part = section_of(design, path.rpartition(".")[0])
+    part = part_at(design, path.rpartition(".")[0])
     if part is None:
         raise InputError(f"{path}: the design {design.name} has no {path.rpartition('.')[0]}")
     return field, part
@@ -161,23 +147,9 @@ def _changed(old: Parameter | None, field: Field, path: str, value: float, struc
 def _replaced(
     design: Design, changes: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, Parameter]
 ) -> Design:
-    top: dict[str, Any] = {}
-    loops: dict[str, Any] = {}
-    gears = {gear.name: gear for gear in design.gears}
-    for section, attributes in changes.items():
-        part = replace(section_of(design, section), **attributes)
-        if section.startswith("gear."):
-            gears[part.name] = part
-        elif section.startswith("control."):
-            loops[section.removeprefix("control.")] = part
-        elif section == "control":
-            top["controller"] = part
-        else:
-            top[section] = part
-    if loops:
-        top["controller"] = replace(top.get("controller", design.controller), **loops)
-    merged = FrozenMap({**design.parameters, **parameters})
-    return replace(design, gears=tuple(gears.values()), parameters=merged, **top)
+    for path, attributes in changes.items():
+        design = with_part(design, path, replace(part_at(design, path), **attributes))
+    return replace(design, parameters=FrozenMap({**design.parameters, **parameters}))
 
 
 def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Parameter, ...]:
@@ -195,3 +167,11 @@ def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Param
             )
         found.append(known)
     return tuple(found)
+
+
+def stacked(design: Design, values: Mapping[str, Any]) -> Design:
+    """A design with arrays in place of some numbers: many designs of one structure, unchecked."""
+    changes: dict[str, dict[str, Any]] = {}
+    for path, array in values.items():
+        changes.setdefault(path.rpartition(".")[0], {})[located(design, path)[0].attribute] = array
+    return _replaced(design, changes, {})

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from actuator_lti.design import model
-from actuator_lti.design.fields import Field, Structure, fields_in
+from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
+from actuator_lti.design.model import Screw
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
-from actuator_lti.design.reading import shown
 from actuator_lti.design.refusals import nearest
+from actuator_lti.design.sections import Section, children
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 
@@ -35,15 +38,38 @@ class Builder:
         self.structure = Structure(
             document.design.axis or "rotary", control.velocity is not None, control.current is not None
         )
+        self.travel_m_rad: float | None = None
+        self.travel_m_rad = self._travel()
 
     def refuse(self, path: str, value: object, reason: str) -> InputError:
         """The error of one key."""
         return InputError(f"{path} = {shown(value)}: {reason}", where=self.where)
 
+    def quantity(self, text: Any, field: Field) -> float:
+        """The SI value of a text; behind a screw also from the units of a rotary axis."""
+        unit, power = field.unit(self.structure), field.travel_power()
+        if self.travel_m_rad is None or power == 0 or not isinstance(text, str):
+            return parse_quantity(text, unit)
+        rotary = field.unit(replace(self.structure, axis="rotary"))
+        try:
+            return parse_quantity(text, rotary) * self.travel_m_rad**power
+        except InputError:
+            return parse_quantity(text, unit)
+
+    def _travel(self) -> float | None:
+        """p of the screw, needed before anything else is read; None without one."""
+        if self.document.screw is None:
+            return None
+        if self.structure.axis != "linear":
+            raise self.refuse("screw", "a table", 'allowed with design.axis = "linear"')
+        return Screw(
+            lead_m=self._number("screw.lead", self.document.screw.lead.value, FIELDS["screw.lead"])
+        ).travel_m_rad
+
     def _number(self, path: str, text: Any, field: Field) -> float:
         unit = field.unit(self.structure)
         try:
-            value = parse_quantity(text, unit)
+            value = self.quantity(text, field)
         except InputError as error:
             raise self.refuse(path, text, error.message) from None
         if field.kind == "integer" and value != int(value):
@@ -58,7 +84,9 @@ class Builder:
         tolerance = None
         if raw.tolerance is not None:
             try:
-                tolerance = read_tolerance(raw.tolerance, value, unit, field)
+                tolerance = read_tolerance(
+                    raw.tolerance, value, lambda text: self.quantity(text, field), field, unit
+                )
             except InputError as error:
                 given = raw.tolerance if isinstance(raw.tolerance, str | int | float) else "table"
                 raise self.refuse(f"{path}.tolerance", given, error.message) from None
@@ -74,24 +102,44 @@ class Builder:
         )
         return int(value) if field.kind == "integer" else value
 
-    def section(
-        self, kind: Callable[..., Any], section: str, raw: Any, template: str = "", /, **more: Any
-    ) -> Any:
-        """An object of ``kind`` from the values written in a section."""
-        values: dict[str, Any] = dict(more)
-        for field in fields_in(template or section):
-            given = getattr(raw, field.key, None) if raw is not None else None
+    def part(self, section: Section, raw: Any, path: str) -> Any:
+        """An object of the section's kind from the values written in one table, with the tables inside it."""
+        values: dict[str, Any] = {"name": path.rpartition(".")[2]} if section.many == "named" else {}
+        for field in fields_in(section.template):
+            given = getattr(raw, field.key)
             if given is None:
                 continue
-            path = f"{section}.{field.key}"
+            where = f"{path}.{field.key}"
             if field.kind in ("quantity", "integer"):
-                values[field.attribute] = self._entry(path, given, field)
+                values[field.attribute] = self._entry(where, given, field)
             elif field.kind == "quantities":
                 items = enumerate(given, 1)
-                values[field.attribute] = tuple(self._number(f"{path}[{i}]", v, field) for i, v in items)
+                values[field.attribute] = tuple(self._number(f"{where}[{i}]", v, field) for i, v in items)
             else:
                 values[field.attribute] = given
-        return kind(**values)
+        return section.kind(**values, **self.tables(section.path, raw))
+
+    def tables(self, path: str, raw: Any) -> dict[str, Any]:
+        """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
+        found: dict[str, Any] = {}
+        for section in children(path):
+            given = getattr(raw, section.key)
+            if section.many:
+                found[section.attribute] = self._items(section, given)
+            elif given is not None:
+                found[section.attribute] = self.part(section, given, section.path)
+        return found
+
+    def _items(self, section: Section, given: Any) -> tuple[Any, ...]:
+        paths: list[str] = []
+        for index, raw in enumerate(given):
+            path = section.item_path(index, raw)
+            if section.many == "named":
+                self.name(f"{section.path}.name", raw.name)
+                if path in paths:
+                    raise self.refuse(f"{section.path}.name", raw.name, "allowed: each name once")
+            paths.append(path)
+        return tuple(self.part(section, raw, path) for raw, path in zip(given, paths, strict=True))
 
     def name(self, path: str, name: str) -> str:
         """A name that may stand in dotted keys."""
@@ -104,31 +152,6 @@ class Builder:
         if not text.strip():
             raise self.refuse(path, text, "allowed: a text")
         return text
-
-    def gears(self) -> tuple[model.Gear, ...]:
-        """All reduction stages, motor side first."""
-        gears: list[model.Gear] = []
-        for raw in self.document.gear:
-            name = self.name("gear.name", raw.name)
-            if name in {gear.name for gear in gears}:
-                raise self.refuse("gear.name", name, "allowed: each name once")
-            gears.append(self.section(model.Gear, f"gear.{name}", raw, "gear.*", name=name))
-        return tuple(gears)
-
-    def controller(self) -> model.Controller:
-        """Sampling and cascade."""
-        raw = self.document.control
-        kinds = {
-            "position": model.PositionLoop,
-            "velocity": model.VelocityLoop,
-            "current": model.CurrentLoop,
-        }
-        loops: dict[str, Any] = {}
-        for key, kind in kinds.items():
-            part = getattr(raw, key)
-            more = {"integral_time_s": None} if key == "current" else {}
-            loops[key] = None if part is None else self.section(kind, f"control.{key}", part, **more)
-        return self.section(model.Controller, "control", raw, **loops)
 
     def requirement(self, raw: Any) -> model.Requirement:
         """One requirement, its limits in the unit in which its quantity is reported."""
@@ -160,13 +183,6 @@ class Builder:
         except (InputError, ValueError) as error:
             raise self.refuse(path, text, getattr(error, "message", str(error))) from None
 
-    def validation(self) -> model.Validation:
-        """What to validate; 10 deg (0.01 m) without a load where the file does not say."""
-        default = 0.01 if self.structure.axis == "linear" else 0.17453292519943295
-        if self.document.validation is None:
-            return model.Validation(full_deflection_rad=default)
-        return self.section(model.Validation, "validation", self.document.validation)
-
     def objects(self) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         from actuator_lti.design.objects import check_objects
@@ -183,16 +199,9 @@ class Builder:
     def design(self, origin: str) -> model.Design:
         """The whole design."""
         head = self.document.design
-        parts = {
-            "motor": self.section(model.Motor, "motor", self.document.motor),
-            "gears": self.gears(),
-            "load": self.section(model.Load, "load", self.document.load),
-            "friction": self.section(model.Friction, "friction", self.document.friction),
-            "encoder": self.section(model.Encoder, "encoder", self.document.encoder),
-            "limits": self.section(model.Limits, "limits", self.document.limits),
-            "controller": self.controller(),
-            "validation": self.validation(),
-        }
+        # 10 deg (0.01 m) without a load where the file does not say what to validate
+        fallback = model.Validation(full_deflection_rad=model.default_deflection(self.structure.axis))
+        parts = {"validation": fallback, **self.tables("", self.document)}
         return model.Design(
             name=self.label("design.name", head.name),
             title=head.title or head.name,

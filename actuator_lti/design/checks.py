@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from math import inf, isfinite
+from math import inf, isfinite, log
 
+from actuator_lti.design.checks_control import check_control
 from actuator_lti.design.model import Design
-from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _ELECTRICAL = {
     "resistance": "resistance_ohm",
@@ -24,7 +25,7 @@ def check_design(design: Design, where: str) -> None:
     InputError
         One line: key, value and what is allowed.
     """
-    for check in (_motor, _cascade, _sampling, _limits, _requirements, _correlations):
+    for check in (_motor, _cascade, _sampling, check_control, _limits, _requirements, _correlations):
         check(design, where)
 
 
@@ -46,14 +47,34 @@ def _motor(design: Design, where: str) -> None:
                 f"motor.{key}: missing; allowed: R, L, kM and kE together, or motor.source_gain alone",
                 where=where,
             )
-    kM, kE = given["torque_constant"], given["back_emf_constant"]
+    same = design.effective_motor
+    kM, kE = same.torque_constant_Nm_A or 0.0, same.back_emf_constant_Vs_rad or 0.0
     if abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
         raise _refuse(
             where,
             "motor.back_emf_constant",
-            f"{kE:g}",
-            f"allowed: within 10 % of motor.torque_constant = {kM:g} (in SI the two are one constant)",
+            f"{given['back_emf_constant']:g}",
+            f"allowed: within 10 % of {given['back_emf_constant'] * kM / kE:g}, as motor.torque_constant = "
+            f"{given['torque_constant']:g} has it (in SI the two are one constant){_factor_named(kE / kM)}",
         )
+
+
+_FACTORS = {
+    "sqrt(2), rms against peak": 2**0.5,
+    "sqrt(3), phase against line-line": 3**0.5,
+    "sqrt(3/2), rms line-line against N m/A rms": 1.5**0.5,
+    "sqrt(3) and sqrt(2) together, V rms of a phase against N m/A peak": 6**0.5,
+    "3/2, dq against phase": 1.5,
+    "60/(2 pi), per rpm against per rad/s": 9.549296585513721,
+    "1000": 1e3,
+    "9.549 V/krpm": 1e3 / 9.549296585513721,
+}
+
+
+def _factor_named(ratio: float) -> str:
+    """The usual factor between data-sheet conventions that explains a ratio kE/kM, or nothing."""
+    off, words = min((abs(abs(log(ratio)) - log(factor)), words) for words, factor in _FACTORS.items())
+    return f"; the ratio is {words}: see motor.constants" if off < 0.08 else ""
 
 
 def _cascade(design: Design, where: str) -> None:
@@ -61,17 +82,12 @@ def _cascade(design: Design, where: str) -> None:
         raise _refuse(
             where, "control.current", "a table", "not allowed with motor.source_gain, which has no current"
         )
-    position, velocity = design.controller.position, design.controller.velocity
-    if position.feedforward and velocity is None:
-        raise _refuse(
-            where, "control.position.feedforward", position.feedforward, "allowed: 0 without a velocity loop"
-        )
 
 
 def _sampling(design: Design, where: str) -> None:
     control = design.controller
     n_v = control.velocity.every if control.velocity else 1
-    n_p = control.position.every
+    n_p = control.position.every if control.position else n_v
     if n_p % n_v:
         raise _refuse(
             where, "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
@@ -87,7 +103,7 @@ def _sampling(design: Design, where: str) -> None:
 
 def no_load_speed(design: Design) -> float:
     """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
-    kE = design.motor.back_emf_constant_Vs_rad
+    kE = design.effective_motor.back_emf_constant_Vs_rad
     return inf if kE is None else design.limits.voltage_V / kE
 
 
@@ -115,8 +131,7 @@ def _requirements(design: Design, where: str) -> None:
     from actuator_lti.design.quantities import QUANTITIES
 
     seen: set[str] = set()
-    present = {"position", "every"}
-    present |= {name for name in ("velocity", "current") if getattr(design.controller, name) is not None}
+    present = {"every", *design.controller.stages}
     for item in design.requirements:
         path = f"requirement.{shown(item.id)[1:-1]}"
         if item.id in seen:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.field_table import ALL_FIELDS
+from actuator_lti.design.sections import template_of
 
 __all__ = ["FIELDS", "Field", "Structure", "field_of", "fields_in"]
 
 FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
-"""Every key of a design file by its dotted path; gears stand under ``gear.*``."""
+"""Every key of a design file by its dotted path; repeated tables stand under ``*`` (``gear.*``)."""
 
 
 def field_of(path: str) -> Field | None:
@@ -19,9 +20,7 @@ def field_of(path: str) -> Field | None:
     >>> field_of("gear.worm.ratio").path
     'gear.*.ratio'
     """
-    if path.startswith("gear."):
-        return FIELDS.get(f"gear.*.{path.rpartition('.')[2]}") if path.count(".") == 2 else None
-    return FIELDS.get(path)
+    return None if "*" in path else FIELDS.get(template_of(path))
 
 
 def fields_in(section: str) -> tuple[Field, ...]:

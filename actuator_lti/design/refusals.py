@@ -7,15 +7,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.reading import shown
+from actuator_lti.design.fields import FIELDS, field_of
 from actuator_lti.design.schema import MAX_GEARS, MAX_LIST, document_model
+from actuator_lti.design.sections import BY_PATH, children
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
-_SECTIONS = (
-    "design", "motor", "gear", "load", "friction", "encoder", "limits", "control", "validation",
-    "requirement", "correlation", "fact", "objects",
-)  # fmt: skip
 _KEYS = {
     "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),
     "correlation": ("first", "second", "coefficient"),
@@ -23,6 +20,7 @@ _KEYS = {
     "objects": ("velocity_gain_factor", "values"),
     "tolerance": ("kind", "half_width", "std", "lower", "upper"),
 }
+_KEYS_OF_TABLES = ("requirement", "correlation", "fact", "objects")
 _VALUE = ("value", "source", "grade", "tolerance")
 
 
@@ -58,7 +56,7 @@ def _line(finding: Any, tree: dict[str, Any]) -> str:
             f"{path} = {given}: allowed: {'a number with its unit' if scalar else 'a table'}{_example(path)}"
         )
     if kind == "list_type":
-        many = f"[[{path}]] tables" if path in _KEYS or path == "gear" else "a list"
+        many = f"[[{path}]] tables" if path in _KEYS or (path in BY_PATH and BY_PATH[path].many) else "a list"
         return f"{path} = {given}: allowed: {many}"
     if kind in ("too_long", "too_short"):
         return f"{path}: allowed: 1 to {MAX_GEARS if path == 'gear' else MAX_LIST} items"
@@ -72,18 +70,15 @@ def _line(finding: Any, tree: dict[str, Any]) -> str:
 
 
 def _field_name(location: list[Any]) -> str:
-    if location and location[0] == "gear":
-        return f"gear.*.{location[2]}" if len(location) > 2 else "gear"
-    return ".".join(str(part) for part in location)
+    return ".".join("*" if isinstance(part, int) else str(part) for part in location)
 
 
 def _example(path: str) -> str:
-    parts = path.split(".")
-    field = FIELDS.get(path) or (FIELDS.get(f"gear.*.{parts[-1]}") if parts[0] == "gear" else None)
+    field = field_of(path.replace("[", ".").replace("]", ""))
     if field is None:
         return ""
     return (
-        f'; example: {parts[-1]} = "{field.example}" ({field.description})'
+        f'; example: {field.key} = "{field.example}" ({field.description})'
         if field.example
         else (f"; it is the {field.description}")
     )
@@ -106,15 +101,14 @@ def _dotted(location: list[Any], tree: dict[str, Any]) -> str:
 
 def known_keys(location: list[Any]) -> list[str]:
     """Keys allowed at a place of the document."""
-    names = ["*" if isinstance(part, int) else str(part) for part in location]
-    section = ".".join(names)
-    if not names:
-        return list(_SECTIONS)
+    section = _field_name(location)
+    if not section:
+        return ["design", *(item.key for item in children("")), *_KEYS_OF_TABLES]
+    names = section.split(".")
     if names[-1] in _KEYS or (names[0] in _KEYS and len(names) == 2):
         return list(_KEYS[names[-1] if names[-1] in _KEYS else names[0]])
     keys = [field.key for field in FIELDS.values() if field.section == section]
-    if section == "control":
-        keys += ["current", "velocity", "position"]
+    keys += [item.key for item in children(section)]
     return (["name", *keys] if section == "gear.*" else keys) or list(_VALUE)
 
 

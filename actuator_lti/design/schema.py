@@ -5,10 +5,20 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Optional
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, StrictFloat, StrictInt, StrictStr, create_model
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    StrictBool,
+    StrictFloat,
+    StrictInt,
+    StrictStr,
+    create_model,
+)
 from pydantic import Field as Slot
 
 from actuator_lti.design.fields import Field, fields_in
+from actuator_lti.design.sections import children
 
 MAX_GEARS = 20
 MAX_LIST = 200
@@ -92,6 +102,7 @@ def _slot(field: Field) -> tuple[Any, Any]:
         "quantity": RawEntry,
         "integer": RawEntry,
         "quantities": Annotated[list[Written], Slot(min_length=1, max_length=MAX_LIST)],
+        "flag": StrictBool,
         "text": StrictStr,
         "choice": Literal[field.choices] if field.choices else StrictStr,
     }
@@ -99,38 +110,38 @@ def _slot(field: Field) -> tuple[Any, Any]:
     return (kind, ...) if field.required else (Optional[kind], None)  # noqa: UP045
 
 
-def _section(section: str, /, **more: Any) -> type[BaseModel]:
-    slots: dict[str, Any] = {field.key: _slot(field) for field in fields_in(section)}
-    return create_model(section, __config__=_STRICT, **slots, **more)
+def _many(kind: Any, longest: int) -> Any:
+    return (Annotated[list[kind], Slot(max_length=longest)], Slot(default_factory=list))
+
+
+def _section(template: str, /, **more: Any) -> type[BaseModel]:
+    slots: dict[str, Any] = {field.key: _slot(field) for field in fields_in(template)}
+    return create_model(template, __config__=_STRICT, **slots, **more)
+
+
+def _tables(path: str) -> dict[str, Any]:
+    """The slots of the tables that lie in a table, each with those inside it."""
+    slots: dict[str, Any] = {}
+    for section in children(path):
+        named = {"name": (StrictStr, ...)} if section.many == "named" else {}
+        kind: Any = _section(section.template, **named, **_tables(section.path))
+        if section.many:
+            slots[section.key] = _many(kind, MAX_GEARS if section.many == "named" else MAX_LIST)
+        else:
+            slots[section.key] = (kind, ...) if section.required else (kind | None, None)
+    return slots
 
 
 @lru_cache(maxsize=1)
 def document_model() -> type[BaseModel]:
     """The pydantic model of a whole design file."""
-    gear = _section("gear.*", name=(StrictStr, ...))
-    loops = {name: _section(f"control.{name}") for name in ("current", "velocity", "position")}
-    control = _section(
-        "control",
-        position=(loops["position"], ...),
-        velocity=(loops["velocity"] | None, None),
-        current=(loops["current"] | None, None),
-    )
-
-    def many(kind: Any, longest: int) -> Any:
-        return (Annotated[list[kind], Slot(max_length=longest)], Slot(default_factory=list))
-
-    optional = {name: (_section(name) | None, None) for name in ("load", "friction", "encoder", "validation")}
     return create_model(
         "DesignFile",
         __config__=_STRICT,
         design=(_section("design"), ...),
-        motor=(_section("motor"), ...),
-        limits=(_section("limits"), ...),
-        control=(control, ...),
-        gear=many(gear, MAX_GEARS),
-        requirement=many(RawRequirement, MAX_LIST),
-        correlation=many(RawCorrelation, MAX_LIST),
-        fact=many(RawFact, MAX_LIST),
+        requirement=_many(RawRequirement, MAX_LIST),
+        correlation=_many(RawCorrelation, MAX_LIST),
+        fact=_many(RawFact, MAX_LIST),
         objects=(RawObjects | None, None),
-        **optional,  # type: ignore[call-overload]
+        **_tables(""),
     )

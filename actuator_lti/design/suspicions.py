@@ -20,7 +20,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     ()
     """
     found: list[str] = []
-    for check in (_sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder):
+    for check in (_sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor):
         found.extend(check(design))
     return tuple(found)
 
@@ -47,7 +47,7 @@ def _sampling(design: Design) -> Iterator[str]:
 
 def estimated_crossovers(design: Design) -> dict[str, float]:
     """First estimates of the loops' crossovers in rad/s, from the asymptotes; only for warnings."""
-    control, motor = design.controller, design.motor
+    control, motor = design.controller, design.effective_motor
     found: dict[str, float] = {}
     if control.current is not None and motor.inductance_H is not None:
         found["current"] = control.current.gain_V_A / motor.inductance_H
@@ -57,7 +57,8 @@ def estimated_crossovers(design: Design) -> dict[str, float]:
             divisor = 1.0 if control.current is not None else motor.resistance_ohm
             torque = motor.torque_constant_Nm_A / divisor
         found["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
-        found["position"] = control.position.gain
+        if control.position is not None:
+            found["position"] = control.position.gain
     return found
 
 
@@ -79,7 +80,7 @@ def _crossovers(design: Design) -> Iterator[str]:
 
 
 def _limits(design: Design) -> Iterator[str]:
-    limits, resistance = design.limits, design.motor.resistance_ohm
+    limits, resistance = design.limits, design.effective_motor.resistance_ohm
     if resistance is not None:
         stall = limits.voltage_V / resistance
         if isfinite(limits.peak_current_A) and limits.peak_current_A > stall:
@@ -99,9 +100,28 @@ def _unused(design: Design) -> Iterator[str]:
         yield "friction.breakaway_ratio: not used by the tanh law"
 
 
+def _holding_torque(design: Design) -> float | None:
+    """Largest torque at the output without losses: peak current (or stall current) times kM times N."""
+    motor, limits = design.effective_motor, design.limits
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * limits.voltage_V * design.total_ratio
+    if motor.torque_constant_Nm_A is None or motor.resistance_ohm is None:
+        return None
+    current = limits.voltage_V / motor.resistance_ohm
+    if design.controller.current is not None:
+        current = min(current, limits.peak_current_A)
+    return motor.torque_constant_Nm_A * current * design.total_ratio
+
+
 def _loads(design: Design) -> Iterator[str]:
     largest = design.load.moment_max_Nm
     unit = "N" if design.axis == "linear" else "N*m"
+    holding = _holding_torque(design)
+    if design.load.path == "back-drivable" and holding is not None and largest > holding:
+        yield (
+            f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
+            "at its peak current without losses"
+        )
     for load in design.validation.loads_Nm:
         if abs(load) > largest:
             yield f"validation.loads: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"
@@ -132,3 +152,16 @@ def _encoder(design: Design) -> Iterator[str]:
     if isfinite(top) and step > 0.05 * top:
         unit = "m/s" if design.axis == "linear" else "rad/s"
         yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"
+
+
+def _ac_motor(design: Design) -> Iterator[str]:
+    rms = {"rms-line": 1.5**0.5, "peak-phase": 3**0.5 / 2}.get(design.motor.constants)
+    if rms is None:
+        return
+    unit = "A rms" if design.motor.constants == "rms-line" else "A peak of a phase"
+    for key, value in (
+        ("peak_current", design.limits.peak_current_A),
+        ("continuous_current", design.limits.continuous_current_A),
+    ):
+        if isfinite(value):
+            yield f"limits.{key}: {value:g} A of the equivalent DC motor, that is {value / rms:.4g} {unit}"

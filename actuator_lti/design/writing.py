@@ -10,13 +10,34 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any
 
-from actuator_lti.design.access import SECTIONS, section_of
-from actuator_lti.design.fields import Field, Structure, fields_in
+from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.model import ControllerObjects, Design, Parameter, Requirement, Tolerance
+from actuator_lti.design.model import (
+    Controller,
+    ControllerObjects,
+    Design,
+    Limits,
+    Motor,
+    Parameter,
+    Requirement,
+    Tolerance,
+    Validation,
+    default_deflection,
+)
 from actuator_lti.design.quantities import write_limit
+from actuator_lti.design.sections import SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.errors import InputError
+
+# what a design has that its file does not mention: a section absent here must be written even when empty
+_BARE = Design(
+    name="",
+    title="",
+    motor=Motor(rotor_inertia_kgm2=1.0),
+    controller=Controller(period_s=1.0, computing_delay_s=0.0),
+    limits=Limits(voltage_V=1.0),
+    validation=Validation(full_deflection_rad=1.0),
+)
 
 
 def write_design(design: Design) -> str:
@@ -35,15 +56,16 @@ def design_tree(design: Design) -> dict[str, Any]:
     head = {"name": design.name, "title": design.title, "axis": design.axis}
     head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
     tree: dict[str, Any] = {"design": head}
-    for name in SECTIONS:
-        part = section_of(design, name)
-        if name == "load":
-            tree["gear"] = [
-                {"name": gear.name, **_section(design, gear, f"gear.{gear.name}", "gear.*", structure)}
-                for gear in design.gears
-            ]
-        if part is not None:
-            _put(tree, name, _section(design, part, name, name, structure))
+    for section, path, part in parts_of(design):
+        table = _section(design, part, path, section.template, structure)
+        here = tree
+        for name in section.path.split(".")[:-1]:
+            here = here.setdefault(name, {})
+        if section.many:
+            named = {"name": part.name} if section.many == "named" else {}
+            here.setdefault(section.key, []).append({**named, **table})
+        elif table or section.required or at_place(_BARE, section.place) is None:
+            here[section.key] = table
     tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
     tree["correlation"] = [asdict(item) for item in design.correlations]
     tree["fact"] = [asdict(item) for item in design.facts]
@@ -53,14 +75,6 @@ def design_tree(design: Design) -> dict[str, Any]:
             "values": {item.label: object_entry(item) for item in design.objects.values},
         }
     return {key: value for key, value in tree.items() if value not in ({}, [])}
-
-
-def _put(tree: dict[str, Any], name: str, section: dict[str, Any]) -> None:
-    outer, _, inner = name.partition(".")
-    if inner:
-        tree[outer][inner] = section
-    else:
-        tree[outer] = section
 
 
 def _section(design: Design, part: Any, name: str, template: str, structure: Structure) -> dict[str, Any]:
@@ -73,17 +87,16 @@ def _section(design: Design, part: Any, name: str, template: str, structure: Str
             section[field.key] = _entry(known)
         elif value is not None and value != inf and value != defaults[field.attribute]:
             section[field.key] = _bare(field, value, field.unit(structure))
-    if name == "validation" and not any(path.startswith("validation.") for path in design.parameters):
-        fallback = 0.01 if design.axis == "linear" else 0.17453292519943295
-        if part.full_deflection_rad == fallback and len(section) == 1:
-            return {}
+    unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
+    if unsaid and len(section) == 1 and part.full_deflection_rad == default_deflection(design.axis):
+        return {}
     return section
 
 
 def _bare(field: Field, value: Any, unit: str) -> Any:
     if isinstance(value, tuple):
         return [_bare(field, item, unit) for item in value]
-    return value if isinstance(value, str) or unit == "1" else f"{value!r} {unit}"
+    return value if isinstance(value, str | bool) or unit == "1" else f"{value!r} {unit}"
 
 
 def _written(text: str) -> str | int | float:
@@ -153,17 +166,27 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     return design_from_tree(tree, design.origin or design.name)
 
 
+def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
+    structure = Structure.of(design)
+    found: dict[str, Any] = {}
+    for path, value in values.items():
+        field = field_of(path)
+        unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
+        plain = isinstance(value, int | float) and not isinstance(value, bool)
+        found[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+    return found
+
+
 def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
+    lists = ("requirement", *(section.path for section in SECTIONS if section.many))
     for depth, part in enumerate(parts[:-1]):
-        if depth == 0 and part in ("gear", "requirement"):
-            here = here.get(part, [])
-        elif isinstance(here, list):
-            label = "id" if parts[0] == "requirement" else "name"
-            here = next((item for item in here if item[label] == part), None)
+        if isinstance(here, list):
+            here = next((item for k, item in enumerate(here, 1) if _label(item, k) == part), None)
         elif isinstance(here, dict):
-            here = here.setdefault(part, {})
+            here = here.setdefault(part, [] if ".".join(parts[: depth + 1]) in lists else {})
         if here is None:
             raise InputError(f"{path}: the design {design.name} has no {'.'.join(parts[: depth + 1])}")
     if not isinstance(here, dict):
@@ -177,25 +200,18 @@ def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> No
     here[parts[-1]] = value
 
 
+def _label(item: dict[str, Any], number: int) -> str:
+    """What a repeated table is known by: its id, its name, else its number from 1."""
+    return str(item.get("id", item.get("name", number)))
+
+
 def design_hash(design: Design) -> str:
     """SHA-256 (hex) of what a design is: all values in SI to 12 digits, tolerances and requirements.
 
     It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
     """
-    content = {
-        key: _canonical(getattr(design, key))
-        for key in (
-            "axis",
-            "motor",
-            "gears",
-            "load",
-            "friction",
-            "encoder",
-            "limits",
-            "controller",
-            "validation",
-        )
-    }
+    top = {section.place for section in SECTIONS if not section.parent}
+    content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}
     content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
     content["tolerances"] = {

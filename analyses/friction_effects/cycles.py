@@ -177,7 +177,7 @@ def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmati
         if name in PLACES:
             rows[:, PLACES[name]] = SCALES * cycle.speed_amplitude_rad_s * value.real
     if "th" in cycle.state and design.controller.velocity is not None:
-        before = -design.controller.position.gain * cycle.state["th"].real
+        before = -design.controller.position_loop.gain * cycle.state["th"].real
         rows[:, at.SPEED_COMMAND_START] = SCALES * cycle.speed_amplitude_rad_s * before
     rows[:, at.WINDOW], rows[:, at.CYCLES] = window, 3
     rows[:, at.TICKS] = round(CYCLES_WATCHED / 3.0) * window

@@ -55,7 +55,7 @@ class Hysteresis:
 def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling_ticks: int) -> Hysteresis:
     """Simulate a slow triangle with and without dry friction and compare the two branches."""
     ticks = max(PERIOD_SETTLINGS * settling_ticks, LEAST_TICKS)
-    every = design.controller.position.every
+    every = design.controller.position_loop.every
     ticks = 4 * every * round(ticks / (4 * every))
     period = ticks * design.controller.period_s
     smallest = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad

@@ -38,7 +38,7 @@ def tone(frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES
     phases as there are updates: its largest sample is its peak to ``1 - cos(pi/updates)``.
     """
     control = design.controller
-    every = control.position.every
+    every = control.position_loop.every
     T = every * control.period_s
     cycles = max(1, math.ceil(least_updates * frequency_hz * T))
     updates = round(cycles / (frequency_hz * T))
@@ -49,7 +49,7 @@ def tone(frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES
 
 def frequency_range_hz(design: Design, loops: Loops) -> tuple[float, float]:
     """Give the range around the bandwidth of the position loop in which large signals are looked at."""
-    T = design.controller.position.every * design.controller.period_s
+    T = design.controller.position_loop.every * design.controller.period_s
     nyquist = 0.5 / T
     grid = np.geomspace(nyquist * 1e-5, nyquist * 0.999, 400)
     magnitude = np.abs(response_at(loops.reference_to_output, 2.0 * np.pi * grid))

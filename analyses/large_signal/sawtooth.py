@@ -137,7 +137,7 @@ def sawtooth(
         _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
         for load in design.validation.loads_Nm
     )
-    swift = design.controller.position.gain / chosen.omega_rad_s
+    swift = design.controller.position_loop.gain / chosen.omega_rad_s
     push = min(found.acceleration_rad_s2 for found in figures)
     reversal = math.degrees(2.0 * rate / push * chosen.omega_rad_s)
     electric = design.motor.has_electrical_dynamics

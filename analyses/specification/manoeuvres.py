@@ -110,7 +110,7 @@ def _sine_hz(full: float, rate: float, acceleration: float) -> float | None:
 
 def _sine(design: Design, name: str, full: float, hz: float, load_Nm: float) -> Manoeuvre:
     """Two periods of a sine; the second counts."""
-    every = design.controller.position.every
+    every = design.controller.position_loop.every
     hz = min(hz, 0.2 / (every * design.controller.period_s))
     chosen = tone(hz, design)
     period = chosen.ticks / chosen.cycles * design.controller.period_s

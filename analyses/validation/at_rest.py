@@ -81,7 +81,7 @@ def sweep_from_rest(
     described : bool
         Whether there is dry friction to be described.
     """
-    tick_s, n = design.controller.period_s, design.controller.position.every
+    tick_s, n = design.controller.period_s, design.controller.position_loop.every
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
@@ -126,11 +126,13 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
     answer is the same but for the images of a held signal.
     """
-    from actuator_lti.loops.cascade import cascade
+    from actuator_lti.drive.operating import Operating
+    from actuator_lti.drive.wiring import wire
     from actuator_lti.loops.sampled import reference_to_output
 
     point = "sliding" if speed_rad_s is None else "describing-function"
-    wired = cascade(design, point, load_Nm, speed_rad_s)  # type: ignore[arg-type]
+    at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
+    wired = wire(design, at)
     return linear_response(reference_to_output(wired), frequency_hz)
 
 

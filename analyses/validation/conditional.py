@@ -249,7 +249,7 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
 def _standing(design: Design) -> float:
     """Error (output, rad) that dry friction can hold up against a controller without integral."""
     control, friction, motor = design.controller, design.friction, design.motor
-    gain = control.position.gain * (control.velocity.gain if control.velocity else 1.0)
+    gain = control.position_loop.gain * (control.velocity.gain if control.velocity else 1.0)
     if control.velocity is not None and control.velocity.integral_time_s is not None:
         gain *= 10.0  # the integral brings it on in time
     per_unit = motor.source_gain_Nm_V or motor.torque_constant_Nm_A or 1.0

@@ -115,7 +115,9 @@ def full_range(design: Design) -> dict[str, float]:
     elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:
         speed = min(speed, limits.voltage_V * motor.source_gain_Nm_V / design.friction.viscous())
     if not isfinite(speed):
-        speed = design.validation.full_deflection_rad * design.total_ratio * design.controller.position.gain
+        speed = (
+            design.validation.full_deflection_rad * design.total_ratio * design.controller.position_loop.gain
+        )
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
 
 

@@ -225,4 +225,4 @@ def every(design: Design, stage: str) -> int:
     control = design.controller
     if stage == "velocity" and control.velocity is not None:
         return control.velocity.every
-    return control.position.every if stage == "position" else 1
+    return control.position_loop.every if stage == "position" else 1

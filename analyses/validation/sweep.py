@@ -146,7 +146,7 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
     scale = rooms.get(smallest.get(setup.point, ""), 1.0)
     if setup.point == "output":
         scale = rooms.get("motor_speed_rad_s", 1.0) / (
-            setup.design.total_ratio * setup.design.controller.position.gain
+            setup.design.total_ratio * setup.design.controller.position_loop.gain
         )
     faint = np.full(window.ticks.size, 1e-4 * scale)
     result = _run(setup, window, faint, min(settle_ticks, FAINT_SETTLE_TICKS), threads)
@@ -166,7 +166,7 @@ def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint:
     limit, controller = setup.design.limits.acceleration_rad_s2, setup.design.controller
     if setup.outer != "position" or controller.velocity is None or not np.isfinite(limit):
         return np.full(faint.size, inf)
-    T = controller.position.every * controller.period_s
+    T = controller.position_loop.every * controller.period_s
     signal = "probe_w_ref_before" if setup.point == "w_ref" else "speed_command_rad_s"
     low, high = result.span(signal)
     change = (high - low) * np.abs(np.sin(np.pi * window.frequency_hz * T))

@@ -24,8 +24,11 @@ COLOURS = {
     "acceleration": style.ORANGE,
     "current": style.GREEN,
     "voltage": style.RED,
+    "torque-command": style.SKY,
+    "overload": style.INK,
+    "profile": style.MUTED,
 }
-LINES = {"speed": 0, "acceleration": 1, "current": 2, "voltage": 3}
+LINES = {name: k % 7 for k, name in enumerate(n for n in COLOURS if n not in ("friction", "stiction"))}
 WORDS = {
     "friction": "dry friction",
     "stiction": "stiction",
@@ -33,6 +36,9 @@ WORDS = {
     "acceleration": "acceleration limit",
     "current": "current limit",
     "voltage": "voltage limit",
+    "torque-command": "limit before the torque filters",
+    "overload": "overload protection",
+    "profile": "profile of the command",
     "none": "linear",
 }
 GLYPHS: dict[str, dict[str, Any]] = {

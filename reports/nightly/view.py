@@ -17,6 +17,7 @@ from reports.nightly.code_version import commits_between
 from reports.nightly.figures import Figure, Verdict
 from reports.nightly.history import History
 from reports.nightly.job import BROKEN
+from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.text import slug
 from reports.nightly.trend import WINDOW, flaps, may_flap, missing_nights
@@ -127,6 +128,7 @@ class Overview:
     missing: tuple[tuple[int, int], ...]
     interrupted: tuple[str, ...]
     tolerances: Any
+    memory: Memory
 
     @property
     def alone(self) -> tuple[DesignView, ...]:
@@ -169,6 +171,7 @@ def overview(
         missing=missing_nights([r.started for r in runs]),
         interrupted=tuple(history.interrupted()),
         tolerances=study.tolerances,
+        memory=history.memory(),
     )
 
 

@@ -51,15 +51,39 @@ def _value(field: Field, structure: Structure) -> st.SearchStrategy[Any]:
         return st.sampled_from(field.choices)
     if field.kind == "text":
         return _texts
+    if field.kind == "flag":
+        return st.booleans()
     if field.kind == "integer":
-        return st.integers(1, 4)
+        return st.integers(1, int(min(4, field.high)))
     unit = field.unit(structure)
     middle = 1.0 if field.high == BIG else min(1.0, field.high / 4)
+    if field.low < 0.0 and field.high < 1.0:  # a coefficient that is negative as a rule
+        middle = -middle / 100
     if field.kind == "quantities":
         items = _factors.map(lambda x: x * middle if unit == "1" else f"{x * middle!r} {unit}")
         return st.lists(items, min_size=1, max_size=4)
     low = 4 * field.low if field.low >= 1.0 else 0.0
     return _factors.flatmap(lambda x: written_value(unit, max(x * middle, low)))
+
+
+_windup = st.sampled_from(
+    [
+        {"anti_windup": "conditional", "tracking_time": None},
+        {"anti_windup": "clamped", "tracking_time": None, "integral_time": "10 ms"},
+        {"anti_windup": "back-calculation", "tracking_time": "3 ms", "integral_time": "10 ms"},
+    ]
+)
+_NO_OVERLOAD = {"speed": None, "continuous_current": None, "peak_time": None}
+_overload = st.sampled_from(
+    [_NO_OVERLOAD, {"speed": None, "peak_current": "12 A", "continuous_current": "4 A", "peak_time": "1 s"}]
+)
+_FILTERS: list[dict[str, Any]] = [
+    {"kind": "lowpass", "frequency": "20 Hz", "order": 2, "damping": 0.7},
+    {"kind": "lowpass", "frequency": {"value": "30 Hz", "source": "tuned", "tolerance": "5 %"}},
+    {"kind": "notch", "frequency": "200 rad/s", "width": "50 rad/s", "depth": 0.1},
+    {"kind": "leadlag", "zero": "10 rad/s", "pole": "100 rad/s", "on": "speed"},
+    {"kind": "biquad", "b": [0.5, 0.1, 0.2], "a": [-0.4, 0.2]},
+]
 
 
 @st.composite
@@ -73,17 +97,21 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     constant = draw(_factors)
     electrical: dict[str, Any] = {"source_gain": None, "torque_constant": f"{constant} {torque}/A",
                                   "back_emf_constant": f"{constant * 1.05:.6g} V*s/{angle}",
-                                  "resistance": "1 ohm", "inductance": "1 mH"}  # fmt: skip
+                                  "resistance": "1 ohm", "inductance": "1 mH", "constants": "dc"}  # fmt: skip
     ideal = {**dict.fromkeys(electrical), "source_gain": draw(written_value(f"{torque}/V", constant))}
     control = draw(_section("control", structure, {"period": "1 ms", "computing_delay": "1.5 ms"}))
     n_v = draw(st.integers(1, 3))
     no_feedforward = {} if has_velocity else {"feedforward": None}
     n_p = n_v * draw(st.integers(1, 3)) if has_velocity else 1
-    control["position"] = draw(_section("control.position", structure, {"every": n_p, **no_feedforward}))
+    if not has_velocity:
+        no_feedforward |= {"acceleration_feedforward": None, "friction_feedforward": None}
+    if draw(st.booleans()) or not (has_velocity or has_current):
+        control["position"] = draw(_section("control.position", structure, {"every": n_p, **no_feedforward}))
     if has_velocity:
-        control["velocity"] = draw(_section("control.velocity", structure, {"every": n_v}))
+        control["velocity"] = draw(_section("control.velocity", structure, {"every": n_v, **draw(_windup)}))
+        control["velocity"]["filter"] = draw(st.lists(st.sampled_from(_FILTERS), max_size=3))
     if has_current:
-        control["current"] = draw(_section("control.current", structure, {}))
+        control["current"] = draw(_section("control.current", structure, draw(_windup)))
     names = draw(
         st.lists(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_-]{0,8}", fullmatch=True), unique=True, max_size=3)
     )
@@ -91,12 +119,39 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
         "design": draw(_section("design", structure, {"name": "d", "axis": axis})),
         "motor": draw(_section("motor", structure, ideal if source else electrical)),
         "gear": [{"name": name, **draw(_section("gear.*", structure, {}))} for name in names],
-        "limits": draw(_section("limits", structure, {"speed": None, "continuous_current": None})),
+        "limits": draw(_section("limits", structure, draw(_overload) if has_current else _NO_OVERLOAD)),
         "control": control,
     }
-    for name in ("load", "friction", "encoder", "validation"):
+    tracking = draw(st.sampled_from([{"speed": "ideal"}, {"speed": "tracking", "bandwidth": "10 Hz"}]))
+    given = {
+        "load": {}, "friction": {}, "encoder": {"bandwidth": None, **tracking}, "validation": {},
+        "coupling": {"after": None}, "output_encoder": {}, "instruments": {"jitter": "20 us"},
+    }  # fmt: skip
+    if "position" in control:
+        given["command"] = {"jerk": None, "acceleration": None, "rate": "1 urad/s"}
+        given["command"] = given["command"] if axis == "rotary" else {**given["command"], "rate": "1 um/s"}
+    if not source:
+        given["temperature"] = {
+            "winding_limit": None,
+            "magnet_coefficient": "-0.11 %/K",
+            "resistance_coefficient": "0.393 %/K",
+        }
+        given["supply"] = {"regenerative": False, "capacitance": "2 mF", "brake_voltage": "1e4 V"}
+    for name, fixed in given.items():
         if draw(st.booleans()):
-            tree[name] = draw(_section(name, structure, {}))
+            tree[name] = draw(_section(name, structure, fixed))
+    if "load" in tree and axis == "rotary" and draw(st.booleans()):
+        tree["load"]["gravity"] = draw(_section("load.gravity", structure, {}))
+    if "load" in tree and "coupling" in tree and draw(st.booleans()):
+        tree["load"]["friction"] = draw(_section("load.friction", structure, {}))
+    if draw(st.booleans()) and tree.get("friction", {}).get("law") != "tanh":
+        points = [{"speed": 0.0, "torque": 2.0}, {"speed": 3.0, "torque": 3.0, "direction": "both"}]
+        points = [
+            {**p, "speed": f"{p['speed']} {angle}/s", "torque": f"{p['torque']} {torque}"} for p in points
+        ]
+        tree["friction"] = {**tree.get("friction", {}), "point": points}
+        for key in ("dry_torque", "viscous"):
+            tree["friction"].pop(key, None)
     tree["requirement"] = draw(_requirements(torque))
     tree["fact"] = draw(st.lists(st.fixed_dictionaries({"label": _texts, "value": _texts}), max_size=2))
     return tree
@@ -113,6 +168,6 @@ def _requirements(draw: st.DrawFn, torque: str) -> list[dict[str, Any]]:
         if quantity == "motor_current":
             item["load"] = f"{draw(_factors)!r} {torque}"
         else:
-            item["loop"] = draw(st.sampled_from(["every", "position"]))
+            item["loop"] = "every"
         found.append(item)
     return found

@@ -27,7 +27,7 @@ AMBER = load_design("ilr33-amber")
 def test_every_numeric_key_can_be_read_and_changed(path: str) -> None:
     value = parameter_value(AMBER, path)
     factor = 1.0 if path in ("encoder.difference_samples", "friction.breakaway_ratio") else 2.0
-    factor = 0.5 if path in ("limits.continuous_current", "limits.speed") else factor
+    factor = 0.5 if path in ("limits.continuous_current", "limits.speed", "limits.release") else factor
     changed = with_values(AMBER, {path: value * factor}, check=False)
     assert parameter_value(changed, path) == value * factor
     others = {p: parameter_value(changed, p) for p in paths_of(changed) if p != path}

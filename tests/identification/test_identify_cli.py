@@ -93,7 +93,7 @@ def test_the_results_become_sections_of_the_report(
 ) -> None:
     _run(capsys, "identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
     result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
-    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out, "--processes", "1")
+    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out)
     ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
     assert "identification" in ids
     assert ids.count("provenance") == 1

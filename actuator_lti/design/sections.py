@@ -1,0 +1,161 @@
+"""The sections of a design file: which table becomes which part of a `Design`, in the order of the file.
+
+Reading, writing, access by dotted key, the schema and the hash are loops over this table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from actuator_lti.design import model
+
+Many = Literal["", "named", "numbered"]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of the file.
+
+    Attributes
+    ----------
+    path : str
+        Table name, such as ``"control.velocity"``; of repeated tables without the name or number.
+    place : str
+        Where the part lies in a `Design`, such as ``"controller.velocity"``.
+    kind : type
+        Dataclass of the part.
+    required : bool
+        Whether a file must have it.
+    many : {"", "named", "numbered"}
+        Repeated tables, known by their key ``name`` (gears) or by their number from 1.
+    rare : bool
+        Whether lists of values pass over it while all its values are the defaults.
+    """
+
+    path: str
+    place: str
+    kind: type
+    required: bool = False
+    many: Many = ""
+    rare: bool = False
+
+    @property
+    def template(self) -> str:
+        """The path under which the fields of this section are registered, such as ``"gear.*"``."""
+        return f"{self.path}.*" if self.many else self.path
+
+    @property
+    def parent(self) -> str:
+        """The table that this one lies in; empty at the top."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def key(self) -> str:
+        """Last part of the table name."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def attribute(self) -> str:
+        """Last part of the place."""
+        return self.place.rpartition(".")[2]
+
+    def item_path(self, index: int, item: Any) -> str:
+        """Dotted path of one repeated table: ``gear.worm``, ``friction.point.2``."""
+        return f"{self.path}.{item.name if self.many == 'named' else index + 1}"
+
+
+SECTIONS: tuple[Section, ...] = (
+    Section("motor", "motor", model.Motor, required=True),
+    Section("screw", "screw", model.Screw),
+    Section("gear", "gears", model.Gear, many="named"),
+    Section("coupling", "coupling", model.Coupling),
+    Section("load", "load", model.Load),
+    Section("load.friction", "load.friction", model.LoadFriction),
+    Section("load.gravity", "load.gravity", model.Gravity),
+    Section("friction", "friction", model.Friction),
+    Section("friction.point", "friction.points", model.FrictionPoint, many="numbered"),
+    Section("encoder", "encoder", model.Encoder),
+    Section("output_encoder", "output_encoder", model.OutputEncoder, rare=True),
+    Section("instruments", "instruments", model.Instruments, rare=True),
+    Section("limits", "limits", model.Limits, required=True),
+    Section("supply", "supply", model.Supply),
+    Section("temperature", "temperature", model.Temperature),
+    Section("command", "command", model.Command, rare=True),
+    Section("control", "controller", model.Controller, required=True),
+    Section("control.current", "controller.current", model.CurrentLoop),
+    Section("control.velocity", "controller.velocity", model.VelocityLoop),
+    Section("control.velocity.filter", "controller.velocity.filters", model.Filter, many="numbered"),
+    Section("control.position", "controller.position", model.PositionLoop),
+    Section("validation", "validation", model.Validation),
+)
+"""Every section, in the order of a design file."""
+
+BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
+
+
+def children(path: str) -> tuple[Section, ...]:
+    """The sections directly inside a table (``""``: at the top)."""
+    return tuple(section for section in SECTIONS if section.parent == path)
+
+
+def template_of(path: str) -> str:
+    """The registered form of a dotted path: names and numbers of repeated tables become ``*``.
+
+    Examples
+    --------
+    >>> template_of("gear.worm.ratio"), template_of("control.velocity.filter.1.depth")
+    ('gear.*.ratio', 'control.velocity.filter.*.depth')
+    """
+    for section in SECTIONS:
+        if section.many and path.startswith(section.path + "."):
+            rest = path[len(section.path) + 1 :].split(".")
+            return ".".join([section.path, "*", *rest[1:]])
+    return path
+
+
+def parts_of(design: model.Design) -> Iterator[tuple[Section, str, Any]]:
+    """Each section that a design has: section, dotted path, part; repeated ones one by one."""
+    for section in SECTIONS:
+        part = at_place(design, section.place)
+        if section.many:
+            for index, item in enumerate(part or ()):
+                yield section, section.item_path(index, item), item
+        elif part is not None:
+            yield section, section.path, part
+
+
+def at_place(design: model.Design, place: str) -> Any:
+    """The part of a design at a place such as ``"controller.velocity"``; None where a stage is absent."""
+    here: Any = design
+    for name in place.split("."):
+        here = None if here is None else getattr(here, name)
+    return here
+
+
+def part_at(design: model.Design, path: str) -> Any:
+    """The part that a table's dotted path names; None if the design has none, KeyError if no table can."""
+    if path in BY_PATH and not BY_PATH[path].many:
+        return at_place(design, BY_PATH[path].place)
+    outer = path.rpartition(".")[0]
+    section = BY_PATH.get(outer)
+    if section is None or not section.many:
+        raise KeyError(path)
+    items = enumerate(at_place(design, section.place) or ())
+    return next((item for index, item in items if section.item_path(index, item) == path), None)
+
+
+def with_part(design: model.Design, path: str, part: Any) -> model.Design:
+    """A copy of a design in which the part at a table's dotted path is another."""
+    section = BY_PATH.get(path)
+    if section is None:
+        section = BY_PATH[path.rpartition(".")[0]]
+        old = at_place(design, section.place)
+        part = tuple(part if section.item_path(i, item) == path else item for i, item in enumerate(old))
+    return _replaced(design, section.place.split("."), part)
+
+
+def _replaced(here: Any, names: list[str], part: Any) -> Any:
+    inner = part if len(names) == 1 else _replaced(getattr(here, names[0]), names[1:], part)
+    return replace(here, **{names[0]: inner})

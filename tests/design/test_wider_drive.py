@@ -1,0 +1,139 @@
+"""Keys of the wider drive: what is read, what is refused and with which words."""
+
+from math import log, pi, sqrt
+
+import pytest
+
+from actuator_lti.design import load_design, read_design_text, write_design
+from actuator_lti.design.checks_control import TRACKING_LIMIT
+from actuator_lti.design.suspicions import warnings_of
+from actuator_lti.design.writing import with_overrides
+from actuator_lti.errors import InputError
+
+AMBER = load_design("ilr33-amber")
+FILTER = "control.velocity.filter"
+NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth": 0.1}
+
+
+def test_filters_keep_their_order_and_have_keys_of_their_own() -> None:
+    design = with_overrides(AMBER, {FILTER: [NOTCH, {"kind": "lowpass", "frequency": "1 kHz"}]})
+    first, second = design.controller.velocity.filters  # type: ignore[union-attr]
+    assert (first.frequency_rad_s, first.width_rad_s, first.depth) == (640.0, 320.0, 0.1)
+    assert second.frequency_rad_s == pytest.approx(2 * pi * 1000, rel=1e-15)
+    changed = with_overrides(design, {"control.velocity.filter.1.depth": 0.2})
+    assert changed.controller.velocity.filters[0].depth == 0.2  # type: ignore[union-attr]
+    assert read_design_text(write_design(changed), changed.origin) == changed
+
+
+def test_the_two_meanings_of_a_peak_time() -> None:
+    # r = 3 for one second: 8.490187 s (model.md section 6); the excess form gives r^2 - 1
+    base = {"limits.peak_time": "1 s"}
+    assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(1 / log(9 / 8), rel=1e-14)
+    assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(8.490187, abs=5e-7)
+    assert with_overrides(
+        AMBER, base | {"limits.overload": "excess"}
+    ).limits.overload_time_s == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("constants", ["rms-line", "peak-phase"])
+def test_an_ac_motor_keeps_torque_losses_and_voltage_limit(constants: str) -> None:
+    """A sinusoidal motor of phase flux constant k: amplitudes of a phase give 3/2 k i and 3/2 R i^2."""
+    k, R, L, amplitude, speed = 0.3, 0.7, 2e-3, 5.0, 40.0
+    torque, loss = 1.5 * k * amplitude, 1.5 * R * amplitude**2
+    if constants == "rms-line":
+        sheet = {"kM": torque / (amplitude / sqrt(2)), "kE": sqrt(3) * k / sqrt(2), "R": 2 * R, "L": 2 * L}
+        current = sqrt(1.5) * amplitude / sqrt(2)
+    else:
+        sheet = {"kM": 1.5 * k, "kE": k, "R": R, "L": L}
+        current = sqrt(3) / 2 * amplitude
+    motor = with_overrides(
+        AMBER,
+        {
+            "motor.constants": constants,
+            "motor.torque_constant": f"{sheet['kM']!r} N*m/A",
+            "motor.back_emf_constant": f"{sheet['kE']!r} V*s/rad",
+            "motor.resistance": f"{sheet['R']!r} ohm",
+            "motor.inductance": f"{sheet['L']!r} H",
+            "limits.speed": "1 rad/s",
+        },
+    ).effective_motor
+    assert motor.torque_constant_Nm_A * current == pytest.approx(torque, rel=1e-14)  # type: ignore[operator]
+    assert motor.resistance_ohm * current**2 == pytest.approx(loss, rel=1e-14)  # type: ignore[operator]
+    # the peak of the line-line voltage is what the bus limits
+    assert motor.back_emf_constant_Vs_rad * speed == pytest.approx(sqrt(3) * k * speed, rel=1e-14)  # type: ignore[operator]
+    assert motor.torque_constant_Nm_A == pytest.approx(motor.back_emf_constant_Vs_rad, rel=1e-14)
+
+
+def test_a_mixed_up_convention_is_named() -> None:
+    with pytest.raises(InputError, match=r"sqrt\(3\).*motor\.constants"):
+        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"})
+    with pytest.raises(InputError, match=r"60/\(2 pi\)"):
+        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"})
+
+
+def test_a_warm_motor() -> None:
+    motor = with_overrides(
+        AMBER, {"temperature.winding": "125 degC", "temperature.magnet": "75 °C"}
+    ).effective_motor
+    assert motor.resistance_ohm == pytest.approx(0.055 * 1.393, rel=1e-14)
+    assert motor.torque_constant_Nm_A == pytest.approx(5.9e-3 * (1 - 0.0011 * 50), rel=1e-14)
+
+
+def test_a_speed_drive_has_no_position_loop() -> None:
+    from actuator_lti.design.loader import design_from_tree
+    from actuator_lti.design.writing import design_tree
+
+    tree = design_tree(AMBER)
+    del tree["control"]["position"]
+    tree["requirement"] = []
+    design = design_from_tree(tree, "speed drive")
+    assert design.controller.outermost == "velocity"
+    with pytest.raises(InputError, match=r"control\.position: missing"):
+        _ = design.controller.position_loop
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({FILTER: [{"kind": "notch", "frequency": "1 kHz"}]}, r"filter\.1\.width.*missing"),
+        ({FILTER: [{**NOTCH, "order": 2}]}, r"filter\.1\.order = 2.*not allowed with kind"),
+        ({FILTER: [{**NOTCH, "frequency": "6 kHz"}]}, r"below the velocity loop's Nyquist"),
+        ({FILTER: [NOTCH] * 9}, "allowed: at most 8"),
+        ({FILTER: [{"kind": "biquad", "b": [1.0], "a": [-2.1, 1.0]}]}, "inside the unit circle"),
+        ({"encoder.speed": "tracking"}, r"needs encoder\.bandwidth"),
+        ({"encoder.speed": "tracking", "encoder.bandwidth": "2 kHz"}, "too fast for its period"),
+        ({"encoder.bandwidth": "100 Hz"}, 'allowed with speed = "tracking"'),
+        ({"control.velocity.tracking_time": "1 ms"}, "back-calculation"),
+        ({"limits.peak_time": "1 s", "limits.continuous_current": "12 A"}, "peak_current above continuous"),
+        ({"supply.regenerative": False}, r"needs supply\.capacitance"),
+        ({"supply.brake_voltage": "10 V"}, r"at least limits\.voltage = 12 V"),
+        ({"command.rate": "90 deg/s"}, r"faster than limits\.speed"),
+        ({"command.jerk": "1 rad/s^3"}, r"needs command\.acceleration"),
+        ({"friction.point": [{"speed": "1 rad/s", "torque": "1 mN*m"}]}, "friction.dry_torque"),
+        ({"instruments.jitter": "50 us"}, "a tenth of a tick"),
+        ({"temperature.winding": "20 K"}, "degC"),
+        ({"motor.constants": "ac"}, "rms-line"),
+    ],
+)  # fmt: skip
+def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        with_overrides(AMBER, changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
+    """The tracking loop of section 7: th+ = p + 2 w0 T r, w+ = w + w0^2 T r, p = th + T w, r = y - p."""
+    import numpy as np
+
+    def radius(x: float) -> float:
+        A = np.array([[1 - 2 * x, (1 - 2 * x)], [-(x**2), 1 - x**2]])
+        return float(np.max(np.abs(np.linalg.eigvals(A))))
+
+    assert radius(TRACKING_LIMIT * 0.999) < 1.0 < radius(2 * (sqrt(2) - 1) * 1.001)
+
+
+def test_the_current_of_an_ac_motor_is_explained() -> None:
+    design = with_overrides(
+        AMBER, {"motor.constants": "rms-line", "motor.torque_constant": f"{5.9e-3 * sqrt(3)!r} N*m/A"}
+    )
+    assert any("9.798 A rms" in line for line in warnings_of(design))
