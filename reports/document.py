@@ -16,6 +16,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
+from reports.certain import certain
 from reports.document_schema import SCHEMA, VERSION, validate
 from reports.findings import Finding
 from reports.findings import plain as plain_findings
@@ -200,7 +201,10 @@ def document(
     sections: Sequence[Section],
     kind: str = "report",
 ) -> dict[str, Any]:
-    """Put a document together; its verdict counts every verdict in its sections."""
+    """Put a document together; its verdict counts every verdict in its sections.
+
+    Numbers are rounded to the digits that are the same on every machine (`reports.certain`).
+    """
     made = {
         "schema": SCHEMA,
         "version": VERSION,
@@ -210,7 +214,7 @@ def document(
         "design": plain(design),
         "provenance": plain(provenance),
         "verdict": summary(block for part in sections for block in walk(part)),
-        "sections": list(sections),
+        "sections": [certain(part) for part in sections],
     }
     check(made)
     return made

@@ -115,11 +115,19 @@ class VerdictsBlock(_Part):
     what: str = "requirements"
 
 
+class DetailsBlock(_Part):
+    """Blocks that open on demand."""
+
+    kind: Literal["details"]
+    title: str
+    blocks: list[Block]
+
+
 class GlanceFigure(_Part):
-    """One figure of a loop with the distance to its requirement."""
+    """One figure of a loop on the first screen, with the limit that is nearest to it."""
 
     label: str
-    value: float | None
+    value: Scalar
     unit: str
     format: str
     limit: float | None
@@ -133,20 +141,12 @@ class GlanceLoop(_Part):
 
     loop: str
     anchor: str
-    stable: Mark
-    figures: Annotated[list[GlanceFigure], Field(min_length=1)]
-
-
-class Weakest(_Part):
-    """The requirement that is nearest to its limit."""
-
-    label: str
-    words: str
-    passed: bool | None
+    stable: Cell
+    figures: list[GlanceFigure]
 
 
 class FindingItem(_Part):
-    """See `reports.findings.Finding`."""
+    """One sentence that a reader must know."""
 
     severity: Literal["fail", "warn", "info"]
     text: str
@@ -158,21 +158,13 @@ class GlanceBlock(_Part):
 
     kind: Literal["glance"]
     loops: list[GlanceLoop]
-    weakest: Weakest | None
+    weakest: dict[str, Scalar] | None
     findings: list[FindingItem]
     more: int
 
 
-class DetailsBlock(_Part):
-    """Blocks that open on demand."""
-
-    kind: Literal["details"]
-    title: str
-    blocks: list[Block]
-
-
 Block = Annotated[
-    TableBlock | FigureBlock | TextBlock | FactsBlock | VerdictsBlock | GlanceBlock | DetailsBlock,
+    TableBlock | FigureBlock | TextBlock | FactsBlock | VerdictsBlock | DetailsBlock | GlanceBlock,
     Discriminator("kind"),
 ]
 
@@ -184,8 +176,8 @@ class SectionPart(_Part):
     title: str
     result: str = ""
     intro: str
-    findings: list[FindingItem] = []
     status: Status
+    findings: list[FindingItem] = Field(default_factory=list)
     blocks: list[Block]
 
 
@@ -242,7 +234,7 @@ def _line(error: ValidationError | RecursionError) -> str:
 
 def _place(steps: tuple[int | str, ...]) -> str:
     """A place as people write it, without the names of the kinds that the union adds."""
-    kinds = {"table", "figure", "text", "facts", "verdicts", "glance", "details", "mark", "plain"}
+    kinds = {"table", "figure", "text", "facts", "verdicts", "details", "mark", "plain"}
     made = ""
     for before, step in zip((None, *steps), steps, strict=False):
         if isinstance(step, int):

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from analyses.isolation import Missing, caught, note
+from analyses.isolation import caught, note
 from reports.figures.registry import draw_svg
 
 Progress = Callable[[int, int], None]
 PLACEHOLDER = (
-    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 420 60" role="img" aria-label="no figure">'
-    '<text x="10" y="36" font-size="12" fill="currentColor">This figure could not be drawn; the exit status '
-    "was 3.</text></svg>"
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 420 60"><text x="10" y="36" font-size="12"'
+    ' fill="currentColor">This figure could not be drawn; the exit status was 3.</text></svg>'
 )
 
 
@@ -25,7 +25,8 @@ def draw_all(
     Parameters
     ----------
     blocks : sequence of mapping
-        Figure blocks of a document.
+        Figure blocks of a document; their data pass through JSON, so that a page equals one made of
+        report.json.
     progress : callable, optional
         Called with (drawn, in all).
     page : bool
@@ -33,7 +34,7 @@ def draw_all(
     """
     drawn: list[str] = []
     for k, block in enumerate(blocks):
-        svg, missing = _drawn(block, f"f{k + 1}", page)
+        svg, missing = caught(f"figure {k + 1} ({block['figure']})", partial(_draw, block, f"f{k + 1}", page))
         drawn.append(svg or PLACEHOLDER)
         note([missing] if missing else [])
         if progress is not None:
@@ -41,11 +42,7 @@ def draw_all(
     return drawn
 
 
-def _drawn(block: Mapping[str, Any], prefix: str, page: bool) -> tuple[str | None, Missing | None]:
+def _draw(block: Mapping[str, Any], prefix: str, page: bool) -> str:
     """Draw one figure; its data pass through JSON, so that a page equals one made of report.json."""
-
-    def draw() -> str:
-        data = json.loads(json.dumps(block["data"], allow_nan=False))
-        return draw_svg(block["figure"], data, prefix=prefix, page=page, alt=block["alt"])
-
-    return caught(f"figure {prefix[1:]} ({block['figure']})", draw)
+    data = json.loads(json.dumps(block["data"], allow_nan=False))
+    return draw_svg(block["figure"], data, prefix=prefix, page=page, alt=block["alt"])

@@ -28,7 +28,8 @@ COLOURS = {
     "overload": style.INK,
     "profile": style.MUTED,
 }
-LINES = {name: k % 7 for k, name in enumerate(n for n in COLOURS if n not in ("friction", "stiction"))}
+LIMITERS = [name for name in COLOURS if name not in ("friction", "stiction")]
+LINES = {name: k for k, name in enumerate(LIMITERS)}
 WORDS = {
     "friction": "dry friction",
     "stiction": "stiction",
@@ -36,7 +37,7 @@ WORDS = {
     "acceleration": "acceleration limit",
     "current": "current limit",
     "voltage": "voltage limit",
-    "torque-command": "limit before the torque filters",
+    "torque-command": "limit in front of the torque filters",
     "overload": "overload protection",
     "profile": "profile of the command",
     "none": "linear",
