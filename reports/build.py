@@ -62,15 +62,11 @@ def design_report(
         *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
-    required = [part for part in loops if part["id"] == "verdicts"]
-    items = [item for part in required for block in doc.walk(part) for item in block.get("items", ())]
-    with isolated() as unsaid:
-        said = (
-            attempt("first section", lambda: answer.section(figures, items, sections), None)
-            if loops
-            else None
-        )
-    sections[:0] = [*([said] if said else []), *notices([*missing, *unsaid], "linear")]
+    with isolated() as unanswered:
+        items = [item for block in doc.walk(loops[0]) for item in block.get("items", ())] if loops else []
+        answered = attempt("first screen", lambda: answer.section(figures, items, sections), None)
+    first_screen = [answered] if answered and figures else []
+    sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
     return doc.document(
         title=design.title or design.name,
         subtitle=design.description,

@@ -155,24 +155,6 @@ def command_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
     return (name, record[name]) if name in record.signals else None
 
 
-def check_simulated(design: Design) -> None:
-    """Refuse a design with parts that the simulator leaves out.
-
-    Raises
-    ------
-    InputError
-        Naming the part.
-    """
-    parts = {
-        "coupling": design.coupling is not None,
-        "friction.point": bool(design.friction.points),
-        "load.friction": design.load.friction is not None,
-    }
-    for name, there in parts.items():
-        if there:
-            raise InputError(f"{name}: is not simulated yet: no record can be held to it", design.name)
-
-
 def measured_signals(
     design: Design, record: Record, derive: bool = False, notes: list[str] | None = None
 ) -> dict[str, FloatArray]:
@@ -235,14 +217,10 @@ def model_signals(
     if command is None:
         wanted = command_name(design)
         raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
-    check_simulated(design)
     notes = [] if notes is None else notes
     design = _with_supply(design, record, notes)
     time = record.time_s - record.time_s[0]
-    load = _load(design, record, time, notes)
-    if LOADS[design.axis] in record.signals and design.load.gravity is not None:
-        notes.append("the recorded load holds all of it: the design's load.gravity is not added")
-        design = replace(design, load=replace(design.load, gravity=None))
+    design, load = _load(design, record, time, notes)
     period = design.controller.period_s
     run = simulate(
         design,
@@ -268,20 +246,21 @@ def model_signals(
     return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
 
 
-def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> LoadMoment:
-    """The recorded load; without one, the design's own slope of the load over the angle."""
+def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> tuple[Design, LoadMoment]:
+    """The recorded load, which holds all of it; without one, the design's own slope and gravity act."""
     from nonlinear import loads
 
-    name = LOADS[design.axis]
-    slope = design.load.moment_slope_Nm_rad
-    if name in record.signals:
-        if slope:
-            notes.append("the recorded load holds all of it: the design's load.moment_slope is not added")
-        return loads.series(time, record[name])
-    if slope:
-        notes.append(f"load: the design's load.moment_slope, {slope:g} per unit of output deflection")
-        return loads.proportional(slope)
-    return loads.constant(0.0)
+    name, own = LOADS[design.axis], []
+    if design.load.moment_slope_Nm_rad:
+        own.append("load.moment_slope")
+    if design.load.gravity is not None:
+        own.append("load.gravity")
+    if name not in record.signals:
+        notes.extend(f"load: the design's {key} acts" for key in own)
+        return design, loads.constant(0.0)
+    notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
+    bare = replace(design, load=replace(design.load, gravity=None, moment_slope_Nm_rad=0.0))
+    return bare, loads.series(time, record[name])
 
 
 def _initial(design: Design, measured: dict[str, FloatArray]) -> State:

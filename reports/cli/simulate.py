@@ -42,15 +42,15 @@ BiasOption = Annotated[
     float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
 ]
 SlopeOption = Annotated[
-    float | None,
+    float,
     typer.Option(
         "--load-slope",
         metavar="N_m/rad",
-        help="Hinge moment per rad of output angle (default: the design's; none beside --load-file).",
+        help="Load torque per rad of output angle, added to the design's.",
     ),
 ]
 LoadFileOption = Annotated[
-    Path | None, typer.Option("--load-file", metavar="CSV", help="Hinge moment over time: s, N m.")
+    Path | None, typer.Option("--load-file", metavar="CSV", help="Load torque over time: s, N m.")
 ]
 RecordOption = Annotated[
     Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
@@ -78,7 +78,7 @@ def simulate(
     duration: DurationOption = None,
     bias_rate: BiasOption = 0.0,
     load: LoadOption = 0.0,
-    load_slope: SlopeOption = None,
+    load_slope: SlopeOption = 0.0,
     load_file: LoadFileOption = None,
     record: RecordOption = None,
     csv: CsvOption = None,
@@ -116,7 +116,7 @@ def simulate(
             drive,
             wanted,
             run_time(wanted, duration),
-            build_load(load, slope_of(drive, load_slope, load_file), load_file),
+            build_load(load, load_slope, load_file),
             bias=commands.ramp(bias_rate * scale) if bias_rate else None,
             friction_on=not no_friction,
             limits_on=not no_limits,
@@ -211,15 +211,8 @@ def build_command(
     return simple[kind]()
 
 
-def slope_of(design: Design, asked: float | None, file: Path | None) -> float:
-    """The slope of the hinge moment: as asked, else the design's own; a load file holds all of it."""
-    if asked is not None:
-        return asked
-    return 0.0 if file is not None else design.load.moment_slope_Nm_rad
-
-
 def build_load(load: float, slope: float, file: Path | None) -> Any:
-    """The hinge moment asked for."""
+    """The load torque asked for."""
     from dataclasses import replace
 
     from nonlinear import loads
