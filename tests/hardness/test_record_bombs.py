@@ -14,11 +14,13 @@ from targets import CAMPAIGN, SPEC
 from actuator_lti import bounds
 from actuator_lti.errors import InputError
 from analyses.records import load_campaign, open_record, read_csv_record, read_mat_record
+from analyses.records.parquet_reader import read_parquet_record
 from nonlinear import commands
 
 KINDS: dict[str, Callable[[Path], object]] = {
     ".csv": lambda path: read_csv_record(path, SPEC),
     ".mat": lambda path: read_mat_record(path, SPEC),
+    ".parquet": lambda path: read_parquet_record(path, SPEC),
     ".toml": load_campaign,
     ".rec": open_record,
     ".cmd": lambda path: commands.recorded(path),
@@ -65,7 +67,7 @@ def test_a_small_file_that_unpacks_to_gigabytes(tmp_path) -> None:
     with pytest.raises(InputError, match=r"b\.mat.*more than allowed: at most 50000000"):
         read_mat_record(path, SPEC)
     path.write_bytes(packed_zeros(bounds.MAT_VALUES.most + (1 << 20)))
-    with pytest.raises(InputError, match=r"numbers of a \.mat file"):
+    with pytest.raises(InputError, match=r"numbers of a \.mat or Parquet file"):
         read_mat_record(path, SPEC)
 
 
