@@ -17,12 +17,9 @@ from actuator_lti import load_design
 from benchmarks.c_simulator import CSimulator
 from benchmarks.control_cascade import seconds_per_second
 from benchmarks.row import Row
-from nonlinear import commands
+from nonlinear import Rows
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.call import call
-from nonlinear.batch import put_sine, repeat_row, run_rows
-from nonlinear.parameters import design_row
-from nonlinear.setup import Tables, put_signal
 
 GROUP = "simulator"
 DURATION_S = 10.0
@@ -58,11 +55,16 @@ def rows(quick: bool = False) -> Iterator[Row]:
 
 def sawtooth_row() -> np.ndarray:
     """5 deg at 1 Hz with 4 N m on the baseline: stick, slip and saturation."""
-    row = design_row(load_design("ilr33-amber"))
-    row[at.TICKS] = round(DURATION_S / row[at.PERIOD])
-    row[at.LOAD] = 4.0
-    put_signal(row, at.COMMAND, commands.sine(np.radians(5.0), 1.0), Tables())
-    return row
+    return sawtooth().values[0]
+
+
+def sawtooth() -> Rows:
+    """The same as one row of a batch."""
+    rows = Rows.of(load_design("ilr33-amber"))
+    rows["ticks"] = round(DURATION_S / rows.value("period"))
+    rows["load"] = 4.0
+    rows.sine("command", np.radians(5.0), 1.0)
+    return rows
 
 
 def numba_seconds(row: np.ndarray, repeats: int) -> float:
@@ -124,13 +126,11 @@ def against_control(best: float) -> Row:
 
 def two_threads(quick: bool) -> Row:
     """A batch of 1000 runs on two threads over one; and what two processes of plain arithmetic get here."""
-    row = sawtooth_row()
-    row[at.TICKS] = 2000 if quick else 20_000
-    batch = repeat_row(row, 1000)
-    put_sine(batch, at.COMMAND, np.linspace(0.001, 0.1, 1000), 3.0)
+    batch = sawtooth().repeat(1000)
+    batch["ticks"] = 2000 if quick else 20_000
+    batch.sine("command", np.linspace(0.001, 0.1, 1000), 3.0)
     pairs = [
-        [best_of(lambda n=n: run_rows(batch, threads=n), 1, time.perf_counter) for n in (1, 2)]
-        for _ in range(3)
+        [best_of(lambda n=n: batch.run(threads=n), 1, time.perf_counter) for n in (1, 2)] for _ in range(3)
     ]
     one, two = np.array(pairs).min(axis=0)
     return Row(

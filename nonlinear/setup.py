@@ -40,6 +40,13 @@ class Tables:
             self.known[id(key)] = place
         return place
 
+    def append(self, other: Tables) -> int:
+        """Append all series of another set; returns where they begin."""
+        base = self.size
+        self.parts.extend(other.parts)
+        self.size += other.size
+        return base
+
     def joined(self) -> Floats:
         """One array for the kernel."""
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
@@ -73,7 +80,8 @@ def check_frequency(design: Design, command: Command) -> None:
 
 def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
     """Write the hinge moment."""
-    row[at.LOAD], row[at.LOAD_SLOPE] = load.constant_Nm, load.slope_Nm_rad
+    row[at.LOAD] = load.constant_Nm
+    row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:
         table = load.series.table(float(row[at.PERIOD]), int(row[at.TICKS]))
         if table is not None:
