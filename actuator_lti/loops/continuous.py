@@ -23,9 +23,10 @@ def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **nam
     n, k = len(flow.states), len(flow.delays_s)
     row = scale * flow.signals[signal]
     every = np.vstack([flow.rates, flow.delayed])
-    used = seen(every[:, : n + k] != 0, row[: n + k] != 0)
-    x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
     u = [n + k + SOURCES.index(source)]
+    depends, driven = every[:, : n + k] != 0, [n + k + SOURCES.index(s) for s in RATES.get(source, (source,))]
+    used = seen(depends, row[: n + k] != 0) & seen(depends.T, np.any(every[:, driven] != 0, axis=1))
+    x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
     dx, v, y = every[x], every[z], row[None, :]
     if len(x):
         names["states"] = [flow.states[i].replace(".", "_") for i in x]

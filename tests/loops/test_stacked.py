@@ -81,7 +81,8 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
         if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
             velocity = design.controller.velocity
             assert velocity is not None
-            values[path] = np.minimum(values[path], 2.5 / (velocity.every * values["control.period"]))
+            most = 2.0 if path.endswith("pole") else 2.5  # a pole on its zero would be no state at all
+            values[path] = np.minimum(values[path], most / (velocity.every * values["control.period"]))
     return values
 
 
