@@ -6,6 +6,8 @@ import sys
 import tomllib
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
 
@@ -40,3 +42,17 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
     "navigation_with_keys": False,
 }
+
+
+def _plain_bars(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Docstrings write |L| for a magnitude; to reStructuredText bars are substitutions."""
+    for number, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            parts = line.split("``")
+            parts[::2] = [part.replace("|", "\\|") for part in parts[::2]]
+            lines[number] = "``".join(parts)
+
+
+def setup(app: Sphinx) -> None:
+    """Connect ahead of numpydoc, which rewrites the docstrings."""
+    app.connect("autodoc-process-docstring", _plain_bars, priority=300)
