@@ -26,7 +26,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.batch import Progress, run_rows
-from nonlinear.parameters import design_row
+from nonlinear.parameters import design_rows
 from nonlinear.probe import Probe, write_probe
 from nonlinear.reduced import COLUMNS, BatchResult
 from nonlinear.setup import Tables
@@ -56,7 +56,9 @@ class Rows:
 
     @classmethod
     def of(cls, design: Design, count: int = 1, *, friction_on: bool = True, limits_on: bool = True) -> Rows:
-        """``count`` equal rows of a design at rest, without command (see `nonlinear.simulate`).
+        """``count`` rows of a design at rest, without command (see `nonlinear.simulate`).
+
+        They are equal, or those of a design stacked over ``count`` (`actuator_lti.design.access.stacked`).
 
         Examples
         --------
@@ -67,8 +69,7 @@ class Rows:
         >>> bool((rows.run().final_output_rad > 0.0099).all())
         True
         """
-        row = design_row(design, friction_on=friction_on, limits_on=limits_on)
-        return cls(design, np.tile(row, (count, 1)))
+        return cls(design, design_rows(design, count, friction_on=friction_on, limits_on=limits_on))
 
     @classmethod
     def join(cls, parts: Sequence[Rows]) -> Rows:

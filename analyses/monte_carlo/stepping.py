@@ -56,68 +56,16 @@ def step_units() -> dict[str, str]:
 
 
 def step_rows(step: StepCheck, population: Population) -> Rows:
-    """Simulator rows of every design: the nominal one with the changed columns put in."""
+    """Simulator rows of every design."""
     from nonlinear import Rows
 
-    rows = Rows.of(population.design, population.count)
-    _put_plant(population, rows)
-    _put_controllers(population, rows)
-    places = {
-        "speed_limit": "limits.speed", "acceleration_limit": "limits.acceleration",
-        "current_limit": "limits.peak_current", "voltage_limit": "limits.voltage",
-    }  # fmt: skip
-    for place, path in places.items():
-        if path in population.values:
-            rows[place] = population.get(path)
+    rows = Rows.of(population.stacked, population.count)
     rows["load"] = step.load_Nm
     rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
     rows.step_figures(step.amplitude_rad)
     rows.extremes()
     rows.step("command", step.amplitude_rad)
     return rows
-
-
-def _put_plant(population: Population, rows: Rows) -> None:
-    stacked = population.stacked
-    rows["ratio"], rows["inertia"] = stacked.total_ratio, stacked.inertia_kgm2
-    rows["dry"], rows["dry_reverse"] = (stacked.friction.dry_Nm(0.0, way) for way in (1, -1))
-    rows["viscous"], rows["viscous_reverse"] = (stacked.friction.viscous(way) for way in (1, -1))
-    places = {
-        "resistance": "motor.resistance", "inductance": "motor.inductance",
-        "back_emf": "motor.back_emf_constant", "torque_constant": "motor.torque_constant",
-        "source_gain": "motor.source_gain", "load_coefficient": "friction.load_coefficient",
-        "breakaway": "friction.breakaway_ratio", "smoothing": "friction.smoothing_speed",
-        "offset": "friction.offset_torque",
-    }  # fmt: skip
-    for place, path in places.items():
-        if path in population.values:
-            rows[place] = population.get(path)
-
-
-def _put_controllers(population: Population, rows: Rows) -> None:
-    design, period = population.design, np.asarray(population.get("control.period"))
-    ratio = np.asarray(population.get("control.computing_delay")) / period
-    whole = np.floor(ratio + 1e-9)
-    rest = (ratio - whole) * period
-    rows["period"] = period
-    rows["delay_ticks"] = whole
-    rows["delay_fraction"] = np.where(np.abs(rest) < 1e-9 * period, 0.0, rest)
-    rows["position_gain"] = population.get("control.position.gain")
-    rows["feedforward"] = population.get("control.position.feedforward")
-    velocity, current = design.controller.velocity, design.controller.current
-    if velocity is not None:
-        gain = population.get("control.velocity.gain")
-        rows["velocity_gain"] = gain
-        if velocity.integral_time_s is not None:
-            held = velocity.every * period
-            rows["velocity_integral"] = gain * held / population.get("control.velocity.integral_time")
-        filter_time = np.asarray(population.get("encoder.filter_time"))
-        rows["filter_coefficient"] = velocity.every * period / (filter_time + velocity.every * period)
-    if current is not None:
-        gain = population.get("control.current.gain")
-        rows["current_gain"] = gain
-        if current.integral_time_s is not None:
-            rows["current_integral"] = gain * period / population.get("control.current.integral_time")
 
 
 def step_columns(step: StepCheck, population: Population) -> Arrays:

@@ -42,7 +42,10 @@ def supply(p, s):  # type: ignore[no-untyped-def]
     if i_b >= 0.0 or p[layout.REGENERATIVE] > 0.0:
         s[layout.S_VOLTAGE_LIMIT] = max(Us - Rs * i_b, 0.0)
         s[ledger + layout.ENERGY_SUPPLY] += Us * i_b * Ts
-        s[ledger + layout.ENERGY_SUPPLY_LOSS] += Rs * i_b * i_b * Ts
+        # the drop that the current of the last tick met; a bus above the source gives from its capacitor
+        charged = Us < U and p[layout.REGENERATIVE] <= 0.0
+        line = layout.ENERGY_CAPACITOR if charged else layout.ENERGY_SUPPLY_LOSS
+        s[ledger + line] += (Us - U) * i_b * Ts
         return
     C = p[layout.CAPACITANCE]
     free = math.sqrt(max(U * U - 2.0 * power * Ts / C, 0.0))
