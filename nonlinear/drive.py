@@ -96,17 +96,20 @@ class Drive:
         angle_rad: float,
         output_angle_rad: float | None = None,
         bus_V: float | None = None,
+        output_speed_rad_s: float | None = None,
     ) -> float:
         """One tick of the controller alone on measured values (motor side); returns the voltage.
 
-        ``output_angle_rad`` is needed where the position comes from the output's sensor, ``bus_V`` where the
-        supply is modelled.
+        ``output_angle_rad`` and ``output_speed_rad_s`` are needed where the output's sensor is used, ``bus_V``
+        where the supply is modelled.
         """
         if output_angle_rad is None:
             output_angle_rad = angle_rad / self.design.total_ratio
-        measured = (current_A, speed_rad_s, angle_rad, output_angle_rad)
+        if output_speed_rad_s is None:
+            output_speed_rad_s = speed_rad_s / self.design.total_ratio
+        measured = (current_A, speed_rad_s, angle_rad, output_angle_rad, output_speed_rad_s)
         self._io[at.IN_COMMAND] = command
-        self._io[at.IN_CURRENT : at.IN_OUTPUT + 1] = measured
+        self._io[at.IN_CURRENT : at.IN_OUTPUT_SPEED + 1] = measured
         self._io[at.IN_BUS] = self.design.limits.voltage_V if bus_V is None else bus_V
         return float(control_tick(self._p, self._s, self._io))
 

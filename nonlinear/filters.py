@@ -62,17 +62,16 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
     return tustin((0.0, 0.0, w0 * w0), (1.0, 2.0 * item.damping * w0, w0 * w0), w0, period_s)
 
 
-def command_section(command: Command, period_s: Any) -> Section:
-    """The command filter: first order ``y += T/(TF + T) (x - y)``, second order by backward differences.
-
-    ``y = (x + (2 D q + 2 q^2) y1 - q^2 y2)/(1 + 2 D q + q^2)``, q = TF/T: stable for every time constant.
-    """
-    q = command.filter_time_s / period_s
-    if command.filter_order == 1:
-        return 1.0 / (1.0 + q), 0.0, 0.0, -q / (1.0 + q), 0.0
-    below = 1.0 + 2.0 * command.filter_damping * q + q * q
-    middle = -(2.0 * command.filter_damping * q + 2.0 * q * q) / below
-    return 1.0 / below, 0.0, 0.0, middle, q * q / below
+def command_section(command: Command, period_s: Any, where: str = "") -> Section:
+    """The command filter at the period of the outermost stage: a low-pass with w0 = 1/filter_time."""
+    w0 = 1.0 / command.filter_time_s
+    lowpass = Filter(
+        kind="lowpass", frequency_rad_s=w0, order=command.filter_order, damping=command.filter_damping
+    )
+    if np.any(w0 * np.asarray(period_s) >= pi):
+        message = f"command.filter_time = {np.min(command.filter_time_s):g} s"
+        raise InputError(f"{message}: must be above T/pi = {np.max(period_s) / pi:g} s", where=where)
+    return section(lowpass, period_s, where)
 
 
 def _given(item: Filter, name: str, where: str) -> Any:

@@ -144,6 +144,7 @@ def _controllers(design: Design, row: Floats) -> None:
     velocity, current = controller.velocity, controller.current
     if velocity is not None:
         row[at.HAS_VELOCITY], row[at.EVERY_VELOCITY] = 1.0, velocity.every
+        row[at.SPEED_SENSOR] = velocity.sensor == "output"
         _regulator(row, at.VELOCITY_GAIN, at.VELOCITY_WINDUP, velocity.gain, velocity, velocity.every * Ts)
         for place in ("speed", "torque"):
             _filters(design, row, place, velocity.every * Ts)
@@ -232,8 +233,10 @@ def _encoder(design: Design, row: Floats, period_s: Any) -> None:
     else:
         w0T = encoder.bandwidth_rad_s * period_s
         row[at.TRACKING_ANGLE], row[at.TRACKING_SPEED] = 2.0 * w0T, w0T * encoder.bandwidth_rad_s
-    quantum = design.angle_quantum_rad
-    row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / quantum
+    quantum, ratio = design.angle_quantum_rad, 1.0
+    if row[at.SPEED_SENSOR].any():
+        quantum, ratio = design.output_quantum_rad, design.total_ratio
+    row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / (quantum * ratio)
 
 
 def _command(design: Design, row: Floats) -> None:
@@ -260,7 +263,7 @@ def _command(design: Design, row: Floats) -> None:
         row[at.PROFILE_SAMPLES] = np.maximum(samples, 1.0)
     if np.any(np.asarray(command.filter_time_s) > 0.0):
         row[at.COMMAND_FILTERS] = 1
-        _put_section(row, at.COMMAND_CHAIN, command_section(command, period))
+        _put_section(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
 
 
 def _supply(design: Design, row: Floats) -> None:

@@ -43,11 +43,11 @@ def prepare_periods(p):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def any_of(p, first, count):  # type: ignore[no-untyped-def]
-    """1 where one of some numbers is not zero."""
+def any_of(p, first, behind):  # type: ignore[no-untyped-def]
+    """1 where one of the numbers from ``first`` up to ``behind`` is not zero."""
     found = 0.0
-    for j in range(count):
-        if p[first + j] != 0.0:
+    for j in range(first, behind):
+        if p[j] != 0.0:
             found = 1.0
     return found
 
@@ -55,18 +55,30 @@ def any_of(p, first, count):  # type: ignore[no-untyped-def]
 @scalar
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
-    more = max(any_of(p, layout.POSITION_INTEGRAL, 2), any_of(p, layout.OUTPUT_SENSOR, 4))
+    more = max(
+        any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT),
+        any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED),
+    )
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, 1)))
+    p[layout.RARE_COMMAND] = max(
+        more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
+    )
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
     p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
-    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, 2), any_of(p, layout.TORQUE_FILTERS, 1))
-    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, 1))
-    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, 2), any_of(p, layout.CURRENT_WINDUP, 1))
+    p[layout.RARE_SPEED] = max(p[layout.RARE_SPEED], p[layout.SPEED_SENSOR])
+    forward = max(
+        any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED),
+        any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE),
+    )
+    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
+    extra = max(
+        any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY),
+        any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING),
+    )
     p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
-    more = max(p[layout.SUPPLY], p[layout.OUTPUT_SENSOR])
-    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, 5))
+    more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
+    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
     tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
     varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
     p[layout.RARE_LOAD] = 1.0 if varying else 0.0

@@ -63,10 +63,10 @@ def sense(p, s, io):  # type: ignore[no-untyped-def]
         if s[layout.S_TICK] > 0.0:
             supply(p, s)
         io[layout.IN_BUS] = s[layout.S_VOLTAGE_LIMIT]
+    rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
     if p[layout.JITTER] > 0.0:
         late = clamp(p[layout.JITTER] * normal(s, layout.NOISE_INSTANT), 0.5 * p[layout.PERIOD])
         di, dw = slopes(p, s)
-        rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
         i, th, y = i + late * di, th + late * (w + 0.5 * late * dw), y + late * rate
         w += late * dw
     if p[layout.CURRENT_NOISE] > 0.0:
@@ -77,4 +77,5 @@ def sense(p, s, io):  # type: ignore[no-untyped-def]
         th += p[layout.ANGLE_NOISE] * normal(s, layout.NOISE_ANGLE)
     if p[layout.OUTPUT_NOISE] > 0.0:
         y += p[layout.OUTPUT_NOISE] * normal(s, layout.NOISE_OUTPUT)
+    io[layout.IN_OUTPUT_SPEED] = rate
     io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE], io[layout.IN_OUTPUT] = i, w, th, y

@@ -113,10 +113,13 @@ class Profile:
 class Speed:
     def __init__(self, design: Design, T: float) -> None:
         self.encoder, self.T = design.encoder, T
-        self.q = design.angle_quantum_rad
+        velocity = design.controller.velocity
+        self.output = velocity is not None and velocity.sensor == "output"
+        self.q = design.output_quantum_rad if self.output else design.angle_quantum_rad
+        if self.output and self.q:
+            self.q *= design.total_ratio
         self.angles = [0.0] * (self.encoder.difference_samples + 1)
         self.th = self.w = self.y = 0.0
-        velocity = design.controller.velocity
         self.filters = [digital(f, T, 0.0) for f in velocity.filters_on("speed")] if velocity else []
 
     def __call__(self, w: float, th: float) -> float:
@@ -164,12 +167,9 @@ class Controller:
         c = self.design.command
         if c.filter_time_s == 0.0:
             return None
-        # backward differences: s = (1 - 1/z)/T
-        q, d = c.filter_time_s / (self.n_p * self.Ts), np.array([1.0, -1.0])
-        a = np.array([1.0, 0.0]) + q * d
-        if c.filter_order == 2:
-            a = np.array([1.0, 0, 0]) + 2 * c.filter_damping * q * np.append(d, 0) + q**2 * np.convolve(d, d)
-        return Digital(np.array([1.0]), a, 0.0)
+        w0 = 1 / c.filter_time_s
+        lowpass = Filter(kind="lowpass", frequency_rad_s=w0, order=c.filter_order, damping=c.filter_damping)
+        return digital(lowpass, self.n_p * self.Ts, 0.0)
 
     def limit_outer(self, v: float) -> float:
         limits, c = self.design.limits, self.design.controller
@@ -208,6 +208,9 @@ class Controller:
             return m.source_gain_Nm_V
         return m.torque_constant_Nm_A / (1.0 if self.pi_c else m.resistance_ohm)
 
+    def sensed(self, w: float, th: float, y: float) -> tuple[float, float]:
+        return (w, self.design.total_ratio * y) if self.speed.output else (w, th)
+
     def overload(self, i: float) -> None:
         limits = self.design.limits
         self.i_max = limits.peak_current_A
@@ -237,7 +240,7 @@ class Controller:
             else:
                 self.u = out
         if self.pi_v and self.k % self.n_v == 0:
-            self.w_meas = self.speed(w, th)
+            self.w_meas = self.speed(*self.sensed(w, th, y))
             limit = self.i_max if c.current else limits.voltage_V
             out, _ = self.pi_v(self.w_ref - self.w_meas, self.i_ff, limit)
             for item in self.torque:
@@ -249,7 +252,7 @@ class Controller:
                 self.u = out
         if self.pi_c:
             if self.pi_v is None and c.current.back_emf_feedforward:
-                self.w_meas = self.speed(w, th)
+                self.w_meas = self.speed(*self.sensed(w, th, y))
             wanted = clamp(self.i_ref, self.i_max)
             forward = c.current.back_emf_feedforward * m.back_emf_constant_Vs_rad * self.w_meas
             forward += c.current.resistance_feedforward * m.resistance_ohm * wanted

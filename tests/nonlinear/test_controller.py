@@ -68,6 +68,7 @@ def some_drive(rng: np.random.Generator) -> Design:
         tracking_time_s=pick(None, 7 * Ts),
     )
     velocity = VelocityLoop(
+        sensor=pick("motor", "motor", "output"),
         gain=0.05 * wide,
         integral_time_s=pick(None, 50 * Ts),
         every=n_v,
@@ -91,7 +92,7 @@ def some_drive(rng: np.random.Generator) -> Design:
     shaped = has_position or has_velocity
     rate = 2e-4 / T_o if has_position else 0.4
     command = Command(
-        filter_time_s=pick(0.0, 3 * T_o, 0.2 * T_o),
+        filter_time_s=pick(0.0, 3 * T_o, 0.4 * T_o),
         filter_order=pick(1, 2),
         filter_damping=0.8,
         rate_rad_s=pick(inf, rate) if shaped else inf,
