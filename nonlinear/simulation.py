@@ -79,7 +79,7 @@ def simulate(
     friction_on, limits_on : bool
         ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
     energy : bool
-        Integrate the energies (some ten times slower).
+        Integrate the energies (at most some twice as slow).
     record_every : int
         Keep every so many rows.
     tanh_tolerance : float

@@ -189,7 +189,7 @@ LENGTH = DECAY + 2  # of the two segments, s
     RELAX,  # R/L
     LOCKED_GAIN,  # 1/R; 0 for a torque source
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
-    LOOK,  # 1: no short way over a segment: energies, tanh law, elastic, or w' may turn twice within
+    LOOK,  # 1: no short way over a segment: tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
     RARE_LOAD,  # 1: the load changes from tick to tick
     RARE_SENSE,  # 1: instruments or the supply are modelled

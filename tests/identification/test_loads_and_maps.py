@@ -169,7 +169,6 @@ def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() ->
     assert "torque needed for its motion" not in result.resimulated[0].how
 
 
-
 def _voltage_record(noise: float, *, fast: bool) -> Record:
     """u = R i + kE w + L di/dt with R 0.5 ohm, kE 0.02, L 3 mH; fast: the current has a part at 60 Hz."""
     w = 200.0 * _waves(1)
