@@ -72,8 +72,9 @@ class Energy:
     """Where the electrical energy of a run went, all in J.
 
     ``input = copper + magnetic + kinetic + friction (dry, viscous, offset) + output work + conversion``;
-    An elastic drive adds ``spring + coupling damping + parting + load friction (dry, viscous, offset)``: parting
-    is the spring energy left when contact ends; a self-locking stage's own loss counts as dry friction.
+    An elastic drive adds ``spring + coupling damping + parting + load friction (dry, viscous, offset)``:
+    parting is the spring energy left when contact ends; a self-locking stage's own loss counts as dry
+    friction.
     ``conversion`` is ``(kE - kM) i w`` integrated, zero for a motor whose constants agree.
 
     The last four are the supply's own account, where one is modelled, of the bus power ``u i`` sampled at the

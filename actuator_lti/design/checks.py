@@ -26,7 +26,17 @@ def check_design(design: Design, where: str) -> None:
     InputError
         One line: key, value and what is allowed.
     """
-    for check in (_motor, _cascade, _sampling, check_control, check_elastic, _limits, _requirements, _correlations):
+    checks = (
+        _motor,
+        _cascade,
+        _sampling,
+        check_control,
+        check_elastic,
+        _limits,
+        _requirements,
+        _correlations,
+    )
+    for check in checks:
         check(design, where)
 
 

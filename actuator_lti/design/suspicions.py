@@ -21,7 +21,18 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     ()
     """
     found: list[str] = []
-    for check in (_sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor, elastic_warnings):
+    checks = (
+        _sampling,
+        _crossovers,
+        _limits,
+        _unused,
+        _loads,
+        _pedigree,
+        _encoder,
+        _ac_motor,
+        elastic_warnings,
+    )
+    for check in checks:
         found.extend(check(design))
     return tuple(found)
 

@@ -184,8 +184,8 @@ def random_drive(seed: int) -> tuple[Design, np.ndarray, np.ndarray, float]:
     }
     Ts = power_of_ten(rng, -4.3, -2.3)
     design = two_mass(
-        Ts, source=bool(source), path="self-locking" if locking else "back-drivable", friction=friction, ratio=N,
-        behind=gears, J_l=J_l * N_r**2, load_friction=load_friction,
+        Ts, source=bool(source), path="self-locking" if locking else "back-drivable", friction=friction,
+        ratio=N, behind=gears, J_l=J_l * N_r**2, load_friction=load_friction,
         coupling={"stiffness_Nm_rad": k, "damping_Nms_rad": damping, "play_rad": play},
     )  # fmt: skip
     voltages = np.repeat(rng.normal(size=8) * (torque if source else 4.0), 3)
