@@ -224,7 +224,7 @@ class Trajectory:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
-        names = (
+        names: tuple[str, ...] = (
             "time_s",
             "reference_rad",
             "output_angle_rad",
