@@ -156,4 +156,4 @@ def test_map_of_one_line_is_c0_and_cv() -> None:
     np.testing.assert_allclose(
         with_map.states[:, [0, 1, 3]], without.states[:, [0, 1, 3]], atol=1e-11 * scale
     )
-    assert sum(with_map.events) == sum(without.events) > 5
+    assert sum(with_map.events) == sum(without.events) >= 5
