@@ -21,6 +21,8 @@ Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
 PEAK_DB = 1e-3  # a maximum is measured again until it no longer changes by so much
 PEAK_ROUNDS = 5
+DIP = 1.0  # of the value at zero frequency: lower minima are looked at closely
+WIDE = 1.15  # ratio of two frequencies: a crossing between them is measured again
 UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
 NEAREST = 6  # points of the interpolating polynomial
 SAME = 1e-9  # of log f: points nearer to each other count as one
@@ -94,7 +96,9 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
     if not sweep.valid.any():
         raise NotMeasured(f"no frequency could be measured: {most_frequent(sweep.reason)}")
     dc = step.final_value
-    fine = refined(setup, sweep, _brackets(sweep, dc), settle_ticks)
+    fine = refined(setup, sweep, [*_brackets(sweep, dc), *_dips(sweep, dc)], settle_ticks)
+    wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
+    fine = refined(setup, fine, wide, settle_ticks)
     fine, error = _peaks_refined(setup, fine, settle_ticks)
     f = fine.frequency_hz
     closed = np.abs(fine.closed_loop) / abs(dc)
@@ -170,12 +174,7 @@ def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     """Where to look closer: crossings of T and L, maxima of T and S."""
     f = sweep.frequency_hz
     closed = np.abs(sweep.closed_loop) / abs(dc)
-    phase = np.degrees(_phase(sweep.closed_loop * np.sign(dc)))
     pairs = []
-    for below in (closed < sqrt(0.5), phase < -90.0):
-        k = int(np.argmax(below))
-        if below[k] and k > 0:
-            pairs.append((k - 1, k))
     gain = np.abs(sweep.open_loop)
     outside, known = gain > 1.0, np.isfinite(gain)
     crossed = (outside[1:] != outside[:-1]) & known[1:] & known[:-1]
@@ -183,7 +182,27 @@ def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     for values in (closed, np.abs(sweep.sensitivity)):
         k = int(np.argmax(np.where(np.isfinite(values), values, -1.0)))
         pairs += [(j, j + 1) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
-    return [(float(f[a]), float(f[b])) for a, b in dict.fromkeys(pairs)]
+    return _falls(sweep, dc) + [(float(f[a]), float(f[b])) for a, b in dict.fromkeys(pairs)]
+
+
+def _falls(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
+    """Where T falls through -3 dB and -90 deg first."""
+    f = sweep.frequency_hz
+    phase = np.degrees(_phase(sweep.closed_loop * np.sign(dc)))
+    pairs = []
+    for below in (np.abs(sweep.closed_loop) / abs(dc) < sqrt(0.5), phase < -90.0):
+        k = int(np.argmax(below))
+        if below[k] and k > 0:
+            pairs.append((float(f[k - 1]), float(f[k])))
+    return pairs
+
+
+def _dips(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
+    """Around minima of T that may dip below -3 dB between two points."""
+    f, v = _distinct(sweep.frequency_hz, np.abs(sweep.closed_loop) / abs(dc))
+    with np.errstate(invalid="ignore"):
+        low = (v[1:-1] <= v[:-2]) & (v[1:-1] <= v[2:]) & (v[1:-1] >= sqrt(0.5)) & (v[1:-1] < DIP)
+    return [(float(f[k + j]), float(f[k + j + 1])) for k in np.flatnonzero(low) for j in (0, 1)]
 
 
 def _phase_margin(sweep: Sweep) -> tuple[float | None, float | None]:

@@ -22,6 +22,7 @@ LOCKED = "small signal, rotor held at a constant speed"
 RELATIVE = 1e-3
 GAIN_DB = 0.01
 PHASE_DEG = 0.1
+NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
 NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
 MARGIN_DB = 20.0 * log10(1.0 + RELATIVE)
 OVERSHOOT_PERCENT = 0.05
@@ -116,7 +117,7 @@ def _peak(found: Measured) -> float:
 def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
     """An entry, not judged where the frequencies that decide it could not be measured."""
     sweep = found.sweep
-    if row.passed is not False or sweep.valid.all() or "margin_" in row.quantity or row.quantity == "delay_margin":
+    if row.passed is not False or "margin_" in row.quantity or row.quantity == "delay_margin":
         return row
     band, peaks, margins = figures.bandwidth, figures.peaks, figures.margins
     at = {
@@ -129,6 +130,8 @@ def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
         "complementary_peak": hertz(peaks.complementary_rad_s) if peaks else None,
     }[row.quantity]
     f, bad = sweep.frequency_hz, ~sweep.valid
+    if at is not None and at < f[0]:
+        return replace(row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz")
     k = int(np.searchsorted(f, at or f[-1]))
     near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
     if row.measured is not None and not near.any():
@@ -147,6 +150,9 @@ def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     band = figures.bandwidth
     if band is None:
         return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth_hz, _why(figures))]
+    if band.resonance_peak_db > NO_DC_DB:
+        why = "the loop has no gain at zero frequency that bandwidth and resonance could be related to"
+        return [not_judged(name, "bandwidth", "Hz", None, None, why)]
     fall, turn = hertz(band.minus3db_rad_s), hertz(band.minus90deg_rad_s)
     top = found.sweep.frequency_hz[-1]
     rows = [

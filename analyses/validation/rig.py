@@ -195,6 +195,20 @@ def rig(design: Design, loop: str, *, limits_on: bool = True) -> Rig:
     return Rig(design, loop, ride(design), limits_on)
 
 
+def small_rig(design: Design, loop: str) -> Rig:
+    """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
+
+    At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
+    growth.  With play, or friction that differs by direction, the drive has to ride on: these have a slope of
+    their own about rest.
+    """
+    found = rig(design, loop, limits_on=False)
+    friction, play = design.friction, design.coupling is not None and design.coupling.play_rad > 0.0
+    if play or friction.points or friction.viscous(1) != friction.viscous(-1):
+        return found
+    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False)
+
+
 def stages_of(design: Design) -> tuple[str, ...]:
     """Stages of the cascade, innermost first."""
     control = design.controller

@@ -32,7 +32,7 @@ from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
 from analyses.validation.riding import ride
-from analyses.validation.rig import Rig, every, points_of, rig, stages_of
+from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tones import tone_sweep
@@ -49,6 +49,8 @@ HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
+LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
+PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
 
 
@@ -186,12 +188,12 @@ class _Work:
 
         def refused() -> T | U:
             try:
-                return attempt(name, work, otherwise)
+                return work()
             except (InputError, NotMeasured) as error:
                 self.notes.append(f"{name}: not judged: {error}")
                 return otherwise
 
-        return self.budget.within(share, name, refused, otherwise)
+        return attempt(name, lambda: self.budget.within(share, name, refused, otherwise), otherwise)
 
     def _stage_loops(self) -> dict[str, Loop]:
         """The loops by name; that of the current with the rotor held."""
@@ -264,7 +266,9 @@ class _Work:
         """From well below the lowest figure of the loop to near Nyquist, evenly on a logarithmic scale."""
         assert loop.period_s is not None
         top = HIGHEST / loop.period_s
-        return np.geomspace(max(self._lowest(name), 1e-3 * top), top, self.settings.frequencies)
+        low = max(self._lowest(name), LOWEST * top)
+        count = max(self.settings.frequencies, int(PER_DECADE * np.log10(top / low)))
+        return np.geomspace(low, top, count)
 
     def _lowest(self, name: str) -> float:
         """Where the sweep of a loop begins, Hz."""
@@ -282,9 +286,9 @@ class _Work:
         questions: list[Question] = []
         for name, settle in self.settle.items():
             loop, margins = self._stage_loops()[name], self.figures[name].margins
-            questions += stage_questions(rig(self.linear, name, limits_on=False), loop, margins, settle)
+            questions += stage_questions(small_rig(self.linear, name), loop, margins, settle)
         if len(self.settle) == len(self.figures):
-            setups = {point: rig(self.linear, point, limits_on=False) for point in self._inner_points()}
+            setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
         return confirm_margins(questions)
 

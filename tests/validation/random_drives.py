@@ -34,6 +34,18 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError, NumericalError
 
+from analyses.validation.settings import Settings
+
+TRIAL = Settings(
+    frequencies=20,
+    point_frequencies=0,
+    multisine=False,
+    amplitude_margins=False,
+    rest_frequencies=8,
+    large_signals=False,
+    friction_effects=False,
+    specification=False,
+)
 T = TypeVar("T")
 
 
@@ -260,13 +272,13 @@ def main(first: int, count: int, wider: bool) -> None:
     import traceback
 
     from analyses.isolation import isolated
-    from analyses.validation import QUICK, validate
+    from analyses.validation import validate
 
     for design in stable_drives(first, count, wider=wider):
         started = time.process_time()
         try:
             with isolated() as missing:
-                found = validate(design, QUICK)
+                found = validate(design, TRIAL)
         except InputError as error:
             print(f"{design.name}  refused: {error}", flush=True)
             continue
