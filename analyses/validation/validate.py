@@ -55,7 +55,11 @@ BELOW = 20.0  # the sweep begins so far below the lowest figure
 
 
 def validate(
-    design: Design, settings: Settings | None = None, progress: Progress | None = None
+    design: Design,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    *,
+    model: Design | None = None,
 ) -> Validation:
     """Check every linear prediction of a design by the nonlinear simulator.
 
@@ -66,6 +70,9 @@ def validate(
         Extent; by default everything (`analyses.validation.settings`).
     progress : callable, optional
         Called with (steps done, steps in all).
+    model : Design, optional
+        The drive that the linear predictions are made of, by default the same: a wrong one shows what a
+        validation sees.
 
     Returns
     -------
@@ -87,7 +94,7 @@ def validate(
     >>> found.passed
     True
     """
-    return _Work(design, settings or Settings(), progress).run()
+    return _Work(design, settings or Settings(), progress, model or design).run()
 
 
 @dataclass
@@ -97,6 +104,7 @@ class _Work:
     design: Design
     settings: Settings
     progress: Progress | None
+    model: Design
     seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     budget: Budget = field(init=False)
@@ -207,10 +215,11 @@ class _Work:
         from actuator_lti.loops import assemble_loops
 
         ride(self.linear)  # a drive that has no steady motion cannot be tested
-        loops = assemble_loops(self.linear)
+        model = without_instruments(self.model)
+        loops = assemble_loops(model)
         self.held = None
         if "current" in loops.present:
-            self.held = assemble_loops(self.linear, rotor="locked").current
+            self.held = assemble_loops(model, rotor="locked").current
         self.loops = loops
         for name, loop in self._stage_loops().items():
             self.figures[name] = loop_figures(loop)
