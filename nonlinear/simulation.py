@@ -28,6 +28,7 @@ from nonlinear.setup import (
     ticks_of,
 )
 from nonlinear.trajectory import STATUS, State, Trajectory
+from nonlinear.watch import watch
 from nonlinear.wrap import wrap
 
 Floats = npt.NDArray[np.float64]
@@ -168,7 +169,8 @@ def _call(
     from nonlinear._kernels.call import call
 
     shared = np.zeros(2)
-    if progress is None:
+    look = watch()
+    if progress is None and look is None:
         return call(row, tables, history, flags, out, shared)
     result: list[int] = []
     thread = Thread(target=lambda: result.append(call(row, tables, history, flags, out, shared)))
@@ -177,11 +179,14 @@ def _call(
     try:
         while thread.is_alive():
             thread.join(0.1)
-            if thread.is_alive():
+            if look is not None:
+                look()
+            if progress is not None and thread.is_alive():
                 progress(int(shared[0]), total)
     except BaseException:
         shared[1] = 1.0
         thread.join()
         raise
-    progress(int(shared[0]), total)  # a run may end before it was looked at once
+    if progress is not None:
+        progress(int(shared[0]), total)  # a run may end before it was looked at once
     return result[0]
