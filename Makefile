@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links
 
-.PHONY: report test machines check bench clean install browser fuzz lock limits release
+.PHONY: report test machines check bench clean install browser fuzz lock limits docs release
 
 install: $(STAMP)
 
@@ -56,12 +56,16 @@ bench: $(STAMP)
 limits: $(STAMP)
 	$(BIN)/python -m actuator_lti.bounds > docs/limits.md
 
+# The documentation in out/docs: opens from disk, asks no network; its tutorials are run while it is built.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs $(OUT)/docs
+
 $(RELEASE): $(STAMP)
 	$(PIP) install --quiet --constraint constraints.txt '.[release]'
 	touch $(RELEASE)
 
 lock: $(RELEASE)
-	$(COMPILE) --extra dev --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra dev --extra docs --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
 
 # Wheel, sources and the bill of materials of what they need to run.
 release: $(RELEASE)

@@ -19,6 +19,8 @@ _PUBLIC = {
     "load_design": "actuator_lti.design",
     "read_design_text": "actuator_lti.design",
     "write_design": "actuator_lti.design",
+    "sweep": "actuator_lti.design",
+    "SweepPoint": "actuator_lti.design",
     "assemble_loops": "actuator_lti.loops",
     "Loop": "actuator_lti.loops",
     "Loops": "actuator_lti.loops",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from os import PathLike
 from threading import Thread
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.bounds import HISTORY_BYTES
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear._kernels import layout as at
@@ -36,7 +38,7 @@ Progress = Callable[[int, int], None]
 
 
 def simulate(
-    design: Design,
+    design: Design | str | PathLike[str],
     command: Command,
     duration_s: float,
     load_Nm: float | LoadMoment = 0.0,
@@ -62,7 +64,8 @@ def simulate(
 
     Parameters
     ----------
-    design : Design
+    design : Design, str or path
+        A design, a shipped name, or the path of a design file.
     command : Command
         Output angle against time, from `nonlinear.commands`.
     duration_s : float
@@ -114,12 +117,12 @@ def simulate(
 
     Examples
     --------
-    >>> from actuator_lti.design import load_design
     >>> from nonlinear import commands, simulate
-    >>> run = simulate(load_design("ilr33-amber"), commands.step(0.01), duration_s=0.1)
+    >>> run = simulate("ilr33-amber", commands.step(0.01), duration_s=0.1)
     >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
     (1000, True)
     """
+    design = as_design(design)
     row = design_row(design, friction_on=friction_on, limits_on=limits_on)
     row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
     row[at.WITH_ENERGY] = energy

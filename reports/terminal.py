@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -30,12 +31,20 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | Table], notes: Sequence[st
         out.print(Text(f"note: {note}", style="yellow"))
 
 
+def print_verdict(passed: bool, words: str) -> None:
+    """Print the first line of an answer: whether all is well, and why."""
+    line = Text().append("PASS" if passed else "FAIL", style=COLOURS["pass" if passed else "fail"])
+    console().print(line.append(f"  {words}"), soft_wrap=True)
+
+
 def _print(block: Mapping[str, Any], out: Console) -> None:
-    """Print one block."""
+    """Print one block; a table that is too wide for the terminal is stacked."""
     if block["kind"] == "table":
-        out.print(table(block))
+        laid = table(block)
+        out.print(laid if _fits(laid, out) else stacked(block))
     elif block["kind"] == "verdicts":
-        out.print(verdict_table(block))
+        laid = verdict_table(block)
+        out.print(laid if _fits(laid, out) else stacked_verdicts(block))
     elif block["kind"] == "text":
         out.print(Text(block["text"]))
     elif block["kind"] == "details":
@@ -50,10 +59,45 @@ def table(block: Mapping[str, Any]) -> Table:
         label = " ".join(
             part for part in (column["label"], f"[{column['unit']}]" if column["unit"] else "") if part
         )
-        made.add_column(Text(label), justify=_side(column["align"]), no_wrap=column["align"] == "right")
+        cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
+        whole = max((cell.cell_len for cell in cells), default=0) if column["align"] == "right" else None
+        made.add_column(Text(label), justify=_side(column["align"]), min_width=whole)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
     return made
+
+
+def _fits(laid: Table, out: Console) -> bool:
+    """Whether no word and no number of a table has to be broken."""
+    return Measurement.get(out, out.options.update(width=10_000), laid).minimum <= out.width
+
+
+def stacked(block: Mapping[str, Any]) -> Text:
+    """Write a table as one paragraph a row: the first cell, then the others, each by its label."""
+    first, *others = block["columns"]
+    text = Text().append(block["caption"], style="bold")
+    for row in block["rows"]:
+        text.append("\n").append_text(_cell(row.get(first["key"]), first["format"])).append(": ")
+        cells = [(column, _cell(row.get(column["key"]), column["format"])) for column in others]
+        said = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
+        for number, (column, cell) in enumerate(said):
+            label = column["label"].lower() if column["label"] != "Unit" else ""
+            text.append("; " if number and label else " " if number else "").append(f"{label} ".lstrip())
+            text.append_text(cell).append(f" {column['unit']}".rstrip())
+    return text.append("\n")
+
+
+def stacked_verdicts(block: Mapping[str, Any]) -> Text:
+    """Write verdicts as two lines each: what and whether, then the figures."""
+    text = Text().append(block.get("what", "requirements").capitalize(), style="bold")
+    for item in block["items"]:
+        status, word = WORDS[item["passed"]]
+        limit = f"limit {item['comparison']} {show(item['limit'])}"
+        figures = f"{show(item['value'])} {item['unit']}, {limit}, distance {show_signed(item['distance'])}"
+        text.append(f"\n{item['label']}: ").append(word, style=COLOURS[status])
+        text.append(f"\n  {' '.join(figures.split())}")
+        text.append(f"\n  {item['reason']}" if item["reason"] else "")
+    return text.append("\n")
 
 
 def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> Table:

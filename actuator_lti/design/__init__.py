@@ -3,11 +3,12 @@
 from actuator_lti.design.access import parameter_value, paths_of, pedigrees, with_values
 from actuator_lti.design.checks import check_design, no_load_speed
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.loader import load_design, read_design_text
+from actuator_lti.design.loader import as_design, load_design, read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.quantities import QUANTITIES
 from actuator_lti.design.shipped import shipped_designs
 from actuator_lti.design.suspicions import warnings_of
+from actuator_lti.design.sweep import SweepPoint, sweep
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
 
@@ -15,6 +16,8 @@ __all__ = [
     "FIELDS",
     "QUANTITIES",
     "Design",
+    "SweepPoint",
+    "as_design",
     "check_design",
     "design_hash",
     "design_tree",
@@ -25,6 +28,7 @@ __all__ = [
     "pedigrees",
     "read_design_text",
     "shipped_designs",
+    "sweep",
     "tolerances",
     "warnings_of",
     "with_overrides",

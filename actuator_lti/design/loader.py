@@ -44,6 +44,23 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     return read_design_text(design_text(name), shown(name, 200)[1:-1])
 
 
+def as_design(design: Design | str | PathLike[str]) -> Design:
+    """A design as it is, or read by :func:`load_design` where a name or path is given.
+
+    Raises
+    ------
+    InputError
+        As :func:`load_design`, and for anything else that is no design.
+    """
+    if isinstance(design, Design):
+        return design
+    if isinstance(design, str | PathLike):
+        return load_design(design)
+    raise InputError(
+        f"design = {shown(design)}: allowed: a Design, a shipped name, or the path of a design file"
+    )
+
+
 def design_text(name_or_path: str | PathLike[str]) -> str:
     """The text of a design file, by shipped name or path, with its comments.
 

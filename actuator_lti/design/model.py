@@ -598,6 +598,12 @@ class Design:
 
         return with_overrides(self, with_units(self, values))
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from actuator_lti.notebook import design_html
+
+        return design_html(self)
+
     @property
     def total_ratio(self) -> float:
         """N, motor angle over output angle; 1 without gears."""

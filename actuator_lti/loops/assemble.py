@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from typing import TYPE_CHECKING, Any, get_args
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def assemble_loops(
-    design: Design,
+    design: Design | str | PathLike[str],
     form: Form = "sampled",
     operating_point: OperatingPoint = "sliding",
     load_Nm: float = 0.0,
@@ -31,7 +33,8 @@ def assemble_loops(
 
     Parameters
     ----------
-    design : Design
+    design : Design, str or path
+        A design, a shipped name, or the path of a design file.
     form : {"sampled", "continuous", "ideal"}
         ``sampled``: exact hold, exact computing delay, PI in z, slower loops held (state spaces with dt).
         ``continuous``: PI in s and exact delays (`DelaySystem`, no Pade; see `actuator_lti.loops.flow` for
@@ -63,12 +66,18 @@ def assemble_loops(
     InputError
         For an unknown form or operating point, or a design without the stage asked for.
 
+    Examples
+    --------
+    >>> assemble_loops("ilr33-amber")
+    Loops(ilr33-amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)
+
     Notes
     -----
     With the rotor free, back-EMF gives the current loop a finite gain at DC although its controller
     integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them.
     A hinge moment proportional to the angle acts through a back-drivable path as a stiffness.
     """
+    design = as_design(design)
     if form not in get_args(Form):
         raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
     at = Operating(

@@ -116,6 +116,12 @@ class Loops:
         named = {"current": self.current, "velocity": self.velocity, "position": self.position}
         return {name: loop for name, loop in named.items() if loop is not None}
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from actuator_lti.notebook import loops_html
+
+        return loops_html(self)
+
     def __repr__(self) -> str:
         names = ", ".join(self.present)
         where = f"{self.operating_point}, {self.load_Nm:g} N m, rotor {self.operating.rotor}"

@@ -64,7 +64,7 @@ def stability_margins(
         Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a pole on the border of stability
         cancelled by a zero, a direct feed-through behind a delay (neutral type), data too coarse.
     NumericalError
-        |L| is one at every frequency, or a search was not settled to its accuracy.
+        ``|L|`` is one at every frequency, or a search was not settled to its accuracy.
 
     Examples
     --------

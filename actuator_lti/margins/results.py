@@ -156,6 +156,12 @@ class StabilityMargins:
     def __str__(self) -> str:
         return "\n".join(_lines(self))
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from actuator_lti.notebook import margins_html
+
+        return margins_html(self)
+
 
 def _lines(m: StabilityMargins) -> list[str]:
     heads = {

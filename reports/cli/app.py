@@ -21,7 +21,7 @@ def build() -> typer.Typer:
     """Assemble the application from its command modules."""
     app = typer.Typer(
         name="actuator-lti",
-        add_completion=False,
+        add_completion=True,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",

@@ -93,12 +93,19 @@ def _print_json(
 def _print_tables(
     where: Mapping[str, Any], figures: Mapping[str, LoopFigures], verdicts: Sequence[RequirementVerdict]
 ) -> None:
-    """Print the tables of the report for people."""
+    """Print the verdict, then the tables of the report for people."""
+    from analyses.requirements import all_pass
     from reports.sections.margins import crossing_table, margin_table, response_table
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
-    from reports.terminal import print_blocks, side_by_side
+    from reports.terminal import print_blocks, print_verdict, side_by_side
 
+    made = section(verdicts, where["load_unit"])
+    unstable = [LOOPS[name] for name, found in figures.items() if found.margins.stable is False]
+    unknown = [LOOPS[name] for name, found in figures.items() if found.margins.stable is None]
+    loops = f"not stable: {', '.join(unstable)}" if unstable else "every loop is stable"
+    loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
+    print_verdict(all_pass(tuple(verdicts)) and not unstable, f"{where['design']}: {loops}. {made['result']}")
     named = {LOOPS[name]: found for name, found in figures.items()}
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
@@ -108,4 +115,4 @@ def _print_tables(
     ):
         blocks.append(crossing_table(named))
     notes = [note for found in figures.values() for note in (*found.margins.notes, *found.notes)]
-    print_blocks([*blocks, *section(verdicts, where["load_unit"])["blocks"]], notes)
+    print_blocks([*blocks, *made["blocks"]], notes)

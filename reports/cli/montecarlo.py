@@ -134,7 +134,7 @@ def _written(
     from reports.cli.progress import progress
     from reports.sections.monte_carlo import section
     from reports.study_pages import study_document, write_pages
-    from reports.terminal import print_blocks
+    from reports.terminal import print_blocks, print_verdict
 
     part = section(result, at_least=at_least)
     title = f"{drive.title or drive.name}: tolerances"
@@ -144,6 +144,7 @@ def _written(
     if as_json:
         print_json(made)
     else:
+        print_verdict(made["verdict"]["passed"], part["result"])
         print_blocks([_short(b) for b in part["blocks"] if b["kind"] == "table"][:1], list(result.notes))
         print_line(f"{page}\nsamples and worst designs: {result.folder}")
     return bool(made["verdict"]["passed"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +20,10 @@ def print_json(data: Any) -> None:
 
 
 def console() -> Console:
-    """Give the console for people: colours on a terminal, plain text in a pipe."""
+    """Give the console for people: colours on a terminal, plain text in a pipe (120 wide, or COLUMNS)."""
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else 120
+    width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120
     return Console(highlight=False, width=width)
 
 

@@ -103,11 +103,12 @@ def _print_json(made: dict[str, Any]) -> None:
 
 
 def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
-    """Print the ledger, the conditional stability, and the verdict."""
+    """Print the verdict, the ledger and the conditional stability."""
     from reports.cli.output import print_line
     from reports.sections.validation import by_loop, loop_name
-    from reports.terminal import print_blocks
+    from reports.terminal import print_blocks, print_verdict
 
+    print_verdict(found.passed, str(found))
     tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
     sections = {part["id"]: part for part in made["sections"]}
     if "conditional" in sections:
@@ -115,7 +116,6 @@ def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ..
     print_blocks(tables, found.notes)
     for path in paths:
         print_line(str(path))
-    print_line(f"{'PASS' if found.passed else 'FAIL'}  {found}")
     print_line(f"{sum(found.seconds.values()):.1f} s")
 
 

@@ -1,0 +1,114 @@
+"""Code of a page that is run while the page is built; a failure ends the build.
+
+``python-run`` runs lines of Python, ``shell-run`` one command `actuator-lti`; code and what it printed
+stand on the page. The code of one page shares its names and one folder, which is gone afterwards.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, ClassVar
+
+from docutils import nodes
+from docutils.parsers.rst import directives
+from sphinx.util.docutils import SphinxDirective
+
+ROOT = Path(__file__).parents[2]
+LONGEST_S = 600.0
+
+
+class Room:
+    """Names and folder of one page."""
+
+    def __init__(self) -> None:
+        self.names: dict[str, Any] = {"__name__": "__page__"}
+        self.holder = tempfile.TemporaryDirectory(prefix="page-")
+        self.folder = self.holder.name
+
+
+class RunDirective(SphinxDirective):
+    """What both directives share."""
+
+    has_content = True
+    option_spec: ClassVar = {
+        "status": directives.nonnegative_int,
+        "lines": directives.positive_int,
+        "hide-output": directives.flag,
+    }
+    language = "python"
+
+    def run(self) -> list[nodes.Node]:
+        rooms: dict[str, Room] = self.env.temp_data.setdefault("run_code_rooms", {})
+        room = rooms.setdefault(self.env.docname, Room())
+        text = "\n".join(self.content)
+        try:
+            printed = self.result(text, room).rstrip()
+        except Exception as error:
+            raise self.error(f"{type(error).__name__}: {error}") from error
+        made: list[nodes.Node] = [self._literal(text, self.language)]
+        if printed and "hide-output" not in self.options:
+            lines = printed.splitlines()
+            most = self.options.get("lines", len(lines))
+            shown = lines[:most] + (["..."] if len(lines) > most else [])
+            made.append(self._literal("\n".join(line.rstrip() for line in shown), "text"))
+        return made
+
+    def result(self, text: str, room: Room) -> str:
+        raise NotImplementedError
+
+    def _literal(self, text: str, language: str) -> nodes.Node:
+        node = nodes.literal_block(text, text)
+        node["language"] = language
+        self.set_source_info(node)
+        return node
+
+
+class PythonRun(RunDirective):
+    """Lines of Python; the value of a last expression is shown as at a prompt."""
+
+    def result(self, text: str, room: Room) -> str:
+        tree = ast.parse(text)
+        last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.chdir(room.folder):
+            exec(compile(tree, self.env.docname, "exec"), room.names)
+            if isinstance(last, ast.Expr):
+                value = eval(compile(ast.Expression(last.value), self.env.docname, "eval"), room.names)
+                if value is not None:
+                    printed.write(repr(value))
+        return printed.getvalue()
+
+
+class ShellRun(RunDirective):
+    """One command `actuator-lti`, with the exit status that the page says (0 where it says nothing)."""
+
+    language = "sh"
+
+    def result(self, text: str, room: Room) -> str:
+        program, *arguments = shlex.split(text, comments=True)
+        if program != "actuator-lti":
+            raise ValueError(f"{program}: only actuator-lti is run")
+        surroundings = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", "NO_COLOR": "1"}
+        ended = subprocess.run(
+            [sys.executable, "-m", "reports.cli", *arguments],
+            cwd=room.folder, env=surroundings, capture_output=True, text=True, timeout=LONGEST_S, check=False,
+        )  # fmt: skip
+        wanted = self.options.get("status", 0)
+        if ended.returncode != wanted:
+            raise ValueError(f"status {ended.returncode}, not {wanted}: {ended.stderr or ended.stdout}")
+        return ended.stdout + ended.stderr
+
+
+def setup(app: Any) -> dict[str, Any]:
+    """Tell Sphinx of the directives."""
+    app.add_directive("python-run", PythonRun)
+    app.add_directive("shell-run", ShellRun)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,58 @@
+"""Sphinx: `make docs` builds the site into out/docs; it works from disk and asks no network."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
+
+_project = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+project = "actuator-lti"
+version = release = _project["version"]
+project_copyright = "the authors; MIT license"
+
+extensions = ["myst_parser", "numpydoc", "sphinx.ext.autosummary", "run_code", "generated_pages"]
+exclude_patterns = ["_ext", "_templates"]
+templates_path = ["_templates"]
+default_role = "literal"
+highlight_language = "text"
+myst_heading_anchors = 3
+
+autosummary_generate = True
+autosummary_ignore_module_all = False
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+autodoc_typehints = "none"
+autodoc_class_signature = "separated"
+
+html_theme = "pydata_sphinx_theme"
+html_title = "actuator-lti"
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "show_prev_next": True,
+    "navbar_end": ["theme-switcher"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+    "navigation_with_keys": False,
+}
+
+
+def _plain_bars(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Docstrings write |L| for a magnitude; to reStructuredText bars are substitutions."""
+    for number, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")):
+            parts = line.split("``")
+            parts[::2] = [part.replace("|", "\\|") for part in parts[::2]]
+            lines[number] = "``".join(parts)
+
+
+def setup(app: Sphinx) -> None:
+    """Connect ahead of numpydoc, which rewrites the docstrings."""
+    app.connect("autodoc-process-docstring", _plain_bars, priority=300)

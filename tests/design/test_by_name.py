@@ -1,0 +1,94 @@
+"""Designs by name or path where Python asks for one, sweeps, and what a notebook shows."""
+
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
+from nonlinear import commands, simulate
+
+DESIGN = load_design("ilr33-amber")
+
+
+def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path: Path) -> None:
+    file = tmp_path / "copy.toml"
+    file.write_text(write_design(DESIGN), encoding="utf-8")
+    wanted = assemble_loops(DESIGN).position.open_loop
+    run = simulate(DESIGN, commands.step(0.01), 0.02)
+    for given in ("ilr33-amber", str(file), file):
+        found = assemble_loops(given).position.open_loop
+        assert all(np.array_equal(getattr(found, part), getattr(wanted, part)) for part in "ABCD")
+        assert np.array_equal(
+            simulate(given, commands.step(0.01), 0.02).output_angle_rad, run.output_angle_rad
+        )
+
+
+@pytest.mark.parametrize("given", [None, 3, b"ilr33-amber", ["ilr33-amber"]])
+def test_anything_else_is_refused_in_one_line(given: object) -> None:
+    for call in (lambda: assemble_loops(given), lambda: simulate(given, commands.step(0.01), 0.02)):
+        with pytest.raises(
+            InputError, match="allowed: a Design, a shipped name, or the path of a design file"
+        ):
+            call()
+    with pytest.raises(InputError, match='nearest known: "ilr33-amber"'):
+        assemble_loops("ilr33-ambre")
+
+
+def test_a_sweep_changes_one_key_and_says_so() -> None:
+    points = sweep("ilr33-amber", "control.position.gain", ["60 1/s", 120.0])
+    assert [point.value for point in points] == ["60 1/s", 120.0]
+    assert [point.design.controller.position.gain for point in points] == [60.0, 120.0]
+    assert points[0].design.parameters["control.position.gain"].source.startswith("changed from")
+    assert all(point.design.motor == DESIGN.motor for point in points)
+    with pytest.raises(InputError, match="limits\\.voltage"):
+        sweep("ilr33-amber", "limits.voltage", ["12 A"])
+
+
+class Reader(HTMLParser):
+    """Cells of a table; refuses tags that are never closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.cells: list[str] = []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        assert tag in {"table", "caption", "thead", "tbody", "tr", "th", "td"}
+        self.open.append(tag)
+        if tag in ("td", "th", "caption"):
+            self.cells.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.cells[-1] += data
+
+
+def test_a_notebook_shows_designs_loops_and_margins() -> None:
+    cells = Reader(DESIGN._repr_html_()).cells
+    assert all(path in cells and known.text in cells for path, known in DESIGN.parameters.items())
+    loops = assemble_loops(DESIGN)
+    assert {"current", "velocity", "position", "w_ref"} <= set(Reader(loops._repr_html_()).cells)
+    margins = stability_margins(loops.position.open_loop)
+    cells = Reader(margins._repr_html_()).cells
+    assert cells[0] == "closed loop: stable"
+    assert f"{margins.phase_margin_deg:.4g} deg" in cells
+
+
+def test_texts_of_a_design_file_cannot_become_html() -> None:
+    text = write_design(DESIGN).replace("ILR-33", "<script>alert(1)</script>ILR-33")
+    assert "<script>" in text
+    from actuator_lti import read_design_text
+
+    Reader(read_design_text(text)._repr_html_())
+
+
+def test_every_package_says_that_it_has_types() -> None:
+    root = Path(__file__).parents[2]
+    for package in ("actuator_lti", "nonlinear", "analyses", "reports"):
+        assert (root / package / "py.typed").exists()

@@ -1,0 +1,96 @@
+"""The pages of the documentation: links and files that they name exist, generated pages leave nothing out."""
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from actuator_lti.design.fields import FIELDS
+from actuator_lti.quantities import QUANTITIES
+from reports.cli.app import PANELS
+
+ROOT = Path(__file__).parents[2]
+GENERATED = {"keys", "quantities", "commands"}
+PAGES = [
+    ROOT / "README.md",
+    *sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name != "generated"),
+]
+
+
+@pytest.fixture(scope="module")
+def made() -> ModuleType:
+    path = ROOT / "docs" / "_ext" / "generated_pages.py"
+    spec = importlib.util.spec_from_file_location("generated_pages", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_link_of_a_page_resolves(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+    missing = [
+        target
+        for target in targets
+        if not (page.parent / target).exists()
+        and not (Path(target).parent.name == "generated" and Path(target).stem in GENERATED)
+    ]
+    assert not missing
+
+
+def test_every_page_is_in_the_contents() -> None:
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    named = {f"{line.strip()}.md" for line in index.splitlines()}
+    pages = {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
+    assert pages - {"index.md"} <= named
+
+
+def test_every_file_that_the_architecture_names_exists() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Five changes")[1]
+    section = ""
+    found = 0
+    for first in re.findall(r"(?m)^\| (`[^|]+) \|", text):
+        for name in re.findall(r"`([\w/.]+\.(?:py|md))`", first):
+            section = section if "/" not in name else str(Path(name).parent)
+            path = ROOT / name if "/" in name else ROOT / section / name
+            assert path.exists() or path.stem == "NAME", name  # a file still to be written
+            found += 1
+    assert found > 20
+
+
+def test_the_list_of_keys_holds_every_key(made: ModuleType) -> None:
+    page = made.keys_page()
+    for field in FIELDS.values():
+        section = page.split(f"## `[{field.section}]`")[1].split("\n## ")[0]
+        assert f"| `{field.key}` |" in section, field.path
+
+
+def test_the_list_of_quantities_holds_every_quantity(made: ModuleType) -> None:
+    page = made.quantities_page()
+    assert all(f"| `{name}` | `{each.unit}` |" in page for name, each in QUANTITIES.items())
+
+
+def test_the_list_of_commands_holds_every_command_and_option(made: ModuleType) -> None:
+    import typer
+
+    from reports.cli.app import build
+
+    page = made.commands_page()
+    root = typer.main.get_command(build())
+    for panel, names in PANELS.items():
+        assert f"## {panel}" in page
+        for name in names:
+            part = page.split(f"### `actuator-lti {name}`\n")[1].split("\n### ")[0]
+            options = [o for p in root.commands[name].params for o in p.opts if o.startswith("--")]
+            assert all(
+                f"`{option}" in part or f"{option}" in part for option in options if option != "--help"
+            )
+
+
+def test_cells_of_tables_stay_cells(made: ModuleType) -> None:
+    assert made.cell("a | b\n*c* <d>") == r"a \| b \*c\* &lt;d>"
+    assert made.table(["a", "b"], [["1", "2"]]) == ["| a | b |", "| --- | --- |", "| 1 | 2 |", ""]

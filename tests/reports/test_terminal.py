@@ -1,0 +1,73 @@
+"""What a terminal shows: the verdict first, and no line wider than the terminal, no word broken."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from reports import document as doc
+from reports.cli.main import main
+from reports.terminal import print_blocks
+
+WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
+
+
+def wide_table(columns: int) -> dict:
+    named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
+    rows = [
+        {"name": f"row {r}", **{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)}}
+        for r in range(3)
+    ]
+    return doc.table("A table", named, rows)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 200])
+@pytest.mark.parametrize("columns", [1, 4, 12])
+def test_no_value_is_broken_and_no_line_is_too_long(
+    width: int, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    block = wide_table(columns)
+    print_blocks([block])
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= width
+    for row in block["rows"]:
+        assert all(value in out for value in row.values())
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_margins_say_the_verdict_first_and_fit(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(["margins", "ilr33-amber"]) == 0
+    first, *rest = capsys.readouterr().out.splitlines()
+    assert first == "PASS  ilr33-amber: every loop is stable. All 12 requirements are met."
+    assert max(map(len, rest)) <= width
+    assert sum(line.count("✓ met") for line in rest) == 12
+
+
+def test_a_failed_requirement_is_in_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=1560 1/s"]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("FAIL  ilr33-amber: every loop is stable. 3 of 12 requirements are not met: ")
+    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=9000 1/s"]) == 1
+    assert (
+        capsys.readouterr().out.splitlines()[0].startswith("FAIL  ilr33-amber: not stable: Position loop. ")
+    )
+
+
+def test_the_program_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "reports.cli", "designs"],
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert "ilr33-amber" in done.stdout
+    done = subprocess.run(
+        [sys.executable, "-m", "reports.cli", "margins", "no-such-design"],
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
