@@ -19,9 +19,7 @@ _SLOW_HZ = 1e-5  # where the limit at zero frequency is read
 
 def unpowered(design: Design, winding: State) -> Design:
     """The design without its loops: the winding ``shorted`` (u = 0) or ``open`` (i = 0)."""
-    bare = replace(
-        design, controller=replace(design.controller, position=None, velocity=None, current=None)
-    )
+    bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
     if winding == "shorted" and design.motor.has_electrical_dynamics:
         return bare
     idle = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0)
@@ -33,9 +31,7 @@ def compliance(design: Design) -> Any:
     return assemble_loops(design).moment_to_output
 
 
-def stiffness_at(
-    response: Any, frequency_hz: npt.ArrayLike, period_s: float
-) -> npt.NDArray[np.complex128]:
+def stiffness_at(response: Any, frequency_hz: npt.ArrayLike, period_s: float) -> npt.NDArray[np.complex128]:
     """K = 1 / G(exp(j w Ts)); inf where the output does not move."""
     z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float)) * period_s)
     G = np.atleast_1d(np.asarray(response(z), dtype=complex))
@@ -44,7 +40,7 @@ def stiffness_at(
 
 
 def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
-    """Powered and unpowered stiffness of a design, friction sliding.
+    """Powered and unpowered stiffness, friction sliding (its share by load as where the motor drives).
 
     Examples
     --------

@@ -86,8 +86,8 @@ class Stiffness:
 
     @property
     def agrees(self) -> bool:
-        """Whether every check agrees within 0.1 %."""
+        """Whether every check agrees to `AGREED`."""
         return all(check.difference <= AGREED for check in self.checks)
 
 
-AGREED = 1e-3
+AGREED = 1e-6
