@@ -8,20 +8,14 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from nonlinear.emit.kinds import Function, Kind, c_float, c_name
+from nonlinear.emit.kinds import FUNCTIONS, Function, Kind, c_float, c_name
 
 Text = tuple[str, Kind]
 Constant = int | float | tuple[float, ...]
 Calls = Callable[[Any, list[Kind], ast.AST, Function], Function]
 
-_MATH = {
-    name: name
-    for name in (
-        "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "asin", "acos", "atan",
-        "atanh", "asinh", "acosh", "atan2", "sinh", "cosh", "tanh", "hypot", "copysign", "fabs", "ceil",
-    )
-}  # fmt: skip
-_TESTS = {"isfinite": "isfinite", "isnan": "isnan", "isinf": "isinf"}
+_TESTS = ("isfinite", "isnan", "isinf")
+_MATH = set(FUNCTIONS.split()) - {*_TESTS, "abs", "floor"}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _BITS = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
@@ -236,10 +230,10 @@ class Expressions:
         ):  # a whole number in Python; adding 0 turns -0 into 0 as the way through integers does
             return f"(floor({texts}) + 0.0)", "float"
         if name in _TESTS:
-            return f"({_TESTS[name]}({texts}) != 0)", "bool"
+            return f"({name}({texts}) != 0)", "bool"
         if name not in _MATH:
             raise self.function.error(node, f"math.{name} is not in the subset")
-        return f"{_MATH[name]}({texts})", "float"
+        return f"{name}({texts})", "float"
 
 
 def bare(text: str) -> str:

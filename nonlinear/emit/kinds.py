@@ -11,65 +11,16 @@ Kind = Literal["float", "int", "bool", "row"]
 C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
 
 # names that C, its standard headers or its compilers take
-RESERVED = frozenset(
-    [
-        "auto",
-        "bool",
-        "break",
-        "case",
-        "char",
-        "const",
-        "continue",
-        "default",
-        "do",
-        "double",
-        "else",
-        "enum",
-        "extern",
-        "false",
-        "float",
-        "for",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "register",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "struct",
-        "switch",
-        "true",
-        "typedef",
-        "union",
-        "unsigned",
-        "void",
-        "volatile",
-        "while",
-        "complex",
-        "imaginary",
-        "I",
-        "NULL",
-        "NAN",
-        "INFINITY",
-        "HUGE_VAL",
-        "errno",
-        "index",
-        "gamma",
-        "y0",
-        "y1",
-        "yn",
-        "j0",
-        "j1",
-        "jn",
-        "near",
-        "far",
-    ]
-)
+_KEYWORDS = """
+    auto bool break case char const continue default do double else enum extern false float for goto if inline
+    int long register restrict return short signed sizeof static struct switch true typedef union unsigned
+    void volatile while complex imaginary I NULL NAN INFINITY HUGE_VAL errno index gamma y0 y1 yn j0 j1 jn near far
+"""
+FUNCTIONS = """
+    sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign
+    fabs ceil floor abs isfinite isnan isinf
+"""
+RESERVED = frozenset((_KEYWORDS + FUNCTIONS).split())
 
 
 class EmitError(ValueError):
