@@ -14,7 +14,8 @@ C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
 _KEYWORDS = """
     auto bool break case char const continue default do double else enum extern false float for goto if inline
     int long register restrict return short signed sizeof static struct switch true typedef union unsigned
-    void volatile while complex imaginary I NULL NAN INFINITY HUGE_VAL errno index gamma y0 y1 yn j0 j1 jn near far
+    void volatile while complex imaginary I NULL NAN INFINITY HUGE_VAL errno index gamma y0 y1 yn j0 j1 jn
+    near far
 """
 FUNCTIONS = """
     sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign
