@@ -1,8 +1,16 @@
-"""Files that are either whole or not there: written beside their place, then moved onto it."""
+"""Files that are either whole or not there: written beside their place, then moved onto it.
+
+A symbolic link is followed: what it points to is replaced, the link stays. Devices and pipes, such as
+``/dev/stdout``, are written to, never replaced; nothing else is taken for a file.
+"""
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -13,6 +21,8 @@ from typing import BinaryIO
 from actuator_lti.errors import InputError
 
 _PART = ".part"
+_STANDARD = ("stdin", "stdout", "stderr")
+_OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|stderr))\Z")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
@@ -57,24 +67,83 @@ def _put(data: bytes, file: BinaryIO) -> None:
 
 
 def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], object]]) -> None:
-    """Fill every file beside its place, then move all into place."""
+    """Fill every file beside its place, then move all into place; devices and pipes are written to last."""
     staged: list[tuple[Path, Path]] = []
+    through: list[tuple[BinaryIO, Path]] = []
+    path = Path()
     try:
         for name, write in files.items():
             path = Path(name)
-            staged.append((_stage(path, write), path))
+            target = _target(path)
+            if target is None:
+                through.append((_held(write), path))
+            else:
+                staged.append((_stage(target, write), target))
+        for held, path in through:
+            _write_through(held, path)
         while staged:
             temporary, path = staged[0]
             os.replace(temporary, path)
             staged.pop(0)
-    except OSError as error:
-        named = str(error.filename or "")
-        where = str(path) if named.endswith(_PART) else named
-        raise InputError(f"cannot write: {error.strerror or error}", where=where) from error
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"cannot write: {_reason(error)}", where=_named(error, path)) from error
     finally:
         for temporary, _ in staged:
             with suppress(OSError):
                 temporary.unlink(missing_ok=True)
+        for held, _ in through:
+            held.close()
+
+
+def _target(path: Path) -> Path | None:
+    """Where a file is put: links are followed to their end; ``None`` for what is no regular file.
+
+    Everything below ``/dev`` and ``/proc`` is an open file of some process, whatever it looks like.
+
+    Raises
+    ------
+    InputError
+        For a directory, a socket or a block device.
+    """
+    if str(path.absolute()).startswith(("/dev/", "/proc/")) and not str(path).startswith("/dev/shm/"):
+        return None
+    real = Path(os.path.realpath(path))
+    try:
+        mode = real.stat().st_mode
+    except FileNotFoundError:
+        return real
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):  # a directory is refused when it would be replaced
+        return real
+    if stat.S_ISCHR(mode) or stat.S_ISFIFO(mode):
+        return None
+    raise InputError("is no file; allowed: a file, a pipe or a character device", where=str(path))
+
+
+def _held(write: Callable[[BinaryIO], object]) -> BinaryIO:
+    """Fill a file without a name: what goes to a pipe may need to be complete first."""
+    held: BinaryIO = tempfile.TemporaryFile()  # noqa: SIM115 - closed by the caller
+    write(held)
+    held.seek(0)
+    return held
+
+
+def _write_through(held: BinaryIO, path: Path) -> None:
+    """Copy to a device or pipe that is there; a pipe that nobody reads is an error, not a wait."""
+    own = _OPEN_FILE.match(str(path.absolute()))
+    if own:  # at its own place in the file: opened again it would begin at the start
+        sys.stdout.flush()
+        handle = os.dup(int(own[1]) if own[1] else _STANDARD.index(own[2]))
+    else:
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+    with os.fdopen(handle, "wb", buffering=0) as device:
+        mode = os.fstat(handle).st_mode
+        if stat.S_ISBLK(mode) or stat.S_ISDIR(mode):
+            raise InputError("is no file; allowed: a file, a pipe or a character device", where=str(path))
+        if not own:
+            os.set_blocking(handle, True)
+        shutil.copyfileobj(held, device)
 
 
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
@@ -92,6 +161,16 @@ def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
             os.unlink(name)
         raise
     return Path(name)
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def _named(error: OSError | ValueError, path: Path) -> str:
+    """The path that stands in the way, never one of our own temporary ones."""
+    named = str(getattr(error, "filename", None) or "")
+    return str(path) if not named or named.endswith(_PART) else named
 
 
 def _umask() -> int:

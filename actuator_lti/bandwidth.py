@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 from scipy.optimize import brentq
 
+from actuator_lti.bandwidth_exact import exact_gain
 from actuator_lti.errors import InputError
+from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, roots
 from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import gain_crossings
 from actuator_lti.margins.delay_distance import delayed_extreme
@@ -23,7 +25,11 @@ from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import reach, subdivided
 
 Level = Literal["1/sqrt(2)", "-3 dB"]
-_LEVELS: dict[str, float] = {"1/sqrt(2)": math.sqrt(0.5), "-3 dB": 10.0**-0.15}
+_SQUARES: dict[str, float] = {"1/sqrt(2)": 0.5, "-3 dB": 10.0**-0.3}
+_FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
+_NEAR_DC = 1e-7
+_POLE = "the response has a pole at zero frequency: it is no closed loop with a bandwidth"
+_NO_GAIN = "the response is zero at zero frequency: there is no value to measure the fall from"
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,11 @@ class Bandwidth:
     Attributes
     ----------
     minus3db_rad_s : float or None
-        Where |T| first falls below ``level`` times its value at zero frequency; ``None``: never.
+        Where |T| first falls below ``level`` times its value at zero frequency; ``None``: never. Where it
+        comes back above later (a resonance beyond), the first fall is still the one that is meant.
+    crossings_rad_s : tuple of float
+        Every frequency at which |T| passes that level, falls and rises in turn: the first is
+        ``minus3db_rad_s``.
     minus90deg_rad_s : float or None
         Where the unwrapped phase of T first falls below -90 deg against zero frequency.
     resonance_peak_db : float
@@ -52,6 +62,7 @@ class Bandwidth:
     resonance_rad_s: float
     dc_gain: float
     definition: str
+    crossings_rad_s: tuple[float, ...] = ()
 
     @property
     def minus3db_hz(self) -> float | None:
@@ -72,10 +83,14 @@ class Bandwidth:
         def text(hz: float | None) -> str:
             return "none" if hz is None else f"{hz:.6g} Hz"
 
-        return (
+        line = (
             f"bandwidth: {text(self.minus3db_hz)} ({self.definition}), {text(self.minus90deg_hz)} (-90 deg); "
             f"resonance {self.resonance_peak_db:+.4f} dB at {self.resonance_hz:.6g} Hz"
         )
+        if len(self.crossings_rad_s) < 2:
+            return line
+        again = ", ".join(text(w / (2.0 * math.pi)) for w in self.crossings_rad_s[1:])
+        return f"{line}; the first fall of the gain is meant, it passes the level again at {again}"
 
 
 @dataclass(frozen=True)
@@ -125,32 +140,88 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     >>> print(closed_loop_bandwidth(control.tf([1], [1, 1])))
     bandwidth: 0.159155 Hz (1/sqrt(2)), none (-90 deg); resonance +0.0000 dB at 0 Hz
     """
-    if level not in _LEVELS:
-        raise InputError(f"level = {level!r}: one of {list(_LEVELS)}")
-    inner = hasattr(system, "delays_s") and system.delays_s.size > 0
-    if not inner:
-        loop = rational_loop(system.to_state_space() if hasattr(system, "delays_s") else system)
-        form = from_rational(loop, delay_s)
-        unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
-    else:
-        form, unit = delay_form(system, delay_s), 1.0
-    dc = _dc(form)
-    if inner:
-        falls = delayed_gain_crossings(form.without_series(), abs(dc) * _LEVELS[level])
-        peak, place = delayed_extreme(form.without_series(), PEAK)
-    else:
-        falls = _rational_falls(loop, abs(dc) * _LEVELS[level])
-        peak, place = rational_extreme(loop, PEAK)
-    turn = _first_turn(form, dc)
-    resonance = -20.0 * math.log10(peak * abs(dc))
+    if level not in _SQUARES:
+        raise InputError(f"level = {level!r}: one of {list(_SQUARES)}")
+    if hasattr(system, "delays_s"):
+        if system.delays_s.size:
+            return _of_delays(system, delay_s, level)
+        system = system.to_state_space()
+    loop = rational_loop(system)
+    fraction = exact_fraction(system, loop)
+    gain = exact_gain(fraction, loop.in_z)
+    if gain is None:
+        raise InputError(_POLE)
+    if _slow_pole(fraction, loop):
+        return _by_response(loop, delay_s, level)
+    if abs(double(gain.dc)) <= dc_noise(loop):
+        raise InputError(_NO_GAIN)
+    peak, place = gain.largest()
+    turn = _unwarped(gain.first_turn(_FLOOR**2), loop)
+    if delay_s:
+        turn = _first_turn(from_rational(loop, delay_s), double(gain.dc))
+        turn = None if turn is None else loop.frequency(turn) if loop.in_z else turn
+    crossings = [_unwarped(w, loop) for w in gain.crossings(_SQUARES[level])]
+    return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
+                      _unwarped(place, loop), double(gain.dc), level)  # fmt: skip
+
+
+def _bandwidth(
+    crossings: list[float], turn: float | None, resonance_db: float, place: float, dc: float, level: Level
+) -> Bandwidth:
     return Bandwidth(
-        minus3db_rad_s=falls[0] * unit if falls else None,
-        minus90deg_rad_s=None if turn is None else turn * unit,
-        resonance_peak_db=resonance if resonance > 1e-9 else 0.0,
-        resonance_rad_s=place * unit if resonance > 1e-9 else 0.0,
+        minus3db_rad_s=crossings[0] if crossings else None,
+        minus90deg_rad_s=turn,
+        resonance_peak_db=resonance_db if resonance_db > 1e-9 else 0.0,
+        resonance_rad_s=place if resonance_db > 1e-9 else 0.0,
         dc_gain=dc,
         definition=level,
+        crossings_rad_s=tuple(crossings),
     )
+
+
+@overload
+def _unwarped(w: float, loop: RationalLoop) -> float: ...
+@overload
+def _unwarped(w: float | None, loop: RationalLoop) -> float | None: ...
+def _unwarped(w: float | None, loop: RationalLoop) -> float | None:
+    """From the s-plane of an exact sampled system to rad/s."""
+    if w is None or loop.period_s is None:
+        return w
+    return 2.0 * math.atan(w) / loop.period_s
+
+
+def _slow_pole(fraction: Fraction, loop: RationalLoop) -> bool:
+    """Whether a state space has a pole that is at zero frequency but for rounding, and perhaps not seen."""
+    if loop.numerator is not None or fraction.den.degree() < 1:
+        return False
+    p = np.array([complex(root) for root, _ in roots(fraction.den)])
+    near = np.abs(p - 1.0) if loop.in_z else np.abs(p) / float(np.abs(loop.A).max())
+    return bool((near < _NEAR_DC).any())
+
+
+def _by_response(loop: RationalLoop, delay_s: float, level: Level) -> Bandwidth:
+    """From the response alone, which a hidden mode at zero frequency leaves as it is."""
+    form = from_rational(loop, delay_s)
+    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+    dc = _dc(form)
+    falls = _rational_falls(loop, abs(dc) * math.sqrt(_SQUARES[level]))
+    return _assembled(form, falls, rational_extreme(loop, PEAK), dc, unit, level)
+
+
+def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
+    form = delay_form(system, delay_s)
+    dc = _dc(form)
+    falls = delayed_gain_crossings(form.without_series(), abs(dc) * math.sqrt(_SQUARES[level]))
+    return _assembled(form, list(falls), delayed_extreme(form.without_series(), PEAK), dc, 1.0, level)
+
+
+def _assembled(
+    form: DelayForm, falls: list[float], extreme: tuple[float, float], dc: float, unit: float, level: Level
+) -> Bandwidth:
+    turn = _first_turn(form, dc)
+    turn = None if turn is None else turn * unit
+    peak_db = -20.0 * math.log10(extreme[0] * abs(dc)) if extreme[0] > 0.0 else math.inf
+    return _bandwidth([x * unit for x in falls], turn, peak_db, extreme[1] * unit, dc, level)
 
 
 def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
@@ -187,7 +258,7 @@ def _db(inverse: float) -> float:
 def _dc(form: DelayForm) -> float:
     low, order = low_frequency(form)
     if order:
-        raise InputError("the response has a pole at zero frequency: it is no closed loop with a bandwidth")
+        raise InputError(_POLE)
     try:
         value = float(border_values(form.without_series(), np.zeros(1))[0].real)
     except np.linalg.LinAlgError:
@@ -196,7 +267,7 @@ def _dc(form: DelayForm) -> float:
         value = float(border_values(form.without_series(), np.array([low]))[0].real)
     reference = float(np.abs(border_values(form.without_series(), np.array([low * 1e3])))[0])
     if abs(value) <= 1e-12 * reference:
-        raise InputError("the response is zero at zero frequency: there is no value to measure the fall from")
+        raise InputError(_NO_GAIN)
     return value
 
 
@@ -219,7 +290,7 @@ def _first_turn(form: DelayForm, dc: float) -> float | None:
     """
     low, _ = low_frequency(form)
     high = math.pi if form.sampled else low * 10.0
-    floor = 1e-6 * abs(dc)
+    floor = _FLOOR * abs(dc)
 
     def resolved(found: Cells) -> Mask:
         size, R = np.abs(found.L), reach(form, found)

@@ -3,7 +3,8 @@
 The loop is built up form by form, and each item is what its step adds to the phase, so the items sum to the
 phase of the exact sampled loop:
 
-    ideal form = controller PI(s) * plant (motor with the inner loops closed)
+    ideal form without filters = controller PI(s) * plant (motor with the inner loops closed)
+    + each filter of speed and torque, one after the other -> ideal form
     + lag of the speed measurement + holds of all rates -> continuous form without computing delay
     + computing delay -> continuous form
     + sampling effects (digital PI against PI(s), aliasing, exact hold) -> sampled form
@@ -11,18 +12,22 @@ phase of the exact sampled loop:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.drive.blocks import centre_rad_s
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.cascade import ERRORS, MEASURED, Cascade, cascade
-from actuator_lti.loops.flow import FlowProgram
+from actuator_lti.loops.flow import ALL
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.plant import OperatingPoint
+    from actuator_lti.design.model import Design, Filter
+    from actuator_lti.drive.operating import OperatingPoint
 
 _GRID = 1000
 _LOW = 1e-4  # of the frequency asked for: where unwrapping starts
@@ -39,9 +44,11 @@ class DelayBudget:
     controller_deg : float
         PI(s), or 0 for P.
     plant_deg : float
-        Motor, with the inner loops closed and ideal.
+        Motor and load, with the inner loops closed and ideal.
+    filters_deg : mapping of str to float
+        Each filter in or inside the loop, in the order of the signal, by kind and frequency.
     measurement_deg : float
-        Age of a speed taken by difference (0 where w itself is measured; a measurement filter is in the
+        Age of a speed taken by difference (0 where w itself is measured; the lag of a tracking loop is in the
         plant's item).
     hold_deg : float
         Holds of all rates inside this loop.
@@ -64,6 +71,7 @@ class DelayBudget:
     sampling_deg: float
     total_deg: float
     one_more_sample_deg: float
+    filters_deg: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def items(self) -> dict[str, float]:
@@ -71,6 +79,7 @@ class DelayBudget:
         return {
             "controller": self.controller_deg,
             "plant": self.plant_deg,
+            **self.filters_deg,
             "measurement": self.measurement_deg,
             "hold": self.hold_deg,
             "computing delay": self.computing_delay_deg,
@@ -100,20 +109,21 @@ def delay_budget(
     InputError
         For a loop that the design does not have, or a frequency out of range.
     """
-    wired = cascade(design, operating_point, load_Nm)
+    wired = wire(design, Operating(point=operating_point, load_Nm=load_Nm))
     if loop_name not in wired.stages:
         raise InputError(f"loop {loop_name!r}: one of {', '.join(wired.stages)}")
     nyquist = np.pi / wired.period_s(loop_name)
     if not 0 < frequency_rad_s < nyquist:
         raise InputError(f"frequency_rad_s = {frequency_rad_s}: between 0 and Nyquist, {nyquist:g} rad/s")
     omega = np.geomspace(frequency_rad_s * _LOW, frequency_rad_s, _GRID)
-    kinds = ("none", "no computing, no measurement", "no computing", "all")
+    bare, steps = _built_up(wired, loop_name, omega)
+    kinds = (frozenset[str](), ALL - {"computing", "measurement"}, ALL - {"computing"}, ALL)
     ideal, held, measured, full = (_continuous(wired, loop_name, kind, omega) for kind in kinds)
-    sampled, later = _sampled(wired, loop_name, omega), _sampled(_one_later(wired), loop_name, omega)
-    controller = wired.pi(loop_name).continuous(omega)
-    controller_deg = float(np.degrees(np.angle(controller[-1])))
-    plant_deg = _from_low(ideal / controller)
-    steps = {
+    sampled, later = (_sampled(each, loop_name, omega) for each in (wired, wired.later(wired.tick_s)))
+    controller = wired.law(loop_name).at_s(omega)
+    items = {
+        "controller_deg": float(np.degrees(np.angle(controller[-1]))),
+        "plant_deg": _from_low(bare / controller),
         "hold_deg": _from_low(held / ideal),
         "measurement_deg": _from_low(measured / held),
         "computing_delay_deg": _from_low(full / measured),
@@ -122,32 +132,56 @@ def delay_budget(
     return DelayBudget(
         loop=loop_name,
         frequency_rad_s=frequency_rad_s,
-        controller_deg=controller_deg,
-        plant_deg=plant_deg,
-        total_deg=controller_deg + plant_deg + sum(steps.values()),
+        total_deg=sum(items.values()) + sum(steps.values()),
         one_more_sample_deg=_from_low(later / sampled),
-        **steps,
+        filters_deg=steps,
+        **items,
     )
 
 
-def _continuous(wired: Cascade, stage: str, delays: str, omega: np.ndarray) -> np.ndarray:
-    from actuator_lti.loops.continuous import delay_system
+def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
+    """The ideal loop without any filter, and what each filter adds to its phase."""
+    velocity, encoder = wired.design.controller.velocity, wired.design.encoder
+    if velocity is None or stage == "current":
+        return _continuous(wired, stage, frozenset(), omega), {}
+    lag = encoder.filter_time_s
+    names = [f"speed filter {1 / lag:.4g} rad/s"] if lag > 0 else []
+    names += [_name(k, item) for k, item in enumerate(velocity.filters, 1)]
+    steps: list[tuple[float, tuple[Filter, ...]]] = [(0.0, ())]
+    if lag > 0:
+        steps.append((lag, ()))
+    steps += [(lag, velocity.filters[: k + 1]) for k in range(len(velocity.filters))]
+    loops = [_continuous(_filtered(wired, *step), stage, frozenset(), omega) for step in steps]
+    shares = [_from_low(after / before) for before, after in pairwise(loops)]
+    return loops[0], dict(zip(names, shares, strict=True))
 
-    flow = FlowProgram(wired, stage, ERRORS[stage], delays).flow()
-    return np.asarray(delay_system(flow, "cut", MEASURED[stage])(1j * omega))
+
+def _name(k: int, item: Filter) -> str:
+    centre = centre_rad_s(item)
+    where = "" if centre is None else f" {centre:.4g} rad/s"
+    return f"{item.on} {item.kind} {k}{where}"
 
 
-def _sampled(wired: Cascade, stage: str, omega: np.ndarray) -> np.ndarray:
+def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
+    """The drive with these filters only."""
+    design, control = wired.design, wired.design.controller
+    assert control.velocity is not None
+    fewer = replace(control, velocity=replace(control.velocity, filters=filters))
+    encoder = replace(design.encoder, filter_time_s=lag_s)
+    return replace(wired, design=replace(design, controller=fewer, encoder=encoder))
+
+
+def _continuous(wired: Drive, stage: str, delays: frozenset[str], omega: np.ndarray) -> np.ndarray:
+    from actuator_lti.loops.continuous import stage_system
+
+    return np.asarray(stage_system(wired, stage, delays)(1j * omega))
+
+
+def _sampled(wired: Drive, stage: str, omega: np.ndarray) -> np.ndarray:
     from actuator_lti.loops.sampled import stage_loop
 
     loop = stage_loop(wired, stage).open_loop
     return np.asarray(loop(np.exp(1j * omega * loop.dt)))
-
-
-def _one_later(wired: Cascade) -> Cascade:
-    control = wired.design.controller
-    slower = replace(control, computing_delay_s=control.computing_delay_s + control.period_s)
-    return replace(wired, design=replace(wired.design, controller=slower))
 
 
 def _from_low(values: np.ndarray) -> float:

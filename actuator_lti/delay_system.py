@@ -82,7 +82,7 @@ class DelaySystem(LTI):
             raise InputError(f"delays_s = {self.delays_s.tolist()}: each must be positive and finite")
         names.setdefault("inputs", m)
         names.setdefault("outputs", p)
-        super().__init__(states=n, dt=0, **names)
+        super().__init__(dt=0, **({"states": n} | names))
         self.A, self.D11 = _matrix(A, n, n, "A"), _matrix(D11, p, m, "D11")
         self.B1, self.B2 = _matrix(B1, n, m, "B1"), _matrix(B2, n, k, "B2")
         self.C1, self.C2 = _matrix(C1, p, n, "C1"), _matrix(C2, k, n, "C2")
@@ -128,6 +128,8 @@ class DelaySystem(LTI):
                 "to_state_space: the system has delays, which no finite state space holds exactly"
             )
         labels = {"inputs": self.input_labels, "outputs": self.output_labels, "name": self.name}
+        if self.nstates:
+            labels["states"] = self.state_labels
         return control.ss(self.A, self.B1, self.C1, self.D11, **labels)
 
     def without_delays(self) -> control.StateSpace:

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.errors import InputError
-from actuator_lti.loops.cascade import Cascade
 
 if TYPE_CHECKING:
+    from actuator_lti.drive.wiring import Drive
     from actuator_lti.loops.result import Loops
 
 
@@ -26,15 +27,18 @@ class LimiterPath:
     Attributes
     ----------
     name : str
-        ``"speed"``: speed command before the clamp (rad/s, motor side). ``"acceleration"``: its change per
-        update over the period of the position loop (rad/s^2).
-        ``"current"``: current command before the clamp (A).
-        ``"voltage"``: voltage before the clamp (V).
+        Of `actuator_lti.drive.signals.LIMITERS`. ``"speed"``: speed command before the clamp (rad/s, motor
+        side). ``"acceleration"``: its change per update over the period of the position loop (rad/s^2).
+        ``"current"``: current command before the clamp (A). ``"voltage"``: voltage before the clamp (V).
+        ``"torque-command"``: what the velocity controller gives to the torque filters. ``"overload"``: the
+        motor current, whose square the protection averages.
     limit : float
         The limit, same unit; ``inf`` where there is none.
     unit : str
     nyquist_rad_s : float
-        pi over the period of the position loop for the sampled form, else ``inf``.
+        pi over the period of the outermost loop for the sampled form, else ``inf``.
+    averaged_s : float or None
+        Time constant of the mean square that the limiter looks at; ``None`` for the value itself.
     """
 
     name: str
@@ -42,6 +46,7 @@ class LimiterPath:
     unit: str
     nyquist_rad_s: float
     _evaluate: Callable[[np.ndarray], np.ndarray]
+    averaged_s: float | None = None
 
     def responses(self, omega_rad_s: Any) -> np.ndarray:
         """T_k(jw), shape (M, len(omega)): a row for each update within a position period."""
@@ -64,11 +69,27 @@ class LimiterPath:
         bias : float
             Constant value of the quantity on top of which the sinusoid acts (in `unit`), e.g. the motor speed
             of a superposed ramp; what it uses up of the limit is no longer there.
+
+        Notes
+        -----
+        A mean square (time constant tau) of a sinusoid of amplitude I tends to I^2/2 with a ripple of the
+        double frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds
+        its square and, by the product of both, a ripple of the single frequency, bounded by its amplitude.
         """
-        room = max(self.limit - abs(bias), 0.0)
         magnitude = np.abs(self.response(omega_rad_s))
         with np.errstate(divide="ignore"):
-            return room / magnitude
+            if self.averaged_s is None:
+                return max(self.limit - abs(bias), 0.0) / magnitude
+            return (
+                self._mean_square_room(np.atleast_1d(np.asarray(omega_rad_s, float)), abs(bias)) / magnitude
+            )
+
+    def _mean_square_room(self, omega: np.ndarray, bias: float) -> np.ndarray:
+        """Largest amplitude I with bias^2 + 2 bias I r1 + (I^2/2) (1 + r2) at most limit^2."""
+        assert self.averaged_s is not None
+        r1, r2 = (1 / np.hypot(1.0, k * omega * self.averaged_s) for k in (1, 2))
+        a, b, c = (1 + r2) / 2, 2 * bias * r1, bias**2 - self.limit**2
+        return np.where(c < 0, (-b + np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))) / (2 * a), 0.0)
 
 
 @dataclass(frozen=True)
@@ -108,26 +129,51 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
     return Onset(omega, lowest, active, each)
 
 
-def limiter_signals(wired: Cascade) -> dict[str, tuple[str, float, str]]:
-    """Signal, limit and unit of each limiter that the wiring has."""
-    limits = wired.design.limits
-    names = {"w_ref": "speed", "i_ref": "current", "u": "voltage"}
-    value = {"w_ref": limits.speed_rad_s, "i_ref": limits.peak_current_A, "u": limits.voltage_V}
-    table = {names[point]: (point, value[point], wired.unit(point)) for point in wired.target.values()}
-    if "speed" in table:
-        unit = "rad/s^2" if wired.design.axis == "rotary" else "m/s^2"
-        table["acceleration"] = ("w_ref", limits.acceleration_rad_s2, unit)
-    order = ("speed", "acceleration", "current", "voltage")
-    return {name: table[name] for name in order if name in table}
+@dataclass(frozen=True)
+class Place:
+    """Where a limiter acts: the signal in front of it, the ticks between its updates, the limit."""
+
+    limiter: Limiter
+    signal: str
+    every: int
+    limit: float
+    unit: str
+
+
+def limiter_places(wired: Drive) -> list[Place]:
+    """Every limiter that the wiring has, in the order of the registry."""
+    limits, found = wired.design.limits, {}
+    target = wired.target or {"voltage": "u"}
+    for stage, signal in target.items():
+        name, every = CLAMP_OF[signal], wired.interval.get(stage, 1)
+        limiter, unit = LIMITERS[name], wired.unit(signal)
+        found[name] = Place(limiter, signal, every, limiter.limit_of(limits), unit)
+        if stage == "velocity" and wired.filters("torque"):
+            first = LIMITERS["torque-command"]
+            found[first.name] = Place(first, "torque_command", every, limiter.limit_of(limits), unit)
+        if name == "speed":
+            change = LIMITERS["acceleration"]
+            found["acceleration"] = Place(change, signal, every, change.limit_of(limits), f"{unit}^2")
+    if limits.peak_time_s is not None and "current" in wired.stages:
+        found["overload"] = Place(LIMITERS["overload"], "i", 1, limits.continuous_current_A, "A")
+    return [found[name] for name in LIMITERS if name in found]
 
 
 def limiter_paths(
-    wired: Cascade, evaluate: Callable[[str, str], Callable[[np.ndarray], np.ndarray]], nyquist_rad_s: float
+    wired: Drive,
+    evaluate: Callable[[str, int, bool], Callable[[np.ndarray], np.ndarray]],
+    nyquist_rad_s: float,
 ) -> dict[str, LimiterPath]:
-    """All limiter paths; ``evaluate(signal, kind)`` gives the function of frequency, kind value or rate."""
+    """All limiter paths; ``evaluate(signal, every, rate)`` gives the function of frequency."""
+    time = wired.design.limits.overload_time_s
     return {
-        name: LimiterPath(
-            name, limit, unit, nyquist_rad_s, evaluate(s, "rate" if name == "acceleration" else "value")
+        place.limiter.name: LimiterPath(
+            place.limiter.name,
+            place.limit,
+            place.unit,
+            nyquist_rad_s,
+            evaluate(place.signal, place.every, place.limiter.kind == "rate"),
+            time if place.limiter.kind == "rms" else None,
         )
-        for name, (s, limit, unit) in limiter_signals(wired).items()
+        for place in limiter_places(wired)
     }

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import flint
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
@@ -14,86 +15,82 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.collocation import open_loop_matrix
 from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
 from actuator_lti.margins.delay_setting import low_frequency
-from actuator_lti.margins.loop import Real
+from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step_modes import ModalTail, modal_tail
+from actuator_lti.step_response import Response, Stepped
+from actuator_lti.step_terms import Exponentials, Term
 
 _FEWEST = 12  # steps to the shortest delay
-_ALIVE = 9.0  # time constants of the slowest mode to look at
 _FIRST = 10.0  # longest delays to step at first
 _MEET = 1e-5
 _POINTS = 32
+_PARTS = 4  # intervals of a step at whose ends the response is kept
+_ZERO = 1e-12  # of the largest response about the poles
 _MOST = 400_000
 
 
 Between = Callable[[int, float], float]
 
 
-def delayed_response(system: Any) -> tuple[Real, Real, float, Between]:
-    """Unit step response of a system with inner delays.
+def delayed_response(system: Any) -> tuple[Response, float]:
+    """Unit step response of a system with inner delays over its final value, and that value.
 
     The first delays are stepped; after them the response is the sum over the exact poles, which the
     collocation of the delays starts and Newton on the characteristic matrix sharpens. The two have to agree
     where they meet, to 1e-5 of the final value; otherwise stepping goes on.
 
-    Returns
-    -------
-    time_s, response : arrays
-        The grid, and the response on it.
-    final_value : float
-        Its limit.
-    between : callable
-        Response at any time within the grid interval k: ``between(k, t)``.
-
     Raises
     ------
     InputError
-        Not stable, or a response that would take too many points.
+        Not stable, a final value of zero, or a response that would take too many points.
     """
     form = delay_form(system)
     low, order = low_frequency(form)
     poles = sorted_poles(open_loop_matrix(form, _POINTS), False)
     if order or poles.unstable or poles.border_count > 1:
         raise InputError("the system is not stable: it has no step figures")
-    final = float(border_values(form, np.array([low if poles.border_count else 0.0]))[0].real)
-    decay = -poles.values.real
-    horizon = _ALIVE / float(decay[decay > 1e-9 * np.abs(poles.values).max()].min())
+    final = _final_value(form, low if poles.border_count else 0.0, poles.values)
     head = _FIRST * float(form.delays.max())
     while True:
         h = _grid_step(form.delays, head)
-        values = _stepped(form, h, int(np.ceil(head / h)))
-        time, response = 0.5 * h * np.arange(2 * values.shape[0]), values[:, :2].ravel()
-        if head >= horizon:
-            return time, response, final, parabolas(h, values)
+        values = _stepped(form, h, int(np.ceil(head / h))) / final
+        time, y = h / _PARTS * np.arange(_PARTS * values.shape[0]), values[:, :_PARTS].ravel()
         tail = modal_tail(form, poles.values, head)
         late = time > 0.75 * head
-        if np.abs(tail.response(time[late]) + final - response[late]).max() <= _MEET * abs(final):
-            return _joined(time, response, final, tail, horizon, parabolas(h, values))
+        if np.abs(tail.response(time[late]) / final + 1.0 - y[late]).max() <= _MEET:
+            return Response(Stepped(time, y, quartics(h, values)), _exponentials(tail, final), False), final
         head *= 2.0
 
 
-def parabolas(h: float, values: Real) -> Between:
-    """The response within its steps; two grid intervals make a step."""
+def _final_value(form: DelayForm, x: float, poles: Complex) -> float:
+    final = float(border_values(form, np.array([x]))[0].real)
+    around = np.abs(poles[np.abs(poles) > 0.0])
+    largest = float(np.abs(border_values(form, around)).max(initial=0.0))
+    if abs(final) <= _ZERO * largest:
+        raise InputError(
+            "the final value of the step response is zero: it has no rise, overshoot or settling"
+        )
+    return final
+
+
+def _exponentials(tail: ModalTail, final: float) -> Exponentials:
+    terms = tuple(
+        Term(flint.acb(complex(p)), (flint.acb(complex(w)),))
+        for p, w in zip(tail.poles, tail.weights, strict=True)
+        if w != 0.0
+    )
+    return Exponentials(terms, final, 64)
+
+
+def quartics(h: float, values: Real) -> Between:
+    """The response within its steps, through its five points in each; four grid intervals make a step."""
+    coefficients = values @ np.linalg.inv(np.vander(np.linspace(0.0, 1.0, _PARTS + 1))).T
 
     def between(k: int, t: float) -> float:
-        a, m, b = values[k // 2]
-        p = t / h - k // 2
-        return float(a + p * (-3.0 * a + 4.0 * m - b) + p**2 * (2.0 * a - 4.0 * m + 2.0 * b))
+        return float(np.polyval(coefficients[k // _PARTS], t / h - k // _PARTS))
 
     return between
-
-
-def _joined(
-    time: Real, response: Real, final: float, tail: ModalTail, horizon: float, early: Between
-) -> tuple[Real, Real, float, Between]:
-    last, late = time.size - 1, tail.grid(float(time[-1]), max(horizon, 1.01 * float(time[-1])))
-    all_time = np.concatenate((time, late))
-    all_response = np.concatenate((response, tail.response(late) + final))
-
-    def between(k: int, t: float) -> float:
-        return early(k, t) if k < last else float(tail.response(np.array([t]))[0]) + final
-
-    return all_time, all_response, final, between
 
 
 def _grid_step(delays: Real, horizon: float) -> float:
@@ -146,26 +143,25 @@ class _Past:
 def _stepped(form: DelayForm, h: float, steps: int) -> Real:
     """March: x exactly for delayed signals that are parabolas over a step.
 
-    Returns y at the start, in the middle and at the end of each step (shape (steps + 1, 3)).
+    Returns y at the start, at each quarter and at the end of each step (shape (steps + 1, 5)).
     """
     n, q = form.B1.size, form.delays.size
     M = np.zeros((n + 3 * q + 1, n + 3 * q + 1))
     M[:n, :n], M[:n, n : n + q], M[:n, -1] = form.A, form.B2, form.B1
     M[n : n + q, n + q : n + 2 * q] = M[n + q : n + 2 * q, n + 2 * q : n + 3 * q] = np.eye(q)
-    to_middle, to_end = expm(M * (0.5 * h))[:n], expm(M * h)[:n]
+    positions = np.arange(_PARTS + 1) / _PARTS
+    inside = np.stack([expm(M * (h * part))[:n] for part in positions])
     past = _Past(steps, _Lag.of(form.delays / h))
-    x, y = np.zeros(n), np.empty((steps + 1, 3))
-
-    def v(x: Real, z: Real) -> Real:
-        return form.C2 @ x + form.D21 + form.D22 @ z
-
+    x, y = np.zeros(n), np.empty((steps + 1, _PARTS + 1))
     for k in range(steps + 1):
-        a, m, b = past.at(k, 0.0), past.at(k, 0.5), past.at(k, 1.0)
+        z = np.stack([past.at(k, part) for part in positions])
+        a, m, b = z[0], z[_PARTS // 2], z[-1]
         state = np.concatenate(
             (x, a, (-3.0 * a + 4.0 * m - b) / h, (4.0 * a - 8.0 * m + 4.0 * b) / h**2, [1.0])
         )
-        x_middle, x_end = to_middle @ state, to_end @ state
-        past.start[k], past.middle[k], past.end[k] = v(x, a), v(x_middle, m), v(x_end, b)
-        y[k] = form.C1 @ x + form.D12 @ a, form.C1 @ x_middle + form.D12 @ m, form.C1 @ x_end + form.D12 @ b
-        x = x_end
+        states = inside @ state
+        v = states @ form.C2.T + form.D21 + z @ form.D22.T
+        past.start[k], past.middle[k], past.end[k] = v[0], v[_PARTS // 2], v[-1]
+        y[k] = states @ form.C1 + z @ form.D12
+        x = states[-1]
     return y + form.D11

@@ -11,7 +11,6 @@ from actuator_lti.margins.loop import Complex, Real
 
 _FORGOTTEN = 25.0  # time constants
 _NEWTON = 8
-_FINE = 0.05
 
 
 @dataclass(frozen=True)
@@ -30,19 +29,6 @@ class ModalTail:
     def response(self, time: Real) -> Real:
         """The deviation at the times given, s."""
         return (np.exp(time[:, None] * self.poles) @ self.weights).real
-
-    def grid(self, start: float, stop: float) -> Real:
-        """Times as close as the fastest pole that is alive asks for."""
-        ends = np.unique(np.clip(14.0 / -self.poles.real, start, stop))
-        ends = np.unique(np.append(ends, stop))
-        parts, at = [], start
-        for end in ends[ends > start]:
-            alive = self.poles[14.0 / -self.poles.real >= end * (1.0 - 1e-12)]
-            fastest = float(np.abs(alive).max()) if alive.size else 1.0 / end
-            count = int(min(max(np.ceil((end - at) * fastest / _FINE), 8), 200_000))
-            parts.append(at + (end - at) * np.arange(1, count + 1) / count)
-            at = float(end)
-        return np.concatenate(parts)
 
 
 def modal_tail(form: DelayForm, poles: Complex, start: float) -> ModalTail:

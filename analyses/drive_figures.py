@@ -1,8 +1,4 @@
-"""What the drive can do at a load, in closed form: output rate, motor current, acceleration.
-
-Steady motion and the first instant of it; the worse of the two directions, with the hinge moment against
-the motion where the load path is back-drivable.  Sources: paper, equations (1), (2), (9); model.md section 1.
-"""
+"""What the drive can do at a load, in words and numbers (`actuator_lti.drive.facts` has the closed forms)."""
 
 from __future__ import annotations
 
@@ -10,8 +6,7 @@ import math
 from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
-from analyses.static_threshold import stall_torque_Nm
+from actuator_lti.drive.facts import RATE_LIMITS, capability
 
 
 @dataclass(frozen=True)
@@ -65,58 +60,14 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     >>> round(found.motor_current_A, 3), found.rate_limit
     (3.037, 'speed limit')
     """
-    if not math.isfinite(load_Nm):
-        raise InputError(f"load_Nm = {load_Nm}: must be finite")
-    return min((_one_way(design, load_Nm, direction) for direction in (1, -1)), key=_rank)
-
-
-def _rank(found: DriveFigures) -> tuple[float, float, float]:
-    """Order the directions: the slower, then the weaker, then the one that needs more current."""
-    return (found.output_rate_rad_s, found.acceleration_rad_s2, -(found.motor_current_A or 0.0))
-
-
-def _one_way(design: Design, load_Nm: float, direction: int) -> DriveFigures:
-    """Give the figures for one direction of motion."""
-    ratio = design.total_ratio
-    against = _resistance_Nm(design, load_Nm, direction)
-    viscous = design.friction.viscous(direction)
-    speed, why = _top_speed(design, against, viscous)
-    current = None
-    k_M = design.motor.torque_constant_Nm_A
-    if design.motor.has_electrical_dynamics and k_M and math.isfinite(speed):
-        current = (against + viscous * speed) / k_M
-    torque = stall_torque_Nm(design)
-    free = max(torque - against * design.friction.breakaway_ratio, 0.0)
-    gain = max(torque - against, 0.0) / design.inertia_kgm2 if free > 0.0 else 0.0
-    limit = design.limits.acceleration_rad_s2
-    cause = "acceleration limit" if limit < gain else "torque"
-    return DriveFigures(load_Nm, speed / ratio, why, current, min(gain, limit) / ratio, cause)
-
-
-def _resistance_Nm(design: Design, load_Nm: float, direction: int) -> float:
-    """Give the constant torque against motion at the motor: dry friction, offset, load where it passes."""
-    friction = design.friction
-    total = friction.dry_Nm(load_Nm, direction) + direction * friction.offset_torque_Nm
-    if design.load.path == "back-drivable":
-        total += abs(load_Nm) / design.total_ratio
-    return total
-
-
-def _top_speed(design: Design, against: float, viscous: float) -> tuple[float, str]:
-    """Give the largest steady motor speed and what sets it."""
-    motor, limits = design.motor, design.limits
-    if stall_torque_Nm(design) <= against:
-        return 0.0, "force"
-    bounds = [(math.inf, "nothing")]
-    if design.controller.velocity is not None:
-        bounds.append((limits.speed_rad_s, "speed limit"))
-    if viscous > 0.0:
-        bounds.append(((stall_torque_Nm(design) - against) / viscous, "force"))
-    if motor.source_gain_Nm_V is None:
-        assert motor.resistance_ohm is not None
-        assert motor.torque_constant_Nm_A is not None
-        assert motor.back_emf_constant_Vs_rad is not None
-        drop = motor.resistance_ohm / motor.torque_constant_Nm_A
-        slope = motor.back_emf_constant_Vs_rad + drop * viscous
-        bounds.append(((limits.voltage_V - drop * against) / slope, "voltage"))
-    return min(bounds, key=lambda bound: bound[0])
+    found = capability(design, load_Nm)
+    current = float(found.motor_current_A)
+    limited = bool(found.accelerates_to_limit)
+    return DriveFigures(
+        load_Nm=load_Nm,
+        output_rate_rad_s=float(found.output_rate_rad_s),
+        rate_limit=RATE_LIMITS[int(found.rate_limit)],
+        motor_current_A=None if math.isnan(current) else current,
+        acceleration_rad_s2=float(found.acceleration_rad_s2),
+        acceleration_limit="acceleration limit" if limited else "torque",
+    )

@@ -1,19 +1,25 @@
-"""Chunks of a numbered study, computed here, on a local Dask cluster, or on one that is already there.
+"""Work that falls into parts, computed here, on a local Dask cluster, or on one that is already there.
 
-A task is a picklable object with ``evaluate(first, count) -> dict of arrays``; what it returns for a number
-must not depend on the chunk that the number is in.  Results come back in any order and are given to a sink
-one by one, so that memory holds only a few chunks, whatever their number.
+Parts are chunks of a numbered study (`Engine.run`) or any items (`Engine.map`). What comes of a part must not
+depend on where it is computed; results come in any order and are given to a sink one by one, so that memory
+holds only a few, whatever their number.
+
+Whoever can talk to a Dask scheduler can run code on it. The local cluster therefore listens on this machine
+only, under TLS with certificates that are made for the run and never leave it, and shows no dashboard.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,14 +27,19 @@ from actuator_lti.errors import InputError, NumericalError
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
+    from distributed.security import Security
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
 Sink = Callable[[Chunk, Arrays], None]
 Progress = Callable[[int, int], None]
-_IN_FLIGHT = 3  # chunks a worker that are under way or waiting to be written
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+_IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
-_RETRIES = 20  # workers that may die over one chunk before the run gives up
+_RETRIES = 20  # workers that may die over one part before the run gives up
+_TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
+_CODE = ("actuator_lti", "nonlinear", "analyses")
 
 
 class Task(Protocol):
@@ -40,14 +51,16 @@ class Task(Protocol):
 
 @dataclass(frozen=True)
 class Engine:
-    """Where chunks are computed.
+    """Where parts are computed.
 
     Attributes
     ----------
     workers : int or None
         Processes of a local Dask cluster; ``None`` for none.
     scheduler : str or None
-        Address of a running Dask scheduler.
+        Address of a running Dask scheduler, such as ``tls://host:8786``.
+    tls : Path or None
+        Folder with ca.pem, cert.pem and key.pem for that scheduler.
     threads : int or None
         Threads in this process when neither is given; all processors by default.
     """
@@ -55,12 +68,24 @@ class Engine:
     workers: int | None = None
     scheduler: str | None = None
     threads: int | None = None
+    tls: Path | None = None
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.scheduler is not None:
             raise InputError("--workers and --scheduler: one of them")
         if self.workers is not None and self.workers < 1:
             raise InputError(f"--workers {self.workers}: at least 1")
+        if self.tls is not None and not (self.scheduler or "").startswith("tls://"):
+            raise InputError("--tls: goes with --scheduler tls://HOST:PORT")
+        if self.tls is None and (self.scheduler or "").startswith("tls://"):
+            raise InputError(
+                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(_TLS_FILES.values())}"
+            )
+
+    @property
+    def distributed(self) -> bool:
+        """Whether parts go to other processes."""
+        return self.workers is not None or self.scheduler is not None
 
     def run(self, task: Task, chunks: Iterable[Chunk], sink: Sink, progress: Progress | None = None) -> None:
         """Evaluate every chunk once and give each result to the sink, in any order.
@@ -71,145 +96,238 @@ class Engine:
             If workers keep dying, or the scheduler cannot be reached.
         """
         todo = list(chunks)
+        counted = _Counted(progress, sum(count for _, count in todo))
+
+        def take(chunk: Chunk, arrays: Arrays) -> None:
+            sink(chunk, arrays)
+            counted.add(chunk[1])
+
+        self._each(_evaluate, task, todo, take)
+
+    def map(
+        self,
+        work: Callable[[Item], Result],
+        items: Sequence[Item],
+        sink: Callable[[Item, Result], None],
+        progress: Progress | None = None,
+    ) -> None:
+        """Apply a function of a module to every item once, each result to the sink, in any order.
+
+        Raises
+        ------
+        NumericalError
+            As `run`; whatever the work raises goes its way.
+        """
+        counted = _Counted(progress, len(items))
+
+        def take(item: Item, result: Result) -> None:
+            sink(item, result)
+            counted.add(1)
+
+        self._each(_applied, work, list(items), take)
+
+    def _each(
+        self, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
+    ) -> None:
+        """Give ``call(held, part)`` of every part to the sink."""
         if not todo:
             return
-        counted = _Counted(sink, progress, sum(count for _, count in todo))
-        if self.workers is None and self.scheduler is None:
-            _threads(task, todo, counted, self.threads or os.cpu_count() or 1)
-        else:
-            self._dask(task, todo, counted)
-
-    def _dask(self, task: Task, todo: list[Chunk], sink: _Counted) -> None:
-        import distributed
-
+        if not self.distributed:
+            _threads(partial(call, held), todo, sink, self.threads or os.cpu_count() or 1)
+            return
         try:
-            if self.scheduler is not None:
-                with _connected(self.scheduler) as client:
-                    _submit(client, task, todo, sink)
-                return
-            with _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
-                _submit(client, task, todo, sink)
+            with self._client() as client:
+                _submit(client, call, held, todo, sink)
         except (OSError, TimeoutError) as error:
+            if isinstance(error, InputError):
+                raise
             raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {error}") from error
 
+    @contextmanager
+    def _client(self) -> Iterator[Client]:
+        import distributed
 
-def _connected(address: str) -> Client:
+        if self.scheduler is not None:
+            with _connected(self.scheduler, self.tls) as client:
+                yield client
+            return
+        with _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
+            yield client
+
+
+def _connected(address: str, tls: Path | None) -> Client:
     """Connect to a running scheduler.
 
     Raises
     ------
     InputError
-        If the address is none.
+        If the address is none, or a certificate cannot be used.
     """
+    import ssl
+
     import distributed
 
+    security = None if tls is None else _security(tls)
     try:
-        return distributed.Client(address, timeout=CONNECT_S)
+        return distributed.Client(address, timeout=CONNECT_S, security=security)
+    except ssl.SSLError as error:
+        raise InputError(
+            f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
+        ) from error
     except ValueError as error:
         raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
+
+
+def _security(folder: Path) -> Security:
+    """The certificates of a folder."""
+    from distributed.security import Security
+
+    files = {key: folder / name for key, name in _TLS_FILES.items()}
+    for path in files.values():
+        if not path.is_file():
+            raise InputError("no such file; allowed: a certificate in PEM", where=str(path))
+    return Security(require_encryption=True, **{key: str(path) for key, path in files.items()})
 
 
 def _local_cluster(workers: int) -> LocalCluster:
     """Start worker processes that leave Ctrl-C to this one: each would print its own traceback."""
     from multiprocessing import resource_tracker
 
+    import dask
     import distributed
+    from distributed.security import Security
 
     resource_tracker.ensure_running()  # its start would take the mask away again
     held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
+    silent: dict[str, list[str]] = {
+        f"distributed.{part}.http.routes": [] for part in ("scheduler", "worker", "nanny")
+    }
     try:
-        return distributed.LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            silence_logs=50,
-        )
+        with dask.config.set(silent):
+            return distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=Security.temporary(),
+                dashboard_address=None,
+                silence_logs=50,
+            )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
 @dataclass
 class _Counted:
-    """A sink that reports how many numbers are done."""
+    """Reports how much is done."""
 
-    sink: Sink
     progress: Progress | None
     total: int
     done: int = 0
 
-    def __call__(self, chunk: Chunk, arrays: Arrays) -> None:
-        self.sink(chunk, arrays)
-        self.done += chunk[1]
+    def add(self, count: int) -> None:
+        self.done += count
         if self.progress is not None:
             self.progress(self.done, self.total)
 
 
-def _threads(task: Task, todo: list[Chunk], sink: _Counted, threads: int) -> None:
+def _threads(
+    call: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None], threads: int
+) -> None:
     """Compute in threads of this process (the compiled parts run without the interpreter's lock)."""
     waiting = iter(todo)
     with ThreadPoolExecutor(threads) as pool:
-        running = {
-            pool.submit(task.evaluate, *chunk): chunk for chunk in islice(waiting, threads * _IN_FLIGHT)
-        }
+        running = {pool.submit(call, part): part for part in islice(waiting, threads * _IN_FLIGHT)}
         try:
             while running:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in finished:
                     sink(running.pop(future), future.result())
-                    for chunk in islice(waiting, 1):
-                        running[pool.submit(task.evaluate, *chunk)] = chunk
+                    for part in islice(waiting, 1):
+                        running[pool.submit(call, part)] = part
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-def _submit(client: Any, task: Task, todo: list[Chunk], sink: _Counted) -> None:
-    """Compute on a Dask cluster, with a few chunks a worker under way; a lost worker's chunks run again."""
+def _submit(
+    client: Any, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
+) -> None:
+    """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
     import distributed
 
     client.wait_for_workers(1, timeout=30)
-    _same_code(client)
-    held = client.scatter(task, broadcast=True, hash=False)
+    _same_code(client, _packages(held))
+    sent = client.scatter(held, broadcast=True, hash=False)
     width = max(2, sum(client.nthreads().values())) * _IN_FLIGHT
-    waiting: Iterator[Chunk] = iter(todo)
+    waiting = iter(todo)
+    parts: dict[str, Any] = {}
 
-    def start(chunk: Chunk) -> Any:
-        return client.submit(_evaluate, held, chunk, pure=False, retries=_RETRIES)
+    def start(part: Any) -> Any:
+        future = client.submit(_answered, call, sent, part, pure=False, retries=_RETRIES)
+        parts[future.key] = part
+        return future
 
-    running = distributed.as_completed([start(chunk) for chunk in islice(waiting, width)])
+    running = distributed.as_completed([start(part) for part in islice(waiting, width)])
     for future in running:
-        chunk, arrays = future.result()
+        result, error = future.result()
         future.release()
-        sink(chunk, arrays)
+        if error is not None:
+            raise error
+        sink(parts.pop(future.key), result)
         for following in islice(waiting, 1):
             running.add(start(following))
 
 
-def _evaluate(task: Task, chunk: Chunk) -> tuple[Chunk, Arrays]:
-    return chunk, task.evaluate(*chunk)
+def _answered(call: Callable[[Any, Any], Any], held: Any, part: Any) -> tuple[Any, Exception | None]:
+    """The result or the error of a part: tried again is only what a dying worker took along."""
+    try:
+        return call(held, part), None
+    except Exception as error:  # noqa: BLE001 - raised again where it was asked for
+        return None, error
 
 
-def code_version() -> str:
-    """Version and content hash of the code that computes samples: workers must have the same."""
+def _evaluate(task: Task, chunk: Chunk) -> Arrays:
+    return task.evaluate(*chunk)
+
+
+def _applied(work: Callable[[Any], Any], item: Any) -> Any:
+    return work(item)
+
+
+def _packages(held: Any) -> tuple[str, ...]:
+    """The packages that a task needs: those of all calculations, and its own."""
+    owner = getattr(held, "func", held)  # a partial function is what it calls
+    own = (getattr(owner, "__module__", None) or type(held).__module__).partition(".")[0]
+    return _CODE if own in _CODE else (*_CODE, own)
+
+
+def code_version(packages: Sequence[str] = _CODE) -> str:
+    """Content hash of the code that computes parts: workers must have the same."""
     import hashlib
-    from pathlib import Path
-
-    import actuator_lti
-    import nonlinear
+    from importlib import import_module
 
     digest = hashlib.sha256()
-    for package in (actuator_lti, nonlinear):
-        folder = Path(package.__file__ or "").parent
-        for path in sorted(folder.rglob("*.py")):
-            digest.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes() + b"\0")
+    for name in packages:
+        try:
+            package = import_module(name)
+        except ImportError:
+            digest.update(f"{name}: absent\0".encode())
+            continue
+        file = Path(package.__file__ or "")
+        whole = file.name == "__init__.py"
+        for path in sorted(file.parent.rglob("*.py")) if whole else [file]:
+            digest.update(f"{name}/{path.relative_to(file.parent)}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
-def _same_code(client: Any) -> None:
+def _same_code(client: Any, packages: tuple[str, ...]) -> None:
     """Refuse workers that run another version of the code."""
-    here = code_version()
-    others = {address: found for address, found in client.run(code_version).items() if found != here}
+    here = code_version(packages)
+    others = {
+        address: found for address, found in client.run(code_version, packages).items() if found != here
+    }
     if others:
         address = next(iter(others))
         raise InputError(f"worker {address} runs other code ({others[address]}, here {here})")

@@ -10,13 +10,14 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
     from actuator_lti.delay_budget import DelayBudget
+    from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.limiters import Onset
     from actuator_lti.loops import ExactMargins, Loops
-    from actuator_lti.plant import OperatingPoint
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
@@ -118,7 +119,8 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     Raises
     ------
     InputError, NumericalError
-        As `assemble_loops` and `loop_figures`.
+        As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
+        loops: what else fails is left out and noted.
     """
     from actuator_lti.loops import assemble_loops
 
@@ -128,26 +130,46 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
 
     loops = assemble_loops(design)
     refused: list[str] = []
-    forms = {"sampled": all_loop_figures(loops)}
-    for form in FORMS[1:]:
-        forms[form] = all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused)
+    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops)}
+    others = attempt("continuous and ideal forms", lambda: _other_forms(design, refused), {})
+    forms.update(others)
     step(1)
-    locked = None
-    if loops.current is not None:
-        fixed = assemble_loops(design, rotor="locked").current
-        locked = None if fixed is None else loop_figures(fixed)
+    locked = attempt("current loop with the rotor locked", lambda: _locked(design, loops), None)
     step(2)
-    break_points = {name: _break_point(loops, name) for name in loops.break_points}
+    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
-    points = _operating_points(design, refused)
+    points = attempt("loops at the operating points", lambda: _operating_points(design, refused), ())
     step(4)
-    budgets = _budgets(design, forms["sampled"])
+    budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
     step(5)
-    border = _onset(loops, forms["sampled"])
+    border = attempt("border of linear validity", lambda: _onset(loops, forms["sampled"]), None)
     step(6)
     return LoopSurvey(
         design, loops, forms, locked, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
+
+
+def _other_forms(design: Design, refused: list[str]) -> dict[str, Mapping[str, LoopFigures]]:
+    """Measure the loops in all forms but the sampled one."""
+    from actuator_lti.loops import assemble_loops
+
+    return {
+        form: all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused)
+        for form in FORMS[1:]
+    }
+
+
+def _locked(design: Design, loops: Loops) -> LoopFigures | None:
+    """Measure the current loop with the rotor locked, where there is one."""
+    from actuator_lti.loops import assemble_loops
+
+    fixed = assemble_loops(design, rotor="locked").current if loops.current is not None else None
+    return None if fixed is None else loop_figures(fixed)
+
+
+def _break_points(loops: Loops) -> dict[str, BreakPoint]:
+    """Measure the loop at every break point."""
+    return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
@@ -164,8 +186,8 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 
 def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPointFigures, ...]:
     """Measure the loops sliding, at rest, and described at small speeds, at each load."""
+    from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops
-    from actuator_lti.plant import friction_slope
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
-from analyses.drive_figures import DriveFigures, drive_figures
+from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
+from analyses.drive_figures import drive_figures
 from analyses.loop_figures import LoopFigures, all_loop_figures
-
-LOOPS = ("current", "velocity", "position")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,22 +77,24 @@ def _judge(
     design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures]
 ) -> list[RequirementVerdict]:
     """Judge one requirement wherever it holds."""
-    if requirement.quantity in DRIVE_QUANTITIES:
-        found = drive_figures(design, requirement.load_Nm or 0.0)
-        value = DRIVE_QUANTITIES[requirement.quantity](found, design)
-        reason = "" if value is not None else "the design has no such figure"
-        return [_verdict(requirement, requirement.id, None, value, reason)]
-    if requirement.quantity not in LOOP_QUANTITIES:
-        known = ", ".join([*LOOP_QUANTITIES, *DRIVE_QUANTITIES])
+    quantity = QUANTITIES.get(requirement.quantity)
+    if quantity is None:
         raise InputError(
-            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are {known}",
+            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
+            f"{', '.join(QUANTITIES)}",
             where=design.origin or None,
         )
-    if requirement.loop in (None, "every"):
-        names = [(f"{requirement.id}/{name}", name) for name in figures]
-    else:
-        names = [(requirement.id, str(requirement.loop))]
-    return [_judge_loop(design, requirement, id, name, figures) for id, name in names]
+    if quantity.scope == "drive":
+        value = quantity.read(drive_figures(design, requirement.load_Nm or 0.0), design.axis)
+        reason = "" if value is not None else "the design has no such figure"
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    named = requirement.loop not in (None, "every")
+    return [
+        _judge_loop(
+            design, requirement, requirement.id if named else f"{requirement.id}/{name}", name, figures
+        )
+        for name in judged_loops(requirement.loop, figures)
+    ]
 
 
 def _judge_loop(
@@ -115,7 +116,7 @@ def _judge_loop(
         return RequirementVerdict(
             id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
         )
-    value = LOOP_QUANTITIES[requirement.quantity](found)
+    value = QUANTITIES[requirement.quantity].read(found)
     reason = "" if value is not None else "not found in the band of this loop"
     return _verdict(requirement, id, name, value, reason)
 
@@ -153,35 +154,3 @@ def distance(requirement: Requirement, value: float) -> float:
     below = math.inf if requirement.minimum is None else value - requirement.minimum
     above = math.inf if requirement.maximum is None else requirement.maximum - value
     return min(below, above)
-
-
-def _magnitude(value: float | None) -> float | None:
-    """A margin counts in either direction: gain down as gain up, lead as lag."""
-    return None if value is None else abs(value)
-
-
-LOOP_QUANTITIES: dict[str, Callable[[LoopFigures], float | None]] = {
-    "gain_margin": lambda found: _magnitude(found.margins.gain_margin_db),
-    "phase_margin": lambda found: _magnitude(found.margins.phase_margin_deg),
-    "delay_margin": lambda found: found.margins.delay_margin_s,
-    "modulus_margin": lambda found: found.margins.modulus_margin,
-    "sensitivity_peak": lambda found: found.margins.sensitivity_peak_db,
-    "bandwidth": lambda found: found.bandwidth.minus3db_hz if found.bandwidth else None,
-    "bandwidth_90deg": lambda found: found.bandwidth.minus90deg_hz if found.bandwidth else None,
-    "resonance_peak": lambda found: found.bandwidth.resonance_peak_db if found.bandwidth else None,
-    "overshoot": lambda found: found.step.overshoot_percent if found.step else None,
-    "rise_time": lambda found: found.step.rise_time_s if found.step else None,
-    "settling_time": lambda found: found.step.settling_time_s if found.step else None,
-}
-
-
-def _at_output(value: float, design: Design) -> float:
-    """Give an output-side figure in degrees (linear axis: metres)."""
-    return value if design.axis == "linear" else math.degrees(value)
-
-
-DRIVE_QUANTITIES: dict[str, Callable[[DriveFigures, Design], float | None]] = {
-    "output_rate": lambda found, design: _at_output(found.output_rate_rad_s, design),
-    "motor_current": lambda found, design: found.motor_current_A,
-    "acceleration": lambda found, design: _at_output(found.acceleration_rad_s2, design),
-}

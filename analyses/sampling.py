@@ -10,15 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_bytes, shown, shown_path
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from actuator_lti.design.model import Design, Tolerance
 
 _BITS = 32
@@ -244,15 +249,20 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
         If the file cannot be read, a column is no key of the design, or a value is not finite.
     """
     import pandas as pd
+    import pyarrow as pa
 
-    where = str(path)
+    where = shown_path(path)
+    data = read_bytes(path, "CSV or Parquet file", TABLE_BYTES)
     try:
-        frame = pd.read_parquet(path) if where.endswith(".parquet") else pd.read_csv(path)
-    except (OSError, ValueError, pd.errors.ParserError) as error:
+        frame = _parquet(data, where) if where.endswith(".parquet") else pd.read_csv(BytesIO(data))
+    except (OSError, ValueError, pd.errors.ParserError, pa.ArrowException) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"cannot be read as a table: {error}", where=where) from error
+    TABLE_ROWS.check(len(frame), where, name="--from-samples")
     unknown = [str(name) for name in frame.columns if name not in known]
     if unknown:
-        raise InputError(f"column {unknown[0]!r}: no parameter of this design", where=where)
+        raise InputError(f"column {shown(unknown[0])}: no parameter of this design", where=where)
     try:
         rows = frame.to_numpy(dtype=float)
     except ValueError as error:
@@ -260,6 +270,16 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
     if rows.size == 0 or not np.all(np.isfinite(rows)):
         raise InputError("a table with at least one row of finite numbers is needed", where=where)
     return Table(tuple(str(name) for name in frame.columns), rows, where)
+
+
+def _parquet(data: bytes, where: str) -> pd.DataFrame:
+    """A Parquet file, refused by what its head announces before it is unpacked."""
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(BytesIO(data))
+    TABLE_ROWS.check(file.metadata.num_rows, where, name="--from-samples")
+    CSV_COLUMNS.check(file.metadata.num_columns, where)
+    return file.read().to_pandas()
 
 
 def as_values(paths: Sequence[str], draws: np.ndarray) -> Mapping[str, np.ndarray]:

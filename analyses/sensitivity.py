@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import DRIVE_QUANTITIES, Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.batch.figures import QUANTITIES
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 from analyses.sampling import Factor
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 STEP = 1e-3
 SWING = 0.1
-_PATIENT = ("rise_time", "overshoot", "settling_time")  # stairs of samples have no slope
 
 
 @dataclass(frozen=True)
@@ -143,16 +142,14 @@ def population_figures(
 ) -> dict[str, np.ndarray]:
     """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads."""
     linear = linear_figures(population, time_figures=time_figures)
-    columns = {
-        f"{loop}.{quantity}": np.abs(linear.quantity(quantity, loop))
-        if quantity in ("gain_margin", "phase_margin")
-        else linear.quantity(quantity, loop)
-        for loop in linear.loops
-        for quantity in QUANTITIES
-        if time_figures or quantity not in _PATIENT
-    }
+    columns = {}
+    for loop in linear.loops:
+        for name, quantity in LOOP_QUANTITIES.items():
+            if time_figures or not quantity.timed:  # stairs of samples have no slope
+                values = linear.quantity(name, loop)
+                columns[f"{loop}.{name}"] = np.abs(values) if quantity.absolute else values
     for load in design.validation.loads_Nm:
-        for quantity in DRIVE_QUANTITIES:
-            if quantity != "motor_current" or design.motor.has_electrical_dynamics:
-                columns[f"drive.{quantity}@{load:g}"] = drive_figures(population, quantity, load)
+        for name in DRIVE_QUANTITIES:
+            if name != "motor_current" or design.motor.has_electrical_dynamics:
+                columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
     return columns

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm, torque_gain_Nm_rad
 
 
 @dataclass(frozen=True)
@@ -45,47 +46,6 @@ class StaticThreshold:
         return self.integral_time_s * (self.forward_rad / amplitude_rad - 1.0)
 
 
-def torque_gain_Nm_rad(design: Design) -> float:
-    """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
-    control, motor = design.controller, design.motor
-    gain = control.position_loop.gain * design.total_ratio
-    if control.velocity is not None:
-        gain *= control.velocity.gain
-    if motor.source_gain_Nm_V is not None:
-        return gain * motor.source_gain_Nm_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    if control.current is None:
-        return gain * motor.torque_constant_Nm_A / motor.resistance_ohm
-    gain *= motor.torque_constant_Nm_A
-    if control.current.integral_time_s is None:
-        gain *= control.current.gain_V_A / (control.current.gain_V_A + motor.resistance_ohm)
-    return gain
-
-
-def stall_torque_Nm(design: Design) -> float:
-    """Largest motor torque at rest; ``inf`` without a limit."""
-    motor, limits = design.motor, design.limits
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * limits.voltage_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    current = limits.voltage_V / motor.resistance_ohm
-    if design.controller.current is not None:
-        current = min(current, limits.peak_current_A)
-    return motor.torque_constant_Nm_A * current
-
-
-def breakaway_torque_Nm(design: Design, load_Nm: float, direction: int) -> float:
-    """Motor torque that starts motion in a direction; 0 where the load already does."""
-    friction = design.friction
-    ratio = friction.breakaway_ratio if friction.law == "coulomb" else 0.0
-    needed = friction.dry_Nm(load_Nm, direction) * ratio + direction * friction.offset_torque_Nm
-    if design.load.path == "back-drivable":
-        needed -= direction * load_Nm / design.total_ratio
-    return max(needed, 0.0)
-
-
 def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
     """Find the smallest command that moves the output at once.
 
@@ -96,7 +56,7 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
     >>> round(1e6 * found.backward_rad, 3)  # um: (Fc - |offset|) and (Fc + |offset|) over the stiffness
     17.187
     """
-    gain, strongest = torque_gain_Nm_rad(design), stall_torque_Nm(design)
+    gain, strongest = float(torque_gain_Nm_rad(design)), float(stall_torque_Nm(design))
     both = {}
     for direction in (1, -1):
         needed = breakaway_torque_Nm(design, load_Nm, direction)

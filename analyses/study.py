@@ -42,11 +42,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import chain, product
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.bounds import GRID_AXES, SAMPLES, STUDY_VARIANTS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_toml, shown_path
 from analyses.slugs import slug
 from analyses.study_axes import Axis, read_axis
 from analyses.study_reading import Reader
@@ -54,7 +57,6 @@ from analyses.study_reading import Reader
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
-MOST_VARIANTS = 1000
 LONGEST_NAME = 200
 
 
@@ -123,12 +125,12 @@ class Study:
 
 def is_study(path: str | Path) -> bool:
     """Whether a file is a study (a TOML file with a ``[study]`` table) and not a design."""
-    from actuator_lti.design.reading import decode, parse_toml, read_bytes
-
     file = Path(path)
-    if not file.is_file():
+    try:
+        there = file.is_file()
+    except OSError:  # a name that is too long, say: whoever reads it as a design tells
         return False
-    return "study" in parse_toml(decode(read_bytes(file, "study file"), str(path)), str(path))
+    return there and "study" in read_toml(file, "study file")
 
 
 def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
@@ -137,7 +139,7 @@ def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
     Parameters
     ----------
     path : path
-        TOML, at most 1 MiB and 1000 variants.
+        TOML, at most 1 MiB and 10000 variants (`actuator_lti.bounds`).
     keep_going : bool
         Keep a variant that its design's checks refuse, with its error, instead of refusing the study.
 
@@ -146,11 +148,8 @@ def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
     InputError
         One line: file, key, value and what is allowed.
     """
-    from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
-
-    where = shown(str(path), 200)[1:-1]
-    tree = parse_toml(decode(read_bytes(Path(path), "study file"), where), where)
-    return study_from_tree(tree, where, Path(path).parent, keep_going=keep_going)
+    tree = read_toml(path, "study file")
+    return study_from_tree(tree, shown_path(path), Path(path).parent, keep_going=keep_going)
 
 
 def study_of(design: Design) -> Study:
@@ -169,7 +168,7 @@ def study_from_tree(tree: dict[str, Any], where: str, folder: Path, *, keep_goin
     extra = reader.tables(tree, "requirement")
     base = _required(base, extra, reader)
     maker = _Maker(base, reader, extra, keep_going)
-    variants = (*maker.variants(tree), *maker.sweeps(tree), *maker.grids(tree))
+    variants = _bounded(chain(maker.variants(tree), maker.sweeps(tree), maker.grids(tree)), where)
     name = reader.text(head, "study", "name", base.name, LONGEST_NAME)
     first = Variant(base.name, slug(base.name), base)
     _check_names((first, *variants), reader)
@@ -202,14 +201,12 @@ def _plan(tree: dict[str, Any], reader: Reader) -> MonteCarloPlan | None:
     table = reader.table(tree, "monte_carlo")
     reader.only(table, "monte_carlo", {"samples", "seed"})
     return MonteCarloPlan(
-        reader.integer(table, "monte_carlo", "samples", 1000, 1, 100_000_000),
+        reader.integer(table, "monte_carlo", "samples", 1000, 1, SAMPLES.most),
         reader.integer(table, "monte_carlo", "seed", 0, 0, 2**63 - 1),
     )
 
 
 def _check_names(variants: tuple[Variant, ...], reader: Reader) -> None:
-    if len(variants) - 1 > MOST_VARIANTS:
-        raise reader.error(f"{len(variants) - 1} variants; allowed: at most {MOST_VARIANTS}")
     seen: set[str] = set()
     for variant in variants:
         if variant.name in seen:
@@ -217,6 +214,15 @@ def _check_names(variants: tuple[Variant, ...], reader: Reader) -> None:
                 f"variant.name = {reader.shown(variant.name)}: twice; allowed: names that differ"
             )
         seen.add(variant.name)
+
+
+def _bounded(variants: Iterator[Variant], where: str) -> tuple[Variant, ...]:
+    """Take variants until there are too many."""
+    taken = []
+    for variant in variants:
+        taken.append(variant)
+        STUDY_VARIANTS.check(len(taken), where)
+    return tuple(taken)
 
 
 @dataclass(frozen=True)
@@ -256,11 +262,11 @@ class _Maker:
                 read_axis(item, f"{where}.axes[{k + 1}]", self.base, reader)
                 for k, item in enumerate(reader.tables(table, "axes", where))
             )
-            size = 1
-            for axis in axes:
-                size *= len(axis.values)
-            if not axes or size > MOST_VARIANTS:
-                raise reader.error(f"{where}: {size if axes else 0} points; allowed: 1 to {MOST_VARIANTS}")
+            if not axes:
+                raise reader.error(f"{where}.axes: no axis; allowed: 1 to {GRID_AXES.most}")
+            GRID_AXES.check(len(axes), reader.where, name=f"{where}.axes")
+            size = prod(len(axis.values) for axis in axes)
+            STUDY_VARIANTS.check(size, reader.where, name=where)
             for point in product(*(axis.values for axis in axes)):
                 yield self._point(axes, point)
 

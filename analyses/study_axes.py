@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.bounds import AXIS_POINTS
 from analyses.study_reading import Reader
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
-MOST_POINTS = 1000
+MOST_POINTS = AXIS_POINTS.most
 
 
 @dataclass(frozen=True)

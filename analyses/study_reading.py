@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_toml, shown
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -37,8 +38,6 @@ class Reader:
     @staticmethod
     def shown(value: object) -> str:
         """A value as it may be printed."""
-        from actuator_lti.design.reading import shown
-
         return shown(value)
 
     def only(self, table: dict[str, Any], place: str, allowed: set[str]) -> None:
@@ -114,10 +113,8 @@ class Reader:
 
     def motor(self, name: str) -> dict[str, Any]:
         """The [motor] table of a file beside the study file."""
-        from actuator_lti.design.reading import decode, parse_toml, read_bytes
-
         where = self.shown(name)[1:-1]
-        tree = parse_toml(decode(read_bytes(self.folder / name, "file with a [motor] table"), where), where)
+        tree = read_toml(self.folder / name, "file with a [motor] table")
         if not isinstance(tree.get("motor"), dict):
             raise InputError("no [motor] table; allowed: a TOML file with one", where=where)
         return tree["motor"]

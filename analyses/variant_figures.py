@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees, pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from actuator_lti.batch import UNITS, Population
+from actuator_lti.batch import Population
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from analyses.drive_figures import drive_figures
-from analyses.requirements import DRIVE_QUANTITIES, LOOP_QUANTITIES
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
 
 Figures = Mapping[str, float | None]
-_LARGER = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin", "bandwidth", "bandwidth_90deg",
-           "output_rate", "acceleration", "onset")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,14 +44,13 @@ def small_signal(design: Design, found: Mapping[str, LoopFigures]) -> dict[str, 
     """Linear figures of every loop and static figures at every load of the design."""
     figures: dict[str, float | None] = {}
     for loop, one in found.items():
-        for quantity, read in LOOP_QUANTITIES.items():
-            closed = quantity not in ("gain_margin", "phase_margin", "modulus_margin", "sensitivity_peak")
-            value = read(one) if one.stable or not closed else None
-            figures[f"{loop}.{quantity}"] = None if value is None else float(value)
+        for name, quantity in LOOP_QUANTITIES.items():
+            value = quantity.read(one) if one.stable or not quantity.closed else None
+            figures[f"{loop}.{name}"] = None if value is None else float(value)
     for load in design.validation.loads_Nm:
         at_load = drive_figures(design, load)
-        for quantity, get in DRIVE_QUANTITIES.items():
-            figures[f"drive.{quantity}@{load:g}"] = get(at_load, design)
+        for name, quantity in DRIVE_QUANTITIES.items():
+            figures[f"drive.{name}@{load:g}"] = quantity.read(at_load, design.axis)
     return figures
 
 
@@ -118,16 +115,15 @@ def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[Figure
 def _name(key: str, design: Design) -> FigureName:
     group, _, rest = key.partition(".")
     quantity, _, at = rest.partition("@")
-    angle = "m" if design.axis == "linear" else "deg"
-    units: dict[str, Any] = {
-        **UNITS, "output_rate": f"{angle}/s", "motor_current": "A", "acceleration": f"{angle}/s^2",
-        "onset": angle, "peak_current": "A",
-    }  # fmt: skip
+    known = QUANTITIES.get(quantity)
+    if known is not None:
+        unit, better = known.unit_for(design.axis), int(known.better)
+    else:  # of the large signal
+        unit, better = ("m" if design.axis == "linear" else "deg", 1) if quantity == "onset" else ("A", -1)
     words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"
     elif at:
         at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
     label = f"{words} at {at}" if at else words
-    unit = "" if units[quantity] == "1" else units[quantity]
-    return FigureName(key, label, unit, group, 1 if quantity in _LARGER else -1)
+    return FigureName(key, label, "" if unit == "1" else unit, group, better)

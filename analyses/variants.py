@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import cache, cached_property, partial
 from math import isfinite, nan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.engine import Engine
 from analyses.requirements import RequirementVerdict, evaluate_requirements
 from analyses.study import Study, Variant
-from analyses.variant_figures import FigureName, Figures, figure_names, large_signal, small_signal
+from analyses.validation.ledger import Entry
+from analyses.variant_figures import FigureName, LargeSignal, figure_names, large_signal, small_signal
+from analyses.variant_store import Store, address
 
 if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
     from actuator_lti.design.model import Design
     from analyses.loop_figures import LoopFigures
     from analyses.sensitivity import Sensitivities
-    from analyses.validation.ledger import Entry
 
 Progress = Callable[[int, int], None]
 _ALIKE = 1e-12  # relative; differences below are rounding
@@ -42,13 +48,12 @@ class Contribution:
     amount: float
 
 
-@dataclass(frozen=True)
-class Compared:
-    """One design of a comparison.
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What is found of one design of a comparison: plain data, kept on disk as they are.
 
     Attributes
     ----------
-    variant : Variant
     figures : mapping of str to float or None
         By column, such as ``"position.phase_margin"``; ``None`` where there is none.
     verdicts : tuple of RequirementVerdict
@@ -58,23 +63,35 @@ class Compared:
     moved_by : mapping of str to tuple of Contribution
         For each difference the changed keys one at a time, the strongest first; what is left over is
         their interaction (or a key without a number).
-    loops : mapping of str to LoopFigures
-        For drawing.
     ledger : tuple of Entry
         Of the validator: each prediction beside what the simulator shows; empty where not asked for.
     untested : str
         Why the validator could not test this design.
     """
 
-    variant: Variant
-    figures: Figures
+    figures: dict[str, float | None]
     verdicts: tuple[RequirementVerdict, ...]
     changed: tuple[Changed, ...] = ()
-    differences: Mapping[str, float] = field(default_factory=dict)
-    moved_by: Mapping[str, tuple[Contribution, ...]] = field(default_factory=dict)
-    loops: Mapping[str, LoopFigures] = field(default_factory=dict, repr=False)
+    differences: dict[str, float] = field(default_factory=dict)
+    moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
     ledger: tuple[Entry, ...] = ()
     untested: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared(Found):
+    """One design of a comparison, with what is found of it."""
+
+    variant: Variant
+
+    @cached_property
+    def loops(self) -> Mapping[str, LoopFigures]:
+        """The loops, for drawing; computed when they are first asked for, as few designs are drawn."""
+        from actuator_lti.loops import assemble_loops
+        from analyses.loop_figures import all_loop_figures
+
+        assert self.variant.design is not None
+        return all_loop_figures(assemble_loops(self.variant.design))
 
 
 @dataclass(frozen=True)
@@ -114,7 +131,14 @@ class Comparison:
         return (high, low) if name.better > 0 else (low, high)
 
 
-def compare(study: Study, *, validation: bool | None = None, progress: Progress | None = None) -> Comparison:
+def compare(
+    study: Study,
+    *,
+    validation: bool | None = None,
+    progress: Progress | None = None,
+    engine: Engine | None = None,
+    folder: Path | None = None,
+) -> Comparison:
     """Compute every figure of every design of a study and what differs from the base.
 
     Parameters
@@ -124,6 +148,11 @@ def compare(study: Study, *, validation: bool | None = None, progress: Progress 
         Whether every design is validated (quick settings); by default as the study says.
     progress : callable, optional
         Called with (steps done, steps in all).
+    engine : Engine, optional
+        Where to compute; in this process, one after the other, where left out.
+    folder : Path, optional
+        Where what is found of each design is kept as soon as it is there; a study that was stopped, or has
+        changed a little, goes on from it.
 
     Raises
     ------
@@ -133,27 +162,80 @@ def compare(study: Study, *, validation: bool | None = None, progress: Progress 
     from analyses.sensitivity import sensitivities
 
     assert study.base.design is not None
-    good = [v for v in study.variants if v.design is not None]
-    total = 2 * (len(good) + 1)
-    tell = progress or (lambda done, total: None)
     plan = large_signal.plan(study.base.design)
     tested = study.validation if validation is None else validation
-    base = _evaluated(study.base, plan, tested)
+    good = [v for v in study.variants if v.design is not None]
+    total = len(good) + 2
+    tell = progress or (lambda done, total: None)
+    kept = _Kept(None if folder is None else Store(folder), study.base, (plan, tested))
+    base = kept.read(study.base) or kept.write(study.base, _evaluated(study.base, plan, tested))
+    found = [kept.read(variant) for variant in good]
     tell(1, total)
-    found = sensitivities(study.base.design)
-    tell(2, total)
-    compared = []
-    for k, variant in enumerate(good):
-        one = _evaluated(variant, plan, tested)
-        tell(3 + 2 * k, total)
-        compared.append(_against(one, base))
-        tell(4 + 2 * k, total)
-    names = figure_names([c.figures for c in (base, *compared)], study.base.design)
+    slopes = sensitivities(study.base.design)
+    missing = [k for k, one in enumerate(found) if one is None]
+    first = total - len(missing)
+    tell(first, total)
+
+    def take(place: tuple[int, Variant], one: Found) -> None:
+        found[place[0]] = kept.write(place[1], one)
+
+    work = partial(_beside, base, study.base, plan, tested)
+    places = [(k, good[k]) for k in missing]
+    (engine or Engine(threads=1)).map(work, places, take, lambda done, _: tell(first + done, total))
+    ends = tuple(_compared(variant, one) for variant, one in zip(good, found, strict=True) if one is not None)
+    reference = _compared(study.base, base)
+    names = figure_names([c.figures for c in (reference, *ends)], study.base.design)
     refused = tuple(v for v in study.variants if v.design is None)
-    return Comparison(study, names, base, tuple(compared), found, refused)
+    return Comparison(study, names, reference, ends, slopes, refused)
 
 
-def _evaluated(variant: Variant, plan: Any, tested: bool) -> Compared:
+def _compared(variant: Variant, found: Found) -> Compared:
+    return Compared(variant=variant, **{part.name: getattr(found, part.name) for part in fields(Found)})
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What is found of the designs of a study, where it is kept at all."""
+
+    store: Store | None
+    base: Variant
+    settings: object
+
+    def read(self, variant: Variant) -> Found | None:
+        data = None if self.store is None else self.store.read(self._address(variant))
+        try:
+            return None if data is None else _adapter().validate_python(data)
+        except ValueError:  # not what this version writes: computed again
+            return None
+
+    def write(self, variant: Variant, found: Found) -> Found:
+        if self.store is not None:
+            self.store.write(self._address(variant), _adapter().dump_python(found))
+        return found
+
+    def _address(self, variant: Variant) -> str:
+        return address((self.base.design, variant.design), self.settings)
+
+
+@cache
+def _adapter() -> TypeAdapter[Found]:
+    """Turns what is found into plain data and back."""
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Found)
+
+
+def _beside(
+    base: Found, origin: Variant, plan: LargeSignal, tested: bool, place: tuple[int, Variant]
+) -> Found:
+    """What is found of a design, and how it differs from the base."""
+    _, variant = place
+    assert origin.design is not None
+    assert variant.design is not None
+    return _against(_evaluated(variant, plan, tested), variant.design, base, origin.design)
+
+
+def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
 
@@ -163,7 +245,7 @@ def _evaluated(variant: Variant, plan: Any, tested: bool) -> Compared:
     figures = {**small_signal(variant.design, found), **plan.figures(variant.design, loops)}
     ledger, untested = _ledger(variant.design) if tested else ((), "")
     verdicts = evaluate_requirements(variant.design, found)
-    return Compared(variant, figures, verdicts, loops=found, ledger=ledger, untested=untested)
+    return Found(figures=figures, verdicts=verdicts, ledger=ledger, untested=untested)
 
 
 def _ledger(design: Design) -> tuple[tuple[Entry, ...], str]:
@@ -176,11 +258,9 @@ def _ledger(design: Design) -> tuple[tuple[Entry, ...], str]:
         return (), str(error)
 
 
-def _against(one: Compared, base: Compared) -> Compared:
+def _against(one: Found, design: Design, base: Found, origin: Design) -> Found:
     """Add what differs from the base, and what moved it."""
-    assert one.variant.design is not None
-    assert base.variant.design is not None
-    changed = changes(base.variant.design, one.variant.design)
+    changed = changes(origin, design)
     differences = {}
     for key, value in one.figures.items():
         before = base.figures.get(key)
@@ -188,7 +268,7 @@ def _against(one: Compared, base: Compared) -> Compared:
             continue
         if abs(value - before) > _ALIKE * max(abs(value), abs(before)):
             differences[key] = value - before
-    moved = _moved_by(base, one, changed, differences)
+    moved = _moved_by(origin, design, changed, differences)
     return replace(one, changed=changed, differences=differences, moved_by=moved)
 
 
@@ -221,14 +301,12 @@ def _flat(tree: Any, path: str = "") -> list[tuple[str, str]]:
 
 
 def _moved_by(
-    base: Compared, one: Compared, changed: tuple[Changed, ...], differences: Mapping[str, float]
+    base: Design, other: Design, changed: tuple[Changed, ...], differences: Mapping[str, float]
 ) -> dict[str, tuple[Contribution, ...]]:
     """Change one number at a time, starting from the base."""
-    assert base.variant.design is not None
-    assert one.variant.design is not None
     if len(changed) == 1:
         return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}
-    alone = _alone(base.variant.design, one.variant.design, changed)
+    alone = _alone(base, other, changed)
     moved: dict[str, tuple[Contribution, ...]] = {}
     for key, total in differences.items():
         parts = [

@@ -26,8 +26,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
@@ -162,15 +163,24 @@ def run_rows(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> BatchResult:
-    """Run parameter rows, shape (n, layout.SIZE); see the module's text."""
+    """Run parameter rows, shape (n, layout.SIZE); see the module's text.
+
+    Raises
+    ------
+    NumericalError
+        If the runs have more ticks than can be computed in a reasonable time.
+    """
     rows = np.ascontiguousarray(rows, dtype=float)
+    ticks = float(rows[:, at.TICKS].sum())
+    if not ticks <= BATCH_TICKS.most:
+        raise NumericalError(f"{ticks:.3g} ticks to simulate; allowed: {BATCH_TICKS.allowed} in all runs")
     series = np.zeros(1) if tables is None else np.ascontiguousarray(tables, dtype=float)
     n = rows.shape[0]
     outs, statuses = np.empty((n, at.OUT_SIZE)), np.empty(n, np.int64)
     spans = _spans(rows[:, at.TICKS], available_threads() if threads is None else threads)
-    done = 0
+    done, shared = 0, np.zeros(2)
     with ThreadPoolExecutor(max_workers=max(1, threads or available_threads())) as pool:
-        waiting = [pool.submit(_run_span, rows, series, a, b, outs, statuses) for a, b in spans]
+        waiting = [pool.submit(_run_span, rows, series, a, b, outs, statuses, shared) for a, b in spans]
         sizes = {future: b - a for future, (a, b) in zip(waiting, spans, strict=True)}
         try:
             for future in as_completed(waiting):
@@ -179,6 +189,7 @@ def run_rows(
                 if progress is not None:
                     progress(done, n)
         except BaseException:
+            shared[1] = 1.0  # stops the runs that are under way
             for future in waiting:
                 future.cancel()
             raise
@@ -186,12 +197,12 @@ def run_rows(
 
 
 def _run_span(
-    rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray
+    rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray, shared: Floats
 ) -> None:
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
     from nonlinear._kernels.call import call
 
-    history, flags, shared = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(2)
+    history, flags = np.empty((0, 0)), np.empty(0, np.uint8)
     for r in range(start, stop):
         statuses[r] = call(rows[r], tables, history, flags, outs[r], shared)
 

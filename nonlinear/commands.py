@@ -15,6 +15,7 @@ from os import PathLike
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 
@@ -53,7 +54,8 @@ class Command:
         if self.samples is None:
             return None
         times, values = self.samples
-        count = min(ticks, int(np.ceil(times[-1] / period_s - 1e-9)) + 1)
+        count = min(ticks, int(np.ceil(min(times[-1] / period_s, 1e18) - 1e-9)) + 1)
+        SIGNAL_ROWS.check(count)
         return np.interp(np.arange(max(count, 1)) * period_s, times, values)
 
     def values(self, period_s: float, ticks: int) -> Floats:
@@ -160,12 +162,15 @@ def stepped_sine(
     ``period_s`` is the tick of the drive; the table is exact at the ticks.
     """
     _finite("stepped_sine", amplitude_rad=amplitude_rad)
+    _positive("stepped_sine", period_s=period_s)
+    TONES.check(len(frequencies_hz))
     for frequency in frequencies_hz:
         _positive("stepped_sine", frequencies_hz=frequency)
     if cycles < 1 or settle_cycles < 0 or not len(frequencies_hz):
         raise InputError("command stepped_sine: at least one frequency and one cycle needed")
     f = np.asarray(frequencies_hz, dtype=float)
     ends = np.cumsum((cycles + settle_cycles) / f)
+    SIGNAL_ROWS.check(float(ends[-1]) / period_s)
     t = np.arange(int(np.ceil(ends[-1] / period_s)) + 1) * period_s
     which = np.minimum(np.searchsorted(ends, t, side="right"), f.size - 1)
     begins = np.concatenate(([0.0], ends[:-1]))[which]
@@ -185,6 +190,11 @@ def multisine(
     """Sum of equal sines with random phases from ``seed``, scaled to the peak ``amplitude_rad``."""
     _finite("multisine", amplitude_rad=amplitude_rad)
     _positive("multisine", duration_s=duration_s, period_s=period_s)
+    TONES.check(len(frequencies_hz))
+    SIGNAL_ROWS.check(duration_s / period_s)
+    TONE_TICKS.check(len(frequencies_hz) * duration_s / period_s)
+    if seed < 0:
+        raise InputError(f"command multisine: seed = {seed}: must be 0 or more")
     for frequency in frequencies_hz:
         _positive("multisine", frequencies_hz=frequency)
     if not len(frequencies_hz):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import decode, read_bytes, shown, shown_path
 
 Floats = npt.NDArray[np.float64]
 
@@ -24,12 +25,13 @@ def read_columns(
     InputError
         If the file cannot be read, a column is missing, or a cell is not a number.
     """
-    where = str(path)
+    where = shown_path(path)
+    text = decode(read_bytes(path, "CSV file", TABLE_BYTES), where)
+    TABLE_ROWS.check(text.count("\n"), where)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read ({error})", where) from error
-    rows = [row for row in csv.reader(text.splitlines(), delimiter=delimiter) if row]
+        rows = [row for row in csv.reader(text.splitlines(), delimiter=delimiter) if row]
+    except csv.Error as error:
+        raise InputError(f"no table: {error}", where) from error
     if len(rows) < 2:
         raise InputError("a header line and at least one row of numbers needed", where)
     header = [name.strip() for name in rows[0]]
@@ -39,7 +41,8 @@ def read_columns(
 def _place(column: str | int, header: list[str], where: str) -> int:
     if isinstance(column, str):
         if column not in header:
-            raise InputError(f"no column {column!r}; there are {', '.join(header)}", where)
+            there = ", ".join(shown(name) for name in header[:20])
+            raise InputError(f"no column {shown(column)}; there are {there}", where)
         return header.index(column)
     if not 0 <= column < len(header):
         raise InputError(f"column {column}: must be 0 to {len(header) - 1}", where)
@@ -54,6 +57,6 @@ def _column(rows: list[list[str]], place: int, where: str) -> Floats:
         except (ValueError, IndexError) as error:
             cell = row[place] if place < len(row) else ""
             raise InputError(
-                f"line {k + 2}, column {place + 1} = {cell!r}: must be a number", where
+                f"line {k + 2}, column {place + 1} = {shown(cell)}: must be a number", where
             ) from error
     return out

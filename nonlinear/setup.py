@@ -9,6 +9,7 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -48,7 +49,8 @@ def ticks_of(duration_s: float, period_s: float) -> int:
     """Number of ticks in a duration, rounded; refuses a duration without any."""
     if not isfinite(duration_s):
         raise InputError(f"duration_s = {duration_s}: must be a finite number of seconds")
-    ticks = round(duration_s / period_s)
+    ticks = round(min(duration_s / period_s, 1e18))
+    RUN_TICKS.check(ticks, name=f"duration_s = {duration_s:g}")
     if ticks < 1:
         raise InputError(f"duration_s = {duration_s:g}: must hold at least one tick of {period_s:g} s")
     return ticks

@@ -9,6 +9,7 @@ from threading import Thread
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import HISTORY_BYTES
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear._kernels import layout as at
@@ -30,7 +31,6 @@ from nonlinear.trajectory import STATUS, State, Trajectory
 from nonlinear.wrap import wrap
 
 Floats = npt.NDArray[np.float64]
-LARGEST_HISTORY_BYTES = 4e9
 Progress = Callable[[int, int], None]
 
 
@@ -149,7 +149,7 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
     probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
     rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
-    if 8.0 * rows * columns > LARGEST_HISTORY_BYTES:
+    if 8 * rows * columns > HISTORY_BYTES.most:
         message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
         raise InputError(f"{message}; use record_every, or simulate_many with reducers")
     history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint8)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.atomic import write_together
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from reports import document as doc
 
 if TYPE_CHECKING:
+    from analyses.isolation import Missing
     from analyses.loop_survey import LoopSurvey
     from analyses.requirements import RequirementVerdict
 
@@ -38,23 +41,23 @@ def design_report(
 
     Raises
     ------
-    InputError, NumericalError
-        From the computations.
+    InputError
+        From the computations. Whatever else fails leaves out its part only: a notice stands in its place, and
+        `analyses.isolation.drain` gives it.
     """
     from actuator_lti.design import design_hash, warnings_of
-    from analyses.loop_survey import survey_loops
-    from analyses.requirements import evaluate_requirements
+    from analyses.isolation import isolated
     from reports.provenance import provenance
 
-    survey = survey_loops(design, progress)
-    verdicts = evaluate_requirements(design, survey.figures)
     origin, head = provenance(design_hash(design)), design_head(design)
-    requirements, *loops = loop_sections(survey, verdicts)
+    with isolated() as missing:
+        loops = _loops(design, progress)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
-        requirements,
+        *notices(missing, "linear"),
+        *loops[:1],
         *first,
-        *loops,
+        *loops[1:],
         *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design)),
     ]
@@ -67,8 +70,56 @@ def design_report(
     )
 
 
+def _loops(design: Design, progress: Progress | None) -> list[doc.Section]:
+    """Compute the linear loops and make their sections; none where the loops themselves fail."""
+    from analyses.isolation import attempt
+    from analyses.loop_survey import survey_loops
+    from analyses.requirements import evaluate_requirements
+
+    survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
+    if survey is None:
+        return []
+    verdicts = attempt("requirements", lambda: evaluate_requirements(design, survey.figures), ())
+    return loop_sections(survey, verdicts)
+
+
+def validation_sections(
+    design: Design, progress: Progress | None = None, *, timing: bool = True
+) -> list[doc.Section]:
+    """Put the linear predictions to the simulator; a design that cannot be tested says why.
+
+    Parameters
+    ----------
+    timing : bool
+        Whether the section says how long it took, which is another text every time.
+    """
+    from analyses.isolation import attempt, isolated
+    from analyses.validation import validate
+    from reports.sections.validation import section
+
+    title = "Linear predictions against simulation"
+    with isolated() as missing:
+        try:
+            made = attempt(title, lambda: section(validate(design, progress=progress), timing=timing), [])
+        except InputError as error:
+            made = [doc.section("validation", title, [doc.text(f"Not tested: {error}")], status="warn")]
+    return [*made, *notices(missing, "validation")]
+
+
+def notices(missing: Sequence[Missing], id: str) -> list[doc.Section]:
+    """Make the section that says what is missing and why; none where nothing is."""
+    if not missing:
+        return []
+    columns = [doc.column("part", "Part"), doc.column("why", "Why it is missing")]
+    rows = [{"part": one.part, "why": one.why, "_status": "fail"} for one in missing]
+    note = "The rest of the report does not depend on these parts; the exit status is 3."
+    what = doc.table("Parts of this report that could not be computed", columns, rows, note)
+    return [doc.section(f"missing-{id}", "Missing parts", [what], status="fail")]
+
+
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     """Make the sections about the linear loops, verdicts first."""
+    from analyses.isolation import attempt
     from reports.sections import (
         break_points,
         delays,
@@ -81,19 +132,23 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     )
     from reports.sections.names import load_unit
 
-    design, figures = survey.design, survey.figures
-    sections = [requirements.section(verdicts, load_unit(design)), margins.section(figures, survey.locked)]
+    design, figures, onset = survey.design, survey.figures, survey.onset
+    makers: dict[str, Callable[[], doc.Section]] = {
+        "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
+        "Margins": lambda: margins.section(figures, survey.locked),
+    }
     for name, found in figures.items():
         locked = survey.locked if name == "current" else None
-        sections.append(loop.section(name, design, found, locked))
-    sections.append(forms.section(survey.forms, survey.refused))
-    sections.append(break_points.section(survey.break_points, figures))
-    sections.append(operating_points.section(survey.operating_points, design))
+        makers[f"Loop {name}"] = partial(loop.section, name, design, found, locked)
+    makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
+    makers["Break points"] = lambda: break_points.section(survey.break_points, figures)
+    makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)
     if survey.budgets:
-        sections.append(delays.section(survey.budgets))
-    if survey.onset is not None:
-        sections.append(limits.section(design, survey.onset))
-    return sections
+        makers["Delays"] = lambda: delays.section(survey.budgets)
+    if onset is not None:
+        makers["Limits"] = lambda: limits.section(design, onset)
+    made = [attempt(f"section {name}", make, None) for name, make in makers.items()]
+    return [part for part in made if part is not None]
 
 
 def closing_sections(

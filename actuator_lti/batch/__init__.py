@@ -4,14 +4,11 @@
 sampled loops; `drive_figures` the static figures that requirements may ask for.
 """
 
-from actuator_lti.batch.drive import DRIVE_QUANTITIES, drive_figures
-from actuator_lti.batch.figures import QUANTITIES, UNITS, Crossovers, LinearFigures, linear_figures
+from actuator_lti.batch.figures import Crossovers, LinearFigures, linear_figures
 from actuator_lti.batch.parameters import Population, variable_paths
+from actuator_lti.batch.static import drive_figures
 
 __all__ = [
-    "DRIVE_QUANTITIES",
-    "QUANTITIES",
-    "UNITS",
     "Crossovers",
     "LinearFigures",
     "Population",

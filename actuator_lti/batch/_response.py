@@ -76,7 +76,9 @@ def _again(n, c, work, state, exchanged):
 
 @kernel
 def closed_loop(response, x, lead):
-    """T = L/(1 + L) with the feed-forward in front, ``1 + lead (1 - 1/z)``."""
+    """T = L/(1 + L) with the feed-forward in front, ``1 + lead (1 - 1/z)``; lead NaN: the response itself."""
+    if np.isnan(lead):
+        return response
     closed = response / (1.0 + response)
     if lead != 0.0:
         closed *= 1.0 + lead * (1.0 - complex(np.cos(x), -np.sin(x)))
@@ -93,6 +95,8 @@ def quantity(mode, response, slope, level, x, lead):
     if mode == SENSITIVITY:
         return (slope / (1.0 + response)).real
     if mode == RESONANCE:  # d ln|T| / dx
+        if np.isnan(lead):
+            return (slope / response).real
         value = (slope / (response * (1.0 + response))).real
         if lead != 0.0:
             back = complex(np.cos(x), -np.sin(x))

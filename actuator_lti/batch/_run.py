@@ -1,15 +1,16 @@
-"""All figures of many designs of one structure: the loop over designs, compiled."""
+"""All figures of many loops of one structure: the loop over designs, compiled."""
 
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
 import numpy as np
 
-from ._assemble import K_FF, KP_P, N_P, PERIOD, open_loops
 from ._compiled import kernel
 from ._figures import (
     DC_GAIN,
     FINAL,
+    GAIN_CROSSOVERS,
+    PHASE_CROSSOVERS,
     RADIUS,
     STABLE,
     bandwidths,
@@ -18,11 +19,10 @@ from ._figures import (
     modulus,
     resonance,
 )
-from ._linalg import balance, eigenvalues, hessenberg
-from ._response import GAIN, PHASE, evaluate, scan
+from ._linalg import balance, hessenberg
+from ._response import GAIN, PHASE, closed_loop, evaluate, scan
 from ._step import step_figures
 
-LOOPS = 3
 TOP = np.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
 CAPACITY = 1200
@@ -69,12 +69,14 @@ def _grid(n, wr, wi, open_wr, open_wi, points):
 
 
 @kernel
-def _closed_dc(n, h, b, c, system):
-    """T at DC: c (I - A + b c)^-1 b by elimination with pivoting (h is A - I)."""
+def _closed_dc(n, h, b, c, closed):
+    """T at DC: c (I - A + closed b c)^-1 b (h is A - I); nan where that is singular."""
+    system = np.empty((n, n))
+    right = np.empty(n)
     for i in range(n):
+        right[i] = b[i]
         for j in range(n):
-            system[i, j] = -h[i, j] + b[i] * c[j]
-        system[i, n] = b[i]
+            system[i, j] = -h[i, j] + closed * b[i] * c[j]
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -82,36 +84,68 @@ def _closed_dc(n, h, b, c, system):
                 best = i
         if system[best, k] == 0.0:
             return np.nan
-        for j in range(k, n + 1):
+        right[k], right[best] = right[best], right[k]
+        for j in range(k, n):
             system[k, j], system[best, j] = system[best, j], system[k, j]
         for i in range(k + 1, n):
             factor = system[i, k] / system[k, k]
-            for j in range(k, n + 1):
+            right[i] -= factor * right[k]
+            for j in range(k, n):
                 system[i, j] -= factor * system[k, j]
     total = 0.0
     for i in range(n - 1, -1, -1):
-        value = system[i, n]
         for j in range(i + 1, n):
-            value -= system[i, j] * system[j, n]
-        system[i, n] = value / system[i, i]
-        total += c[i] * system[i, n]
+            right[i] -= system[i, j] * right[j]
+        right[i] /= system[i, i]
+        total += c[i] * right[i]
     return total
 
 
 @kernel
-def _poles(n, a, b, c, closed, scratch, wr, wi):
-    """Eigenvalues of a - closed * b c into wr, wi; the largest modulus (nan if the iteration fails).
-
-    An eigenvalue at 1 is not counted: it is the motor angle that an inner loop does not see.
-    """
+def _scanned(n, a, b, c, poles, scratch, arrays):
+    """The scanned response of a loop; a becomes a - I in Hessenberg form. The count of points."""
+    points, stack = scratch
+    xs, rs, ss, work, state, exchanged = arrays
+    balance(n, a, b, c)
+    hessenberg(n, a, b, c, np.empty(n))
     for i in range(n):
-        for j in range(n):
-            scratch[i, j] = a[i, j] - closed * b[i] * c[j]
-    unused_b = np.zeros(n)
-    unused_c = np.zeros(n)
-    hessenberg(n, scratch, unused_b, unused_c, np.empty(n))
-    if eigenvalues(n, scratch, wr, wi) != 0:
-        return np.nan
+        a[i, i] -= 1.0
+    kept = _grid(n, poles[2], poles[3], poles[0], poles[1], points)
+    return scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
+
+
+@kernel
+def _closed_figures(count, n, a, b, c, lead, poles, arrays, row):
+    """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
+    xs, rs, ss, work, state, exchanged = arrays
+    dc = _closed_dc(n, a, b, c, 0.0 if np.isnan(lead) else 1.0)
+    for i in range(n):
+        if np.hypot(poles[2, i] - 1.0, poles[3, i]) <= HIDDEN:
+            dc = closed_loop(rs[0], xs[0], np.nan if np.isnan(lead) else 0.0).real
+    row[DC_GAIN] = dc
+    row[FINAL] = dc
+    resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
+    bandwidths(count, xs, rs, ss, dc, lead, row, n, a, b, c, work, state, exchanged)
+
+
+@kernel
+def _one_loop(count, n, a, b, c, arrays, row):
+    """Crossovers and modulus margin of an open loop whose response is scanned."""
+    xs, rs, ss, work, state, exchanged = arrays
+    for k in (GAIN_CROSSOVERS, PHASE_CROSSOVERS):
+        row[k] = 0.0
+    dc = row[DC_GAIN]
+    open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else np.inf
+    nyquist, _ = evaluate(n, a, b, c, np.pi, work, state, exchanged)
+    crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
+    crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
+    ends(open_dc, nyquist.real, count, xs, rs, row)
+    modulus(count, xs, rs, ss, nyquist, row, n, a, b, c, work, state, exchanged)
+
+
+@kernel
+def _radius(n, wr, wi):
+    """Largest modulus but of an eigenvalue at 1: the motor angle, which an inner loop does not see."""
     radius = 0.0
     for i in range(n):
         if np.hypot(wr[i] - 1.0, wi[i]) > HIDDEN:
@@ -120,76 +154,34 @@ def _poles(n, a, b, c, closed, scratch, wr, wi):
 
 
 @kernel
-def _one_loop(n, a, b, c, lead, time_figures, arrays, row):
-    """Every figure of one open loop into its row."""
-    points, stack, xs, rs, ss, work, state, exchanged, scratch, poles = arrays
-    row[:] = np.nan
-    for k in range(3):
-        row[k] = 0.0
-    balance(n, a, b, c)
-    hessenberg(n, a, b, c, np.empty(n))
-    _poles(n, a, b, c, 0.0, scratch, poles[0], poles[1])
-    row[RADIUS] = _poles(n, a, b, c, 1.0, scratch, poles[2], poles[3])
-    if np.isnan(row[RADIUS]):
-        return
-    row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
-    for i in range(n):
-        a[i, i] -= 1.0
-    kept = _grid(n, poles[2], poles[3], poles[0], poles[1], points)
-    count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
-    dc = _closed_dc(n, a, b, c, scratch)
-    for i in range(n):
-        if np.hypot(poles[2, i] - 1.0, poles[3, i]) <= HIDDEN:
-            dc = (rs[0] / (1.0 + rs[0])).real
-    row[DC_GAIN] = dc
-    row[FINAL] = dc
-    open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else np.inf
-    nyquist, _ = evaluate(n, a, b, c, np.pi, work, state, exchanged)
-    crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    ends(open_dc, nyquist.real, count, xs, rs, row)
-    modulus(count, xs, rs, ss, nyquist, row, n, a, b, c, work, state, exchanged)
-    resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
-    bandwidths(count, xs, rs, ss, dc, lead, row, n, a, b, c, work, state, exchanged)
-    if time_figures:
-        for i in range(n):
-            a[i, i] += 1.0
-        step_figures(n, a, b, c, lead, poles[2], poles[3], row)
+def many_loops(A, B, C, poles, lead, time_figures, out):
+    """Fill out[k] for every open loop A[k], B[k], C[k] (overwritten); every design by itself.
 
-
-@kernel
-def many_designs(kind, rows, first, last, size, time_figures, out):
-    """Fill out[k, loop, :] for designs k in first to last; every design by itself, whatever the split."""
-    space = np.zeros((8, size + 1, size + 1))
-    a = np.zeros((size, size))
-    b = np.zeros(size)
-    c = np.zeros(size)
-    loops_a = np.zeros((LOOPS, size, size))
-    loops_b = np.zeros((LOOPS, size))
-    loops_c = np.zeros((LOOPS, size))
-    orders = np.zeros(LOOPS, dtype=np.int64)
+    poles[k] holds real and imaginary parts of the open loop's, then of the closed loop's. lead is k_ff/(Kv
+    T) of a feed-forward in front. Where it is NaN, A, B, C are a closed loop's response itself: then only
+    its figures are written.
+    """
+    n = A.shape[1]
+    scratch = (np.empty(600), np.empty(48))
     arrays = (
-        np.empty(600),
-        np.empty(48),
         np.empty(CAPACITY),
         np.empty(CAPACITY, dtype=np.complex128),
         np.empty(CAPACITY, dtype=np.complex128),
-        np.zeros((size, size), dtype=np.complex128),
-        np.zeros(size, dtype=np.complex128),
-        np.zeros(size),
-        np.zeros((size, size + 1)),
-        np.zeros((4, size)),
+        np.zeros((n, n), dtype=np.complex128),
+        np.zeros(n, dtype=np.complex128),
+        np.zeros(n),
     )
-    for k in range(first, last):
-        open_loops(kind, rows[k], space, a, b, c, loops_a, loops_b, loops_c, orders)
-        for loop in range(LOOPS):
-            if orders[loop] == 0:
-                out[k, loop, :] = np.nan
-                continue
-            lead = 0.0  # feed-forward, in front of the position loop
-            if loop == LOOPS - 1:
-                lead = rows[k, K_FF] / (rows[k, KP_P] * kind[N_P] * rows[k, PERIOD])
-            _one_loop(
-                orders[loop], loops_a[loop], loops_b[loop], loops_c[loop], lead, time_figures, arrays,
-                out[k, loop],
-            )  # fmt: skip
+    for k in range(A.shape[0]):
+        a, b, c, row = A[k], B[k], C[k], out[k]
+        if np.isnan(poles[k, 0, 0]):
+            continue
+        count = _scanned(n, a, b, c, poles[k], scratch, arrays)
+        row[RADIUS] = _radius(n, poles[k, 2], poles[k, 3])
+        row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
+        _closed_figures(count, n, a, b, c, lead[k], poles[k], arrays, row)
+        if not np.isnan(lead[k]):
+            _one_loop(count, n, a, b, c, arrays, row)
+        if time_figures:
+            for i in range(n):
+                a[i, i] += 1.0
+            step_figures(n, a, b, c, lead[k], poles[k, 2], poles[k, 3], row)

@@ -17,6 +17,8 @@ FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no
 def step_figures(n, a, b, c, lead, wr, wi, row):
     """Rise 10-90 % and settling 2 % in ticks, overshoot in percent, of the closed loop a - b c.
 
+    Where lead is NaN, of a, b, c as they are.
+
     All are times of samples; the response is followed for 14 time constants of the slowest pole. Where
     that one is real and far slower than the rest, its tail is known in closed form.
     """
@@ -29,6 +31,7 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
     tail = alone < 0.7 * ticks
     if tail:
         ticks = int(alone)
+    fed_back = 0.0 if np.isnan(lead) else 1.0
     state = np.zeros(n)
     after = np.zeros(n)
     ten = -1
@@ -40,8 +43,8 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
         total = 0.0
         for j in range(n):
             total += c[j] * state[j]
-        error = 1.0 - total
-        if k == 1:
+        error = 1.0 - fed_back * total
+        if k == 1 and lead > 0.0:
             error += lead  # the command has jumped since the sample before
         for i in range(n):
             value = b[i] * error

@@ -2,46 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import inf, pi
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.batch.parameters import OperatingPoint, Population
+from actuator_lti.batch.parameters import Population
+from actuator_lti.drive.operating import Operating, OperatingPoint
+from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
+from actuator_lti.loops.blocks import Block
+from actuator_lti.loops.periodic import fundamental
+from actuator_lti.loops.sampled import fundamental_path, stage_blocks
+from actuator_lti.loops.tick import TickProgram
+from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 
-LOOP_NAMES = ("current", "velocity", "position")
-QUANTITIES = (
-    "gain_margin",
-    "phase_margin",
-    "delay_margin",
-    "modulus_margin",
-    "sensitivity_peak",
-    "bandwidth",
-    "bandwidth_90deg",
-    "resonance_peak",
-    "rise_time",
-    "overshoot",
-    "settling_time",
-)
-"""Names of requirements.toml quantities that have one value a loop; units in `UNITS`."""
-UNITS = {
-    "gain_margin": "dB",
-    "phase_margin": "deg",
-    "delay_margin": "s",
-    "modulus_margin": "1",
-    "sensitivity_peak": "dB",
-    "bandwidth": "Hz",
-    "bandwidth_90deg": "Hz",
-    "resonance_peak": "dB",
-    "rise_time": "s",
-    "overshoot": "%",
-    "settling_time": "s",
-}
-_TIME = ("rise_time", "overshoot", "settling_time")
-_CHUNK = 64
+_CHUNK = 1024
 _MOST_ORDER = 80
 
 
@@ -109,18 +88,18 @@ class LinearFigures:
         return self._list(loop, FIRST_PHASE, 2)
 
     def quantity(self, name: str, loop: str) -> np.ndarray:
-        """One figure of one loop, shape (count,), in the unit of `UNITS`.
+        """One figure of one loop, shape (count,), in its unit (`actuator_lti.quantities`).
 
         Margins are the ones to quote; ``inf`` where there is none.
         """
-        if name not in QUANTITIES:
-            raise InputError(f"quantity {name!r}: one of {', '.join(QUANTITIES)}")
+        if name not in LOOP_QUANTITIES:
+            raise InputError(f"quantity {name!r}: one of {', '.join(LOOP_QUANTITIES)}")
         return getattr(self, f"_{name}")(loop)
 
     def _index(self, loop: str) -> int:
         if loop not in self.loops:
             raise InputError(f"loop {loop!r}: this design has {', '.join(self.loops)}")
-        return LOOP_NAMES.index(loop)
+        return LOOPS.index(loop)
 
     def _column(self, loop: str, column: int) -> np.ndarray:
         return self.raw[:, self._index(loop), column]
@@ -204,8 +183,8 @@ def linear_figures(
     """Figures of the sampled loops of every design of a population.
 
     The same sampled loops as `actuator_lti.assemble_loops` (form ``"sampled"``) and the same definitions
-    as `actuator_lti.stability_margins`, compiled: each design is assembled in closed form, its response
-    followed on a grid that is refined until nothing can hide between two points, every crossover
+    as `actuator_lti.stability_margins`: the same walk with stacked coefficients, then compiled code: the
+    response followed on a grid that is refined until nothing can hide between two points, every crossover
     polished to rounding. The bits do not depend on threads or on the rest of the population.
 
     Parameters
@@ -226,27 +205,88 @@ def linear_figures(
         For a computing delay of so many ticks that the order passes 80.
     """
     from ._figures import COLUMNS
-    from ._run import many_designs
 
-    rows = population.rows(operating_point, load_Nm, speed_amplitude_rad_s, direction)
-    kind = population.structure()
-    size = population.largest_order(rows, kind)
-    if size > _MOST_ORDER:
-        raise InputError(f"control.computing_delay: gives loops of order {size}; at most {_MOST_ORDER} here")
-    out = np.empty((population.count, 3, COLUMNS))
-    starts: Sequence[int] = range(0, population.count, _CHUNK)
+    at = Operating(
+        point=operating_point,
+        load_Nm=load_Nm,
+        speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction,
+    )
+    out = np.full((population.count, len(LOOPS), COLUMNS), np.nan)
+    chunks = [
+        group[first : first + _CHUNK]
+        for group in population.alike()
+        for first in range(0, len(group), _CHUNK)
+    ]
 
-    def fill(first: int) -> int:
-        last = min(first + _CHUNK, population.count)
-        many_designs(kind, rows, first, last, size, time_figures, out)
-        return last - first
+    def fill(chosen: np.ndarray) -> int:
+        _fill(wire(population.part(chosen).stacked, at), chosen, time_figures, out)
+        return len(chosen)
 
     done = 0
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for finished in pool.map(fill, starts):
+        for finished in pool.map(fill, chunks):
             done += finished
             if progress is not None:
                 progress(done, population.count)
-    names = tuple(n for n, there in zip(LOOP_NAMES, (kind[1], kind[2], 1), strict=True) if there)
-    ticks = np.array([1, kind[3], kind[4]], dtype=float)
-    return LinearFigures(names, population.count, out, rows[:, 7:8] * ticks)
+    wired = wire(population.stacked, at)
+    periods = [
+        np.broadcast_to(wired.period_s(loop) if loop in wired.stages else np.nan, population.count)
+        for loop in LOOPS
+    ]
+    return LinearFigures(wired.stages, population.count, out, np.column_stack(periods))
+
+
+def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray) -> None:
+    """Figures of every loop of stacked designs."""
+    for stage in wired.stages:
+        rows = np.full((len(chosen), out.shape[2]), np.nan)
+        lead, response = _command_path(wired) if stage == "position" else (0.0, None)
+        _figures_of(fundamental(stage_blocks(wired, stage)), lead, time_figures, rows)
+        if response is not None:
+            verdict = rows[:, [0, 14]].copy()
+            _figures_of(response, np.nan, time_figures, rows)
+            rows[:, [0, 14]] = verdict
+        out[chosen, LOOPS.index(stage)] = rows
+
+
+def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
+    """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
+    from ._run import many_loops
+
+    A, B, C = _stacked(block, len(rows))
+    leads = np.array(np.broadcast_to(np.asarray(lead, dtype=float), len(rows)))
+    closed = A - B[:, :, None] * C[:, None, :] * ~np.isnan(leads)[:, None, None]
+    finite = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(closed).all(axis=(1, 2))
+    found = [np.linalg.eigvals(np.where(finite[:, None, None], each, 0.0)) for each in (A, closed)]
+    poles = np.stack([part for each in found for part in (each.real, each.imag)], axis=1)
+    poles[~finite] = np.nan
+    many_loops(A, B, C, poles, leads, time_figures, rows)
+
+
+def _command_path(wired: Drive) -> tuple[Any, Block | None]:
+    """What stands between command and position loop: a lead k_ff/(Kv T), or else the whole response.
+
+    With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response.
+    """
+    law, T = wired.design.controller.position_loop, wired.period_s("position")
+    plain = law.integral_time_s is None and not any(
+        present(each)
+        for each in (law.derivative_time_s, law.acceleration_feedforward, wired.design.command.filter_time_s)
+    )
+    if plain and (wired.design.coupling is None or law.sensor == "output"):
+        return law.feedforward / (law.gain * T), None
+    program = TickProgram(wired, "position")
+    return 0.0, fundamental_path(program, wired.interval["position"], "ref", "output_angle")
+
+
+def _stacked(block: Block, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arrays of its own for every design, without the direct term, which is 0."""
+    n = len(block.states)
+    if n > _MOST_ORDER:
+        raise InputError(f"control.computing_delay: gives loops of order {n}; at most {_MOST_ORDER} here")
+
+    def own(part: np.ndarray, *shape: int) -> np.ndarray:
+        return np.array(np.broadcast_to(part, (count, *shape)))
+
+    return own(block.A, n, n), own(block.B[..., 0], n), own(block.C[..., 0, :], n)

@@ -12,10 +12,10 @@ from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.model import Design, Parameter
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.design.reading import shown
 from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 
 def paths_of(design: Design) -> tuple[str, ...]:
@@ -167,3 +167,11 @@ def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Param
             )
         found.append(known)
     return tuple(found)
+
+
+def stacked(design: Design, values: Mapping[str, Any]) -> Design:
+    """A design with arrays in place of some numbers: many designs of one structure, unchecked."""
+    changes: dict[str, dict[str, Any]] = {}
+    for path, array in values.items():
+        changes.setdefault(path.rpartition(".")[0], {})[located(design, path)[0].attribute] = array
+    return _replaced(design, changes, {})

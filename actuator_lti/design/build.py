@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from actuator_lti.design import model
-from actuator_lti.design.fields import Field, Structure, fields_in
+from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
+from actuator_lti.design.model import Screw
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
-from actuator_lti.design.reading import shown
 from actuator_lti.design.refusals import nearest
 from actuator_lti.design.sections import Section, children
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 
@@ -36,15 +38,38 @@ class Builder:
         self.structure = Structure(
             document.design.axis or "rotary", control.velocity is not None, control.current is not None
         )
+        self.travel_m_rad: float | None = None
+        self.travel_m_rad = self._travel()
 
     def refuse(self, path: str, value: object, reason: str) -> InputError:
         """The error of one key."""
         return InputError(f"{path} = {shown(value)}: {reason}", where=self.where)
 
+    def quantity(self, text: Any, field: Field) -> float:
+        """The SI value of a text; behind a screw also from the units of a rotary axis."""
+        unit, power = field.unit(self.structure), field.travel_power()
+        if self.travel_m_rad is None or power == 0 or not isinstance(text, str):
+            return parse_quantity(text, unit)
+        rotary = field.unit(replace(self.structure, axis="rotary"))
+        try:
+            return parse_quantity(text, rotary) * self.travel_m_rad**power
+        except InputError:
+            return parse_quantity(text, unit)
+
+    def _travel(self) -> float | None:
+        """p of the screw, needed before anything else is read; None without one."""
+        if self.document.screw is None:
+            return None
+        if self.structure.axis != "linear":
+            raise self.refuse("screw", "a table", 'allowed with design.axis = "linear"')
+        return Screw(
+            lead_m=self._number("screw.lead", self.document.screw.lead.value, FIELDS["screw.lead"])
+        ).travel_m_rad
+
     def _number(self, path: str, text: Any, field: Field) -> float:
         unit = field.unit(self.structure)
         try:
-            value = parse_quantity(text, unit)
+            value = self.quantity(text, field)
         except InputError as error:
             raise self.refuse(path, text, error.message) from None
         if field.kind == "integer" and value != int(value):
@@ -59,7 +84,9 @@ class Builder:
         tolerance = None
         if raw.tolerance is not None:
             try:
-                tolerance = read_tolerance(raw.tolerance, value, unit, field)
+                tolerance = read_tolerance(
+                    raw.tolerance, value, lambda text: self.quantity(text, field), field, unit
+                )
             except InputError as error:
                 given = raw.tolerance if isinstance(raw.tolerance, str | int | float) else "table"
                 raise self.refuse(f"{path}.tolerance", given, error.message) from None

@@ -6,8 +6,8 @@ from math import inf, isfinite, log
 
 from actuator_lti.design.checks_control import check_control
 from actuator_lti.design.model import Design
-from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _ELECTRICAL = {
     "resistance": "resistance_ohm",

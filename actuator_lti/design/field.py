@@ -73,6 +73,21 @@ class Field:
             return "1/s"
         return self.unit_template.format(drive=drive, **words)
 
+    def travel_power(self) -> int:
+        """n, where a value in rotary units becomes one in linear units times p^n, p the travel per radian.
+
+        Examples
+        --------
+        >>> from actuator_lti.design.fields import FIELDS
+        >>> FIELDS["motor.rotor_inertia"].travel_power(), FIELDS["limits.speed"].travel_power()
+        (-2, 1)
+        """
+        above, _, below = self.unit_template.partition("/")
+        return sum(
+            power * (above.count(word) - below.count(word))
+            for word, power in (("{angle}", 1), ("{torque}", -1), ("{inertia}", -2))
+        )
+
     def allowed(self, unit: str) -> str:
         """The allowed range in words."""
         if self.kind == "flag":

@@ -70,10 +70,15 @@ _MOTOR = (
     _positive("motor.back_emf_constant", "back_emf_constant_Vs_rad", "V*s/{angle}", "kE",
               "back-EMF per rad/s", example="5.9 mV*s/rad"),
     _choice("motor.constants", "constants", ("dc", "rms-line", "peak-phase"),
-            "how the sheet gives kM, kE, R, L and currents: dc (phase-phase), rms-line (N m/A rms, V rms "
+            "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
             "line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L per phase)"),
     _positive("motor.source_gain", "source_gain_Nm_V", "{torque}/V", "g",
               "gain of an ideal torque source, instead of R, L, kM, kE", example="35.15 N/V"),
+)
+_SCREW = (
+    _positive("screw.lead", "lead_m", "m", "p",
+              "travel per revolution of the screw: with it the motor's values may stand in N m, rad and "
+              "kg m2, and encoder.counts_per_rev is per revolution", required=True, example="10 mm"),
 )
 _GEAR = (
     _positive("gear.*.ratio", "ratio", "1", "i", "input speed over output speed", required=True,
@@ -149,7 +154,7 @@ _FRICTION_POINT = (
 )
 _ENCODER = (
     _integer("encoder.counts_per_rev", "counts_per_rev", 2**32, "",
-             "counts per motor revolution after quadrature (linear axis: per metre)"),
+             "counts per motor revolution after quadrature (linear axis without a screw: per metre)"),
     _choice("encoder.speed", "speed", ("ideal", "difference", "tracking"),
             "the speed itself, a difference of angles, or a tracking loop (observer)"),
     _integer("encoder.difference_samples", "difference_samples", 64, "m",
@@ -209,7 +214,7 @@ _TEMPERATURE = (
     _degrees("temperature.magnet", "magnet_degC", "temperature of the magnets in this design", "60 degC"),
     _degrees("temperature.reference", "reference_degC", "temperature that the sheet holds for", "25 degC"),
     _quantity("temperature.resistance_coefficient", "resistance_per_K", "1/K", "",
-              "change of R per kelvin (copper 0.393 %/K)", low=0.0, high=0.1, example="0.393 %/K"),
+              "change of R per kelvin (copper 0.393 %/K)", low=0.0, high=0.02, example="0.393 %/K"),
     _quantity("temperature.magnet_coefficient", "magnet_per_K", "1/K", "",
               "change of kM and kE per kelvin (NdFeB -0.11 %/K)", low=-0.05, high=0.05, example="-0.11 %/K"),
     _degrees("temperature.ambient", "ambient_degC", "temperature around the motor", "25 degC"),
@@ -313,8 +318,8 @@ _VALIDATION = (
 # fmt: on
 
 ALL_FIELDS: tuple[Field, ...] = (
-    *_DESIGN, *_MOTOR, *_GEAR, *_COUPLING, *_LOAD, *_LOAD_FRICTION, *_GRAVITY, *_FRICTION, *_FRICTION_POINT,
-    *_ENCODER, *_OUTPUT_ENCODER, *_INSTRUMENTS, *_LIMITS, *_SUPPLY, *_TEMPERATURE, *_COMMAND, *_CONTROL,
-    *_FILTER, *_VALIDATION,
+    *_DESIGN, *_MOTOR, *_SCREW, *_GEAR, *_COUPLING, *_LOAD, *_LOAD_FRICTION, *_GRAVITY, *_FRICTION,
+    *_FRICTION_POINT, *_ENCODER, *_OUTPUT_ENCODER, *_INSTRUMENTS, *_LIMITS, *_SUPPLY, *_TEMPERATURE,
+    *_COMMAND, *_CONTROL, *_FILTER, *_VALIDATION,
 )  # fmt: skip
 """Every key, in the order of a design file."""

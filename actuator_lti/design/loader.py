@@ -10,9 +10,9 @@ from typing import Any
 
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design
-from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.design.shipped import shipped_designs, shipped_path
 from actuator_lti.errors import InputError
+from actuator_lti.reading import decode, parse_toml, read_bytes, shown
 
 
 def load_design(name_or_path: str | PathLike[str]) -> Design:
@@ -84,7 +84,10 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     InputError
         As :func:`load_design`.
     """
-    return design_from_tree(parse_toml(text, origin), origin)
+    tree = parse_toml(text, origin)
+    if not tree:
+        raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
+    return design_from_tree(tree, origin)
 
 
 def design_from_tree(tree: dict[str, Any], origin: str) -> Design:

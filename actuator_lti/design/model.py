@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, log, pi, prod, sin, sqrt
-from typing import Literal
+from typing import Any, Literal
 
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
@@ -61,6 +61,22 @@ class Gear:
     ratio: float
     input_inertia_kgm2: float = 0.0
     output_inertia_kgm2: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screw:
+    """A screw, rack or belt between a rotary motor and a linear axis: travel per revolution.
+
+    It lets the motor's data sheet stand in its own units: with p = lead/2 pi a torque T is the force T/p, an
+    angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
+    """
+
+    lead_m: float
+
+    @property
+    def travel_m_rad(self) -> float:
+        """p, travel per radian."""
+        return self.lead_m / (2.0 * pi)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -535,6 +551,7 @@ class Design:
     friction: Friction = field(default_factory=Friction)
     encoder: Encoder = field(default_factory=Encoder)
     output_encoder: OutputEncoder = field(default_factory=OutputEncoder)
+    screw: Screw | None = None
     coupling: Coupling | None = None
     command: Command = field(default_factory=Command)
     supply: Supply | None = None
@@ -549,6 +566,37 @@ class Design:
     revision: str = ""
     description: str = ""
     origin: str = ""
+
+    def with_values(self, values: Mapping[str, Any]) -> Design:
+        """A copy with some keys changed, as a design file would write them.
+
+        Parameters
+        ----------
+        values : mapping of dotted key to value
+            Text with its unit (``"90 1/s"``), or a number in SI; other keys take text, lists and tables.
+            A changed value says in its source what it was; a tolerance in percent follows it.
+
+        Returns
+        -------
+        Design
+            Checked like a file.
+
+        Raises
+        ------
+        InputError
+            For an unknown key, a wrong unit, or values that contradict each other.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> design = load_design("ilr33-amber")
+        >>> better = design.with_values({"control.position.gain": "90 1/s", "limits.voltage": 24.0})
+        >>> better.controller.position.gain, better.parameters["limits.voltage"].source
+        (90.0, 'changed from 12 V')
+        """
+        from actuator_lti.design.writing import with_overrides, with_units
+
+        return with_overrides(self, with_units(self, values))
 
     @property
     def total_ratio(self) -> float:
@@ -574,18 +622,18 @@ class Design:
 
     @property
     def angle_quantum_rad(self) -> float | None:
-        """One encoder count at the motor, in rad (linear axis: counts per metre, so in m); None without."""
-        return self._quantum(self.encoder.counts_per_rev)
+        """One encoder count at the motor, in rad (linear axis: in m, of a screw's lead or of a metre)."""
+        return self._quantum(self.encoder.counts_per_rev, self.screw.lead_m if self.screw else 1.0)
 
     @property
     def output_quantum_rad(self) -> float | None:
         """One count of the output's encoder at the output shaft, in rad or m; None without."""
         return self._quantum(self.output_encoder.counts_per_rev)
 
-    def _quantum(self, counts: int | None) -> float | None:
+    def _quantum(self, counts: int | None, travel_m: float = 1.0) -> float | None:
         if counts is None:
             return None
-        return (1.0 if self.axis == "linear" else 2.0 * pi) / counts
+        return (travel_m if self.axis == "linear" else 2.0 * pi) / counts
 
     @property
     def inertia_kgm2(self) -> float:

@@ -1,49 +1,12 @@
-"""The figures that a requirement may limit, and the unit in which each is reported."""
+"""Limits of figures as text: the figures themselves stand in `actuator_lti.quantities`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
-from actuator_lti.design.model import Axis
 from actuator_lti.design.units import convert, parse_quantity, parse_unit, split_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import QUANTITIES
 
-
-@dataclass(frozen=True)
-class Quantity:
-    """A figure of merit: its name, its unit in reports (linear axis: other), and whether of a loop."""
-
-    name: str
-    unit: str
-    scope: Literal["loop", "drive"]
-    description: str
-    linear_unit: str = ""
-
-    def unit_for(self, axis: Axis) -> str:
-        """The unit in which this figure is reported."""
-        return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
-
-
-_LIST = (
-    Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down"),
-    Quantity("phase_margin", "deg", "loop", "smallest phase margin"),
-    Quantity("delay_margin", "s", "loop", "smallest delay margin"),
-    Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1"),
-    Quantity("sensitivity_peak", "dB", "loop", "peak of |S|"),
-    Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB"),
-    Quantity("bandwidth_90deg", "Hz", "loop", "closed loop -90 deg"),
-    Quantity("resonance_peak", "dB", "loop", "peak of |T| over its value at DC"),
-    Quantity("overshoot", "%", "loop", "of the step of the closed loop"),
-    Quantity("rise_time", "s", "loop", "10 % to 90 %"),
-    Quantity("settling_time", "s", "loop", "to within 2 %"),
-    Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "m/s"),
-    Quantity("motor_current", "A", "drive", "motor current at top speed and a load"),
-    Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load", "m/s^2"),
-)
-
-QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
-"""Every quantity that a requirement may name."""
+__all__ = ["QUANTITIES", "parse_limit", "write_limit"]
 
 
 def parse_limit(text: str | float | int, unit: str) -> float:

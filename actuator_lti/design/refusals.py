@@ -8,10 +8,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from actuator_lti.design.fields import FIELDS, field_of
-from actuator_lti.design.reading import shown
 from actuator_lti.design.schema import MAX_GEARS, MAX_LIST, document_model
 from actuator_lti.design.sections import BY_PATH, children
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _KEYS = {
     "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),

@@ -68,6 +68,7 @@ class Section:
 
 SECTIONS: tuple[Section, ...] = (
     Section("motor", "motor", model.Motor, required=True),
+    Section("screw", "screw", model.Screw),
     Section("gear", "gears", model.Gear, many="named"),
     Section("coupling", "coupling", model.Coupling),
     Section("load", "load", model.Load),

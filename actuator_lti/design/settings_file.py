@@ -9,8 +9,8 @@ from typing import Any
 from actuator_lti.design.model import ControllerObject, ControllerObjects
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import check_objects
-from actuator_lti.design.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.errors import InputError
+from actuator_lti.reading import decode, parse_toml, read_bytes, shown
 
 MAX_OBJECTS = 5000
 _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")

@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, register_namespace, tostring
 
+from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.model import ControllerObject, ControllerObjects
-from actuator_lti.design.reading import MAX_BYTES, MAX_DEPTH, decode, read_bytes, shown
 from actuator_lti.design.settings_file import checked_objects
 from actuator_lti.errors import InputError
+from actuator_lti.reading import decode, read_bytes, shown
 
 _INTEGER = re.compile(r"(?:[+-]?[0-9]{1,20}|0[xX][0-9A-Fa-f]{1,16})\Z")
 _NAMESPACE = "http://www.canopen.org/xml/1.0"
@@ -32,7 +33,7 @@ def _parsed(text: str, where: str) -> Element:
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
-    if len(text) > MAX_BYTES:
+    if len(text) > TOML_BYTES.most:
         raise InputError("is larger than allowed: at most 1 MiB", where=where)
     try:
         root: Element = fromstring(text.encode(), forbid_dtd=True)
@@ -55,7 +56,7 @@ def _objects_in(root: Element, where: str) -> list[tuple[ControllerObject, Eleme
     stack: list[tuple[Element, int]] = [(root, 0)]
     while stack:
         element, depth = stack.pop()
-        if depth > 8 * MAX_DEPTH:
+        if depth > 8 * TOML_DEPTH.most:
             raise InputError("nested too deeply", where=where)
         if _local(element) == "CANopenObject":
             index = _hex(element, "index", 4, where)

@@ -100,9 +100,28 @@ def _unused(design: Design) -> Iterator[str]:
         yield "friction.breakaway_ratio: not used by the tanh law"
 
 
+def _holding_torque(design: Design) -> float | None:
+    """Largest torque at the output without losses: peak current (or stall current) times kM times N."""
+    motor, limits = design.effective_motor, design.limits
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * limits.voltage_V * design.total_ratio
+    if motor.torque_constant_Nm_A is None or motor.resistance_ohm is None:
+        return None
+    current = limits.voltage_V / motor.resistance_ohm
+    if design.controller.current is not None:
+        current = min(current, limits.peak_current_A)
+    return motor.torque_constant_Nm_A * current * design.total_ratio
+
+
 def _loads(design: Design) -> Iterator[str]:
     largest = design.load.moment_max_Nm
     unit = "N" if design.axis == "linear" else "N*m"
+    holding = _holding_torque(design)
+    if design.load.path == "back-drivable" and holding is not None and largest > holding:
+        yield (
+            f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
+            "at its peak current without losses"
+        )
     for load in design.validation.loads_Nm:
         if abs(load) > largest:
             yield f"validation.loads: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"

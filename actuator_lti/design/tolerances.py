@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from typing import Any
 
@@ -10,20 +11,24 @@ from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 
+Parse = Callable[[Any], float]
 
-def _width(text: str | float | int, nominal: float, unit: str) -> float:
+
+def _width(text: str | float | int, nominal: float, parse: Parse) -> float:
     """A half width or a standard deviation in SI; relative where written in percent."""
     if isinstance(text, str) and text.strip().endswith("%"):
         width = parse_quantity(text, "1") * abs(nominal)
     else:
-        width = parse_quantity(text, unit)
+        width = parse(text)
     if width <= 0.0:
         raise InputError("allowed: above 0")
     return width
 
 
-def read_tolerance(raw: Any, nominal: float, unit: str, field: Field) -> Tolerance:
+def read_tolerance(raw: Any, nominal: float, parse: Parse, field: Field, unit: str) -> Tolerance:
     """The tolerance of a value from its text (half width of a uniform one) or its table.
+
+    ``parse`` reads a quantity of this key into SI.
 
     Raises
     ------
@@ -32,14 +37,14 @@ def read_tolerance(raw: Any, nominal: float, unit: str, field: Field) -> Toleran
     """
     if isinstance(raw, str | int | float):
         text = raw if isinstance(raw, str) else repr(raw)
-        tolerance = Tolerance(kind="uniform", half_width=_width(raw, nominal, unit), text=text)
+        tolerance = Tolerance(kind="uniform", half_width=_width(raw, nominal, parse), text=text)
     else:
-        tolerance = _from_table(raw, nominal, unit)
+        tolerance = _from_table(raw, nominal, parse)
     check_tolerance(tolerance, nominal, unit, field)
     return tolerance
 
 
-def _from_table(raw: Any, nominal: float, unit: str) -> Tolerance:
+def _from_table(raw: Any, nominal: float, parse: Parse) -> Tolerance:
     wanted, unwanted = ("half_width", "std") if raw.kind == "uniform" else ("std", "half_width")
     given = getattr(raw, wanted)
     bounds = {key: getattr(raw, key) for key in ("lower", "upper") if getattr(raw, key) is not None}
@@ -51,10 +56,10 @@ def _from_table(raw: Any, nominal: float, unit: str) -> Tolerance:
         raise InputError('allowed: lower or upper with kind "truncated-normal", and only there')
     return Tolerance(
         kind=raw.kind,
-        lower=parse_quantity(bounds["lower"], unit) if "lower" in bounds else -inf,
-        upper=parse_quantity(bounds["upper"], unit) if "upper" in bounds else inf,
+        lower=parse(bounds["lower"]) if "lower" in bounds else -inf,
+        upper=parse(bounds["upper"]) if "upper" in bounds else inf,
         text=given if isinstance(given, str) else repr(given),
-        **{wanted: _width(given, nominal, unit)},
+        **{wanted: _width(given, nominal, parse)},
     )
 
 
@@ -73,7 +78,7 @@ def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance:
     """The tolerance of a changed nominal: a relative one follows it, an absolute one stays."""
     if not tolerance.text.strip().endswith("%"):
         return tolerance
-    width = _width(tolerance.text, nominal, "1")
+    width = _width(tolerance.text, nominal, lambda text: parse_quantity(text, "1"))
     wide = width if tolerance.kind == "uniform" else None
     std = None if tolerance.kind == "uniform" else width
     return Tolerance(

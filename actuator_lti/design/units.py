@@ -15,8 +15,8 @@ from functools import lru_cache
 from math import isfinite
 from typing import Any
 
-from actuator_lti.design.reading import shown
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 _DEFINITIONS = """
 tera- = 1e12 = T-
@@ -61,6 +61,7 @@ hertz = 6.283185307179586 * radian / second = Hz
 
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))")
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
+_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
 _BARE_POWER = re.compile(r"(?<=[A-Za-z])([23])(?![0-9])")
 _RUN_TOGETHER = re.compile(r"\b(k?g)(c?m\^2)")
 _MAX_TEXT = 120
@@ -175,11 +176,50 @@ def scaled(number: float, factor: float) -> float:
     return number * factor
 
 
+_KINDS = {
+    "ohm": "resistance", "H": "inductance", "V": "voltage", "A": "current", "W": "power", "F": "capacitance",
+    "s": "time", "1/s": "gain or rate", "rad/s": "speed or angular frequency", "rad": "angle", "m": "length",
+    "kg": "mass", "kg*m^2": "moment of inertia", "N*m": "torque", "N": "force", "m/s": "speed",
+    "N*m/A": "torque constant", "V*s/rad": "back-EMF constant", "rad/s^2": "angular acceleration",
+    "m/s^2": "acceleration", "N*m*s/rad": "viscous friction", "N*m/rad": "stiffness",
+    "degC": "temperature", "K": "temperature difference",
+}  # fmt: skip
+
+
+@lru_cache(maxsize=1)
+def _kinds() -> dict[Dimension, str]:
+    return {parse_unit(unit).dimension: kind for unit, kind in _KINDS.items()}
+
+
+def _kind_of(written: str, found: UnitValue) -> str:
+    """What a unit measures, in words where there is one."""
+    kind = _kinds().get(found.dimension)
+    if kind is None:
+        return f"has the dimension of {shown(written)}"
+    return f"{shown(written)} is the unit of a{'n' if kind[0] in 'aeiou' else ''} {kind}"
+
+
+def _advice(found: UnitValue, wanted: UnitValue, number: float) -> str:
+    """How to get from what is written to what is wanted, where engineers mix the two up."""
+    pair = (_kinds().get(found.dimension, ""), _kinds().get(wanted.dimension, ""))
+    if pair == ("speed or angular frequency", "gain or rate"):
+        return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * found.factor:.6g} 1/s"
+    if pair == ("moment of inertia", "mass"):
+        return "; a screw of lead p carries J as the mass J (2 pi/p)^2"
+    if pair == ("mass", "moment of inertia"):
+        return "; a mass m on a screw of lead p is the inertia m (p/2 pi)^2"
+    if pair == ("torque", "force"):
+        return "; a screw of lead p turns a torque T into the force 2 pi T/p"
+    return ""
+
+
 def split_quantity(text: str) -> tuple[float, str]:
     """Number and unit of a written quantity."""
     match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
     if match is None:
         raise ValueError("a number and a unit are wanted")
+    if _COMMA.match(text):
+        raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
     number = float(match.group(1))
     if not isfinite(number):
         raise ValueError("must be finite")
@@ -230,8 +270,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     except (ValueError, OverflowError) as error:
         raise InputError(f"{error}; allowed: {example}") from None
     if not compatible(found, wanted):
-        missing = "has no unit" if not written else f"has the dimension of {shown(written)}"
-        raise InputError(f"wrong dimension, {missing}; allowed: {example}")
+        missing = "has no unit" if not written else _kind_of(written, found)
+        raise InputError(f"wrong dimension, {missing}; allowed: {example}{_advice(found, wanted, number)}")
     value = scaled(number, found.factor)
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")

@@ -10,7 +10,7 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any
 
-from actuator_lti.design.fields import Field, Structure, fields_in
+from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import (
     Controller,
@@ -164,6 +164,18 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     for path, value in overrides.items():
         _override(tree, path, value, design)
     return design_from_tree(tree, design.origin or design.name)
+
+
+def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
+    structure = Structure.of(design)
+    found: dict[str, Any] = {}
+    for path, value in values.items():
+        field = field_of(path)
+        unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
+        plain = isinstance(value, int | float) and not isinstance(value, bool)
+        found[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+    return found
 
 
 def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, get_args
 
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.cascade import Cascade, cascade
+from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from actuator_lti.plant import OperatingPoint, RotorState
+    from actuator_lti.drive.operating import OperatingPoint, RotorState
 
 
 def assemble_loops(
@@ -22,6 +24,8 @@ def assemble_loops(
     direction: int = 1,
     rotor: RotorState = "free",
     inner_loops: InnerLoops = "closed",
+    speed_rad_s: float = 0.0,
+    angle_rad: float = 0.0,
 ) -> Loops:
     """All loops of a design as named python-control systems (model.md section 3).
 
@@ -32,8 +36,8 @@ def assemble_loops(
         ``sampled``: exact hold, exact computing delay, PI in z, slower loops held (state spaces with dt).
         ``continuous``: PI in s and exact delays (`DelaySystem`, no Pade; see `actuator_lti.loops.flow` for
         which loop carries which delay). ``ideal``: continuous without any delay, the paper's own model.
-    operating_point : {"sliding", "rest", "describing-function"}
-        Slope of the friction, see `actuator_lti.plant.friction_slope`.
+    operating_point : {"sliding", "rest", "describing-function", "driving", "driven", "gap"}
+        Slope of the friction and contact of the coupling, see `actuator_lti.drive.operating.Operating`.
     load_Nm : float
         Hinge moment at the output shaft in N m: more dry friction.
     speed_amplitude_rad_s : float, optional
@@ -42,11 +46,13 @@ def assemble_loops(
         Direction of motion for asymmetric friction.
     rotor : {"free", "locked"}
         Locked: only the current loop, without back-EMF, so that its closed loop starts at 0 dB.
-
     inner_loops : {"closed", "open"}
         Open: `Loops.velocity` and `Loops.position` with the feedback of the loops inside them taken away, the
         inner controllers still in the path. Break points, limiters and the response to the command are those
         of the closed drive in any case.
+    speed_rad_s, angle_rad : float
+        Motor speed at which the slope of a friction map is taken, output angle at which gravity is made
+        linear.
 
     Returns
     -------
@@ -65,23 +71,28 @@ def assemble_loops(
     """
     if form not in get_args(Form):
         raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
-    wired = cascade(design, operating_point, load_Nm, speed_amplitude_rad_s, direction, rotor)
+    at = Operating(
+        point=operating_point,
+        load_Nm=load_Nm,
+        speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction,
+        rotor=rotor,
+        speed_rad_s=speed_rad_s,
+        angle_rad=angle_rad,
+    )
+    wired = wire(design, at)
     if inner_loops not in get_args(InnerLoops):
         raise InputError(f"inner_loops = {inner_loops!r}: one of {', '.join(get_args(InnerLoops))}")
-    if not wired.stages:
+    if not wired.stages and rotor == "locked":
         raise InputError("rotor = 'locked': the design has no current loop")
     opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
-    delays = "all" if form == "continuous" else "none"
+    delays = ALL if form == "continuous" else frozenset[str]()
     parts = _sampled(wired, opened) if form == "sampled" else _continuous(wired, opened, delays)
     stages: dict[str, Loop] = parts.pop("stages")
     return Loops(
         design=design,
         form=form,
-        operating_point=operating_point,
-        load_Nm=load_Nm,
-        speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction,
-        rotor=rotor,
+        operating=at,
         inner_loops=inner_loops,
         current=stages.get("current"),
         velocity=stages.get("velocity"),
@@ -91,25 +102,26 @@ def assemble_loops(
     )
 
 
-def _sampled(wired: Cascade, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]:
+def _sampled(wired: Drive, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]:
     from actuator_lti.loops import sampled
     from actuator_lti.loops.limiter_responses import sampled_limiters
 
-    whole = "position" in wired.stages
+    whole = wired.operating.rotor == "free"
     return {
         "stages": {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages},
         "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
         "limiters": sampled_limiters(wired) if whole else {},
         "reference_to_output": sampled.reference_to_output(wired) if whole else None,
+        "moment_to_output": sampled.moment_to_output(wired) if whole else None,
         "tick_system": sampled.tick_system(wired) if whole else None,
     }
 
 
-def _continuous(wired: Cascade, opened: dict[str, tuple[str, ...]], delays: str) -> dict[str, Any]:
+def _continuous(wired: Drive, opened: dict[str, tuple[str, ...]], delays: frozenset[str]) -> dict[str, Any]:
     from actuator_lti.loops import continuous
     from actuator_lti.loops.limiter_responses import continuous_limiters
 
-    whole = "position" in wired.stages
+    whole = wired.operating.rotor == "free"
     return {
         "stages": {
             stage: continuous.stage_loop(wired, stage, delays, opened[stage]) for stage in wired.stages
@@ -117,5 +129,6 @@ def _continuous(wired: Cascade, opened: dict[str, tuple[str, ...]], delays: str)
         "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
         "limiters": continuous_limiters(wired, delays) if whole else {},
         "reference_to_output": continuous.reference_to_output(wired, delays) if whole else None,
+        "moment_to_output": continuous.moment_to_output(wired, delays) if whole else None,
         "tick_system": None,
     }

@@ -3,39 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.loops.tick import Tick, TickProgram
 
 
+def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Which states an output sees, through others as well.
+
+    Parameters
+    ----------
+    depends : ndarray of bool, shape (n, n)
+        Whether state r is computed from state c.
+    start : ndarray of bool, shape (n,)
+        What the output looks at itself.
+    """
+    found = start
+    while True:
+        more = found | depends[found].any(axis=0)
+        if (more == found).all():
+            return found
+        found = more
+
+
 @dataclass(frozen=True)
 class Block:
-    """A sampled SISO system ``x+ = A x + B v, y = C x + D v``; shapes (n,n), (n,1), (1,n), (1,1)."""
+    """A sampled SISO system ``x+ = A x + B v, y = C x + D v``.
+
+    Shapes (n,n), (n,1), (1,n), (1,1), or stacked over designs in front. ``states`` are their names.
+    """
 
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
+    states: tuple[str, ...]
 
     def pruned(self) -> Block:
-        """Without the states that nothing looks at (such as a hold written before it is read)."""
-        A, B, C = self.A, self.B, self.C
-        while A.shape[0]:
-            used = np.any(A != 0, axis=0) | np.any(C != 0, axis=0)
-            if used.all():
-                break
-            A, B, C = A[np.ix_(used, used)], B[used], C[:, used]
-        return Block(A, B, C, self.D)
+        """Without the states that the output does not see (the motor angle inside an inner loop, say)."""
+        n = len(self.states)
+        depends = np.any(self.A.reshape(-1, n, n) != 0, axis=0)
+        used = seen(depends, np.any(self.C.reshape(-1, n) != 0, axis=0))
+        names = tuple(name for name, there in zip(self.states, used, strict=True) if there)
+        A = self.A[..., used, :][..., :, used]
+        return Block(A, self.B[..., used, :], self.C[..., :, used], self.D, names)
 
     def feedback(self) -> Block:
         """Closed with negative unit feedback, output kept: T = L/(1 + L). Needs D = 0."""
-        return Block(self.A - self.B @ self.C, self.B, self.C, self.D)
+        return replace(self, A=self.A - self.B @ self.C)
 
     def sensitivity(self) -> Block:
         """S = 1/(1 + L). Needs D = 0."""
-        return Block(self.A - self.B @ self.C, self.B, -self.C, np.ones((1, 1)))
+        return replace(self, A=self.A - self.B @ self.C, C=-self.C, D=np.ones_like(self.D))
 
 
 def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
@@ -46,10 +68,10 @@ def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
     return A, B
 
 
-def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, scale: float = 1.0) -> Block:
+def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, scale: Any = 1.0) -> Block:
     """From an input held over the ticks to a signal at the start of the first of them."""
     n = len(program.states)
     column = program.inputs.index(source)
     A, B = compose(ticks)
-    row = scale * ticks[0].signals[signal]
-    return Block(A, B[:, [column]], row[None, :n], row[None, [n + column]])
+    row = np.asarray(scale)[..., None, None] * ticks[0].signals[signal][..., None, :]
+    return Block(A, B[..., :, [column]], row[..., :n], row[..., [n + column]], program.states)

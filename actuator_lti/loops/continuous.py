@@ -7,24 +7,66 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.delay_system import DelaySystem
-from actuator_lti.loops.cascade import ERRORS, MEASURED, Cascade
-from actuator_lti.loops.flow import INPUTS, Flow, FlowProgram
+from actuator_lti.drive.wiring import ERRORS, MEASURED, Drive
+from actuator_lti.errors import InputError
+from actuator_lti.loops.blocks import seen
+from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.result import Loop
+from actuator_lti.loops.sampled import whole_path
+
+RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")}
+"""An input and its derivatives, as the ideal form has them."""
 
 
 def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **names: Any) -> DelaySystem:
-    """SISO system from one input of a flow to one of its signals."""
+    """SISO system from one input of a flow to one of its signals, of the states that the signal sees."""
     n, k = len(flow.states), len(flow.delays_s)
-    column = n + k + INPUTS.index(source)
     row = scale * flow.signals[signal]
-    x, z, u = slice(0, n), slice(n, n + k), [column]
-    dx, y, v = flow.rates, row[None, :], flow.delayed
+    every = np.vstack([flow.rates, flow.delayed])
+    used = seen(every[:, : n + k] != 0, row[: n + k] != 0)
+    x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
+    u = [n + k + SOURCES.index(source)]
+    dx, v, y = every[x], every[z], row[None, :]
+    if len(x):
+        names["states"] = [flow.states[i].replace(".", "_") for i in x]
     return DelaySystem(
         *(dx[:, x], dx[:, u], dx[:, z]),
         *(y[:, x], v[:, x], y[:, u], y[:, z], v[:, u], v[:, z]),
-        flow.delays_s,
+        flow.delays_s[z - n],
         **names,
     )
+
+
+def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[DelaySystem]:
+    """The system from an input, and from its derivatives where the flow has them (ideal form)."""
+    found = [delay_system(flow, name, signal, scale) for name in RATES.get(source, (source,))]
+    while len(found) > 1 and not (np.any(found[-1].B1) or np.any(found[-1].D11)):
+        found.pop()
+    return found
+
+
+def joined(parts: list[DelaySystem]) -> DelaySystem:
+    """``sum_j s^j G_j`` as one proper system: s (s I - A)^-1 B is B + (s I - A)^-1 A B.
+
+    Raises
+    ------
+    InputError
+        Where it is not proper, as with a derivative without a filter.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    first = parts[0]
+    A, C = first.A, first.C1
+    B, D = np.zeros_like(first.B1), [np.zeros((1, 1)) for _ in parts]
+    for j, part in enumerate(parts):
+        power = part.B1
+        for below in range(j):
+            D[j - 1 - below] = D[j - 1 - below] + C @ power
+            power = A @ power
+        B, D[j] = B + power, D[j] + part.D11
+    if any(np.any(np.abs(more) > 1e-12) for more in D[1:]):
+        raise InputError("form = 'ideal': a derivative without a filter is no proper system; give it a time")
+    return DelaySystem(A, B, [], C, [], D[0], [], [], [], [], states=first.state_labels)
 
 
 def finished(system: DelaySystem, **names: Any) -> Any:
@@ -33,7 +75,7 @@ def finished(system: DelaySystem, **names: Any) -> Any:
     return system.to_state_space() if system.delay_free else system
 
 
-def _loop(wired: Cascade, loop: DelaySystem, name: str, point: str, signals: tuple[str, str]) -> Loop:
+def _loop(wired: Drive, loop: DelaySystem, name: str, point: str, signals: tuple[str, str]) -> Loop:
     error, measured = signals
     label, unit = name.replace(" ", "_"), wired.unit(error)
     one = DelaySystem.from_system(1.0)
@@ -53,44 +95,40 @@ def _loop(wired: Cascade, loop: DelaySystem, name: str, point: str, signals: tup
     )
 
 
-def stage_loop(wired: Cascade, stage: str, delays: str, opened: tuple[str, ...] = ()) -> Loop:
-    """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent."""
-    flow = FlowProgram(wired, stage, ERRORS[stage], delays, opened).flow()
-    loop = delay_system(flow, "cut", MEASURED[stage])
+def stage_system(
+    wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()
+) -> DelaySystem:
+    """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent."""
+    flow = FlowProgram(wired, stage, ERRORS[stage], opened, delays).flow()
+    measured = "output" if stage == "position" else MEASURED[stage]
+    return joined(systems(flow, "cut", measured, wired.ratio if stage == "position" else 1.0))
+
+
+def stage_loop(wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
+    """The loop of a stage, see `stage_system`."""
+    loop = stage_system(wired, stage, delays, opened)
     return _loop(wired, loop, stage, wired.target[stage], (ERRORS[stage], MEASURED[stage]))
 
 
-def point_loop(wired: Cascade, point: str, delays: str) -> Loop:
+def point_loop(wired: Drive, point: str, delays: frozenset[str]) -> Loop:
     """The loop seen at a break point with all other loops closed."""
-    flow = FlowProgram(wired, wired.stages[-1], point, delays).flow()
-    loop = delay_system(flow, "cut", point, scale=-1.0)
+    flow = FlowProgram(wired, wired.outermost, point, (), delays).flow()
+    loop = joined(systems(flow, "cut", point, scale=-1.0))
     return _loop(wired, loop, f"at {point}", point, (point, f"{point}_returned"))
 
 
-def feedforward_rate(wired: Cascade, delays: str, s: np.ndarray) -> np.ndarray:
-    """What the feed-forward takes for the derivative of the command: s, or with delays the controller's own.
-
-    With delays it is the backward difference over the position period, (1 - exp(-s T))/T, as in the tick.
-    """
-    T = wired.period_s("position")
-    return s if delays == "none" else -np.expm1(-s * T) / T
+def _whole(wired: Drive, delays: frozenset[str]) -> Flow:
+    return FlowProgram(wired, wired.outermost, None, (), delays).flow()
 
 
-def reference_to_output(wired: Cascade, delays: str) -> Any:
-    """Command at the output shaft to output angle, with the feed-forward on the derivative of the command.
+def reference_to_output(wired: Drive, delays: frozenset[str]) -> Any:
+    """Command to what the outermost stage moves, its feed-forward included."""
+    source, signal, _, label = whole_path(wired)
+    total = joined(systems(_whole(wired, delays), "ref", signal))
+    return finished(total, name="reference_to_output", inputs=[source], outputs=[label])
 
-    Ideal form: the exact derivative (with x' = x - B_rate r the command itself remains as input); with
-    delays see `feedforward_rate`, its delay kept exactly.
-    """
-    flow = FlowProgram(wired, "position", None, delays).flow()
-    system = delay_system(flow, "ref", "th", scale=1 / wired.ratio)
-    rate = delay_system(flow, "ref_rate", "th", scale=1 / wired.ratio)
-    if wired.design.controller.position_loop.feedforward == 0.0:
-        total = system
-    elif system.delay_free:
-        B, D = system.B1 + system.A @ rate.B1, system.D11 + system.C1 @ rate.B1
-        total = DelaySystem(system.A, B, [], system.C1, [], D, [], [], [], [])
-    else:
-        T = wired.period_s("position")
-        total = system + rate * ((DelaySystem.from_system(1.0) - DelaySystem.delay(T)) / T)
-    return finished(total, name="reference_to_output", inputs=["th_ref"], outputs=["output_angle"])
+
+def moment_to_output(wired: Drive, delays: frozenset[str]) -> Any:
+    """Moment on the output shaft to the output angle, all loops closed."""
+    system = delay_system(_whole(wired, delays), "moment", "output_angle")
+    return finished(system, name="moment_to_output", inputs=["moment"], outputs=["output_angle"])

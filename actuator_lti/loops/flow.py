@@ -1,34 +1,40 @@
-"""The cascade in continuous time, with or without delays, and with a loop cut anywhere.
+"""The walk in continuous time, with or without delays, and with a loop cut anywhere.
 
 Which loop carries which delay. A reference r that is updated every n ticks and used by a loop of n' ticks
 (n a multiple of n') waits 0, n', ..., n - n' ticks until it is used: (n - n') Ts/2 on average. The voltage is
 held for one tick after the computing delay: d + Ts/2. Along the path of a loop of period T these add up to
 d + T/2, as model.md section 3 has it, and nothing is counted twice: with equal rates only the voltage is
 held. A difference speed over m velocity periods T is the mean over m T, that is m T/2 old. The measurement
-filter is the lag 1/(T_F s + 1).
+filter is the lag 1/(T_F s + 1). A derivative that the controller takes is the difference over its period, its
+delay kept exactly; in the ideal form it is the derivative.
 
 What remains between this form and the sampled one is of order Ts: the digital PI is
-Kp (1 + 1/(Tn s)) + Kp T/(2 Tn) + O(s T^2), and holds and differences also lose some gain.
+Kp (1 + 1/(Tn s)) + Kp T/(2 Tn) + O(s T^2), the tracking loop leads by T/2, a moment that follows the output
+is held, and holds and differences also lose some gain.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.loops.cascade import ERRORS, Cascade
+from actuator_lti.drive.blocks import Block
+from actuator_lti.errors import InputError
+from actuator_lti.loops.rows import Row, table, total
+from actuator_lti.loops.walk import INPUTS, Program, Walk
 
-INPUTS = ("ref", "ref_rate", "torque", "cut")
+ALL = frozenset({"hold", "measurement", "computing"})
+SOURCES = (*INPUTS, "ref_rate", "ref_rate_rate", "cut_rate")
+"""Inputs of a flow: those of a program, and the derivatives of the command and of the cut's input."""
 
 
 @dataclass(frozen=True)
 class Flow:
     """``dx = rates (x, z, v), q = delayed (x, z, v), z_k(t) = q_k(t - delays[k])``; signals as such rows.
 
-    v = (ref, ref_rate, torque, cut): the reference of the outermost stage (``ref`` of the position at the
-    output shaft, ``ref_rate`` its derivative), a torque at the motor, the input at the cut.
+    v in the order of `SOURCES`; the derivatives occur in the ideal form only.
     """
 
     states: tuple[str, ...]
@@ -39,140 +45,113 @@ class Flow:
 
 
 @dataclass(frozen=True)
-class FlowProgram:
-    """The linear drive in continuous time, up to a stage, perhaps with one signal cut (as `TickProgram`).
+class FlowProgram(Program):
+    """The linear drive in continuous time (see `Program`).
 
     Attributes
     ----------
-    delays : {"all", "none", "no computing", "no computing, no measurement"}
-        Which delays are kept: all of them; none (form ``ideal``); all but the computing delay; the holds only
-        (for the delay budget).
-    opened : tuple of str
-        Stages whose feedback is taken away; their controllers stay in the path.
+    delays : frozenset of str
+        Which delays are kept, of `ALL`: none is the form ``ideal``; some, for the delay budget.
     """
 
-    cascade: Cascade
-    outer: str
-    cut: str | None = None
-    delays: str = "all"
-    opened: tuple[str, ...] = ()
-
-    @cached_property
-    def stages(self) -> tuple[str, ...]:
-        """Stages that run, innermost first."""
-        names = self.cascade.stages
-        return names[: names.index(self.outer) + 1]
-
-    @property
-    def measures_speed(self) -> bool:
-        """Whether the velocity feedback is there."""
-        return "velocity" in self.stages and "velocity" not in self.opened
-
-    @cached_property
-    def delay_table(self) -> dict[str, float]:
-        """Delay in s of each place that has one: ``u``, ``i_ref``, ``w_ref`` and ``speed``."""
-        if self.delays == "none":
-            return {}
-        cascade, control, encoder = self.cascade, self.cascade.design.controller, self.cascade.design.encoder
-        inner, table = 1, {}
-        for stage in self.stages:
-            table[cascade.target[stage]] = (cascade.interval[stage] - inner) * cascade.tick_s / 2
-            inner = cascade.interval[stage]
-        table["u"] = table.get("u", 0.0) + cascade.tick_s / 2
-        if self.delays == "all":
-            table["u"] += control.computing_delay_s
-        if self.measures_speed and encoder.speed == "difference" and "no measurement" not in self.delays:
-            table["speed"] = encoder.difference_samples * cascade.period_s("velocity") / 2
-        return {name: delay for name, delay in table.items() if delay > 0}
-
-    @cached_property
-    def states(self) -> tuple[str, ...]:
-        """Plant states, integrals of the controllers, measurement filter."""
-        cascade, encoder = self.cascade, self.cascade.design.encoder
-        needs_angle = self.outer == "position" or cascade.plant.stiffness_Nm_rad != 0.0
-        names = [s for s in cascade.plant.states if s != "th" or needs_angle]
-        names += [f"I_{stage}" for stage in self.stages if cascade.pi(stage).integral_time_s is not None]
-        if self.measures_speed and encoder.filter_time_s > 0:
-            names.append("filter")
-        return tuple(names)
+    delays: frozenset[str] = ALL
 
     def flow(self) -> Flow:
-        """Run the program once on rows."""
-        return _Run(self).finish()
+        """Walk once."""
+        return FlowWalk(self).finish()
 
 
-class _Run:
+class FlowWalk(Walk):
+    """The program in continuous time; ``rate`` holds the derivatives of the states."""
+
     def __init__(self, program: FlowProgram) -> None:
-        self.program, self.cascade = program, program.cascade
-        waits = (*(f"z:{name}" for name in program.delay_table),)
-        names = (*program.states, *waits, *(f"in:{name}" for name in INPUTS))
-        self.row = dict(zip(names, np.eye(len(names)), strict=True))
-        self.rate: dict[str, np.ndarray] = {}
-        self.waiting: dict[str, np.ndarray] = {}
-        self.signals: dict[str, np.ndarray] = {}
+        super().__init__(program)
+        self.delays = program.delays
+        self.rate: dict[str, Row] = {}
+        self.delay: dict[str, float] = {}
+        self.waiting: dict[str, Row] = {}
+        self.flow_plant()
+        self.drive_plant(self.controllers())
 
-    def at_cut(self, name: str, value: np.ndarray) -> np.ndarray:
-        self.signals[name] = value
-        return self.row["in:cut"] if self.program.cut == name else value
+    def state(self, name: str) -> Row:
+        """A state."""
+        self.rate.setdefault(name, Row())
+        return Row.of(name)
 
-    def after_delay(self, name: str, value: np.ndarray) -> np.ndarray:
-        if name not in self.program.delay_table:
+    def updates(self, every: int) -> bool:
+        """Always."""
+        return True
+
+    def late(self, name: str, value: Row, delay_s: float) -> Row:
+        """A value as it was some time ago."""
+        if not delay_s > 0:
             return value
-        self.waiting[name] = value
-        return self.row[f"z:{name}"]
+        self.delay[name], self.waiting[name] = delay_s, value
+        return Row.of(f"z:{name}")
 
-    def publish(self, stage: str, value: np.ndarray) -> np.ndarray:
-        target = self.cascade.target[stage]
-        return self.after_delay(target, self.at_cut(target, value))
+    def held(self, name: str, value: Row | None, made: int, used: int) -> Row:
+        """Late by the mean waiting time; the voltage by its own hold and the computing delay as well."""
+        assert value is not None
+        delay = (made - used) * self.drive.tick_s / 2 if "hold" in self.delays else 0.0
+        if name == "u":
+            delay += self.drive.tick_s / 2 if "hold" in self.delays else 0.0
+            delay += self.control.computing_delay_s if "computing" in self.delays else 0.0
+        return self.late(name, value, delay)
 
-    def position(self) -> np.ndarray:
-        cascade, position = self.cascade, self.cascade.design.controller.position_loop
-        fed_back = cascade.ratio * self.at_cut("output", self.row["th"] / cascade.ratio)
-        value = position.gain * self.at_cut("e_th", cascade.ratio * self.row["in:ref"] - fed_back)
-        value = value + position.feedforward * cascade.ratio * self.row["in:ref_rate"]
-        self.signals["w_cmd"] = value
-        return value
+    def apply(self, name: str, block: Block, value: Row) -> Row:
+        """The continuous face."""
+        face = block.continuous
+        names = [f"{name}.{k}" for k in range(len(face.B))]
+        x = [self.state(each) for each in names]
+        for each, row, gain in zip(names, face.A, face.B, strict=True):
+            self.rate[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
+        return total(c * s for c, s in zip(face.C, x, strict=True)) + face.D * value
 
-    def measured_speed(self) -> np.ndarray:
-        speed = self.after_delay("speed", self.row["w"])
-        if "filter" in self.program.states:
-            self.rate["filter"] = (speed - self.row["filter"]) / self.cascade.design.encoder.filter_time_s
-            speed = self.row["filter"]
-        self.signals["w_meas"] = speed
-        return speed
+    def derivative(self, name: str, value: Row, period_s: Any) -> Row:
+        """The difference over the period; ideal: the derivative, by the chain rule."""
+        if self.delays:
+            return (value - self.late(f"{name}_prev", value, period_s)) / period_s
+        return total(gain * self.derivative_of(source) for source, gain in value.terms.items())
 
-    def pi(self, stage: str, error: np.ndarray) -> np.ndarray:
-        law, integral = self.cascade.pi(stage), f"I_{stage}"
-        error = self.at_cut(ERRORS[stage], error)
-        if integral not in self.program.states:
-            return law.gain * error
-        self.rate[integral] = law.integral_rate_s * error
-        return law.gain * error + self.row[integral]
+    def derivative_of(self, name: str) -> Row:
+        """Derivative of a state or an input."""
+        if name in self.rate and name not in ("i", "w", "W"):
+            return self.rate[name]
+        if f"{name}_rate" in SOURCES:
+            return Row.of(f"{name}_rate")
+        raise InputError(f"form = 'ideal': no derivative of {name}; give the derivative a filter time")
 
-    def controllers(self) -> np.ndarray:
-        reference = self.row["in:ref"]
-        if "position" in self.program.stages:
-            reference = self.publish("position", self.position())
-        if "velocity" in self.program.stages:
-            error = reference - self.measured_speed() if self.program.measures_speed else reference
-            reference = self.publish("velocity", self.pi("velocity", error))
-        if "current" in self.program.stages:
-            error = reference if "current" in self.program.opened else reference - self.row["i"]
-            reference = self.publish("current", self.pi("current", error))
-        return reference
+    def estimated(self, block: Block, speed: Row, angle: Row) -> Row:
+        """From the speed itself, as late as the estimate."""
+        age = block.age_s if "measurement" in self.delays else 0.0
+        return self.late("speed", self.apply("estimate", block, speed), age)
+
+    def flow_plant(self) -> None:
+        """The plant left to itself."""
+        plant = self.drive.plant
+        for r, name in enumerate(plant.states):
+            own = (float(plant.A[r, c]) * Row.of(s) for c, s in enumerate(plant.states))
+            self.rate[name] = total(own)
+
+    def drive_plant(self, u: Row) -> None:
+        """What acts on the plant."""
+        plant = self.drive.plant
+        self.signals.setdefault("u", u)
+        moment = Row.of("moment")
+        if plant.stiffness_Nm_rad:
+            moment = moment + plant.stiffness_Nm_rad * self.signals["output_angle"]
+        for r, name in enumerate(plant.states):
+            acting = ((plant.B_u, u), (plant.B_T, Row.of("torque")), (plant.B_M, moment))
+            self.rate[name] += total(float(B[r]) * row for B, row in acting)
 
     def finish(self) -> Flow:
-        plant, program = self.cascade.plant, self.program
-        self.signals |= {name: self.row[name] for name in plant.states if name in self.row}
-        u, torque = self.controllers(), self.row["in:torque"]
-        if plant.stiffness_Nm_rad:
-            torque = torque + plant.stiffness_Nm_rad * self.row["th"]
-        for r, name in enumerate(plant.states):
-            if name in program.states:
-                rate = plant.B_u[r] * u + plant.B_T[r] * torque
-                known = [(c, s) for c, s in enumerate(plant.states) if s in self.row]
-                self.rate[name] = rate + sum((plant.A[r, c] * self.row[s] for c, s in known), 0 * u)
-        width = len(u)
-        rates = np.array([self.rate[name] for name in program.states]).reshape(-1, width)
-        waits = np.array([self.waiting[name] for name in program.delay_table]).reshape(-1, width)
-        return Flow(program.states, np.array(list(program.delay_table.values())), rates, waits, self.signals)
+        """Matrices over all states that there are."""
+        states, waits = tuple(self.rate), tuple(self.delay)
+        names = (*states, *(f"z:{name}" for name in waits), *SOURCES)
+        return Flow(
+            states,
+            np.array([self.delay[name] for name in waits]),
+            table(self.rate.values(), names),
+            table([self.waiting[name] for name in waits], names),
+            {name: table([row], names)[0] for name, row in self.signals.items()},
+        )

@@ -6,28 +6,27 @@ from collections.abc import Callable
 
 import numpy as np
 
+from actuator_lti.drive.wiring import Drive
 from actuator_lti.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.blocks import compose
-from actuator_lti.loops.cascade import Cascade
-from actuator_lti.loops.continuous import delay_system, feedforward_rate
+from actuator_lti.loops.continuous import systems
 from actuator_lti.loops.flow import FlowProgram
 from actuator_lti.loops.tick import TickProgram
 
 Response = Callable[[np.ndarray], np.ndarray]
 
 
-def sampled_limiters(wired: Cascade) -> dict[str, LimiterPath]:
+def sampled_limiters(wired: Drive) -> dict[str, LimiterPath]:
     """Exact: the quantity at every tick where it is updated, a row each.
 
     A sinusoid passes every phase of the samples, so the peak of the samples is the magnitude of the row.
     """
-    program = TickProgram(wired, "position")
+    program = TickProgram(wired, wired.outermost)
     ticks = [program.tick(k) for k in range(program.ticks)]
-    n, period = len(program.states), wired.period_s("position")
+    n, period = len(program.states), program.ticks * wired.tick_s
     A, B = compose(ticks)
 
-    def evaluate(signal: str, kind: str) -> Response:
-        every = wired.interval[wired.producer(signal)]
+    def evaluate(signal: str, every: int, rate: bool) -> Response:
         rows = []
         for j in range(0, program.ticks, every):
             before = compose(ticks[:j]) if j else (np.eye(n), np.zeros_like(B))
@@ -39,24 +38,24 @@ def sampled_limiters(wired: Cascade) -> dict[str, LimiterPath]:
             z = np.exp(1j * omega * period)
             x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, [0]], (len(z), n, 1)))
             values = table[:, :n] @ x[:, :, 0].T + table[:, [n]]
-            return values * (-np.expm1(-1j * omega * period) / period) if kind == "rate" else values
+            return values * (-np.expm1(-1j * omega * period) / period) if rate else values
 
         return response
 
     return limiter_paths(wired, evaluate, np.pi / period)
 
 
-def continuous_limiters(wired: Cascade, delays: str) -> dict[str, LimiterPath]:
+def continuous_limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:
     """With exact delays, or ideal; the change of the speed command is taken as its derivative."""
-    flow = FlowProgram(wired, "position", None, delays).flow()
+    flow = FlowProgram(wired, wired.outermost, None, (), delays).flow()
 
-    def evaluate(signal: str, kind: str) -> Response:
-        direct, rate = delay_system(flow, "ref", signal), delay_system(flow, "ref_rate", signal)
+    def evaluate(signal: str, every: int, rate: bool) -> Response:
+        parts = systems(flow, "ref", signal)
 
         def response(omega: np.ndarray) -> np.ndarray:
             s = 1j * omega
-            values = direct(s) + feedforward_rate(wired, delays, s) * rate(s)
-            return np.atleast_2d(s * values if kind == "rate" else values)
+            values = sum((s**j * part(s) for j, part in enumerate(parts)), 0 * s)
+            return np.atleast_2d(s * values if rate else values)
 
         return response
 

@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block, siso
-from actuator_lti.loops.cascade import Cascade, cascade
 from actuator_lti.loops.tick import TickProgram
 
 if TYPE_CHECKING:
@@ -29,24 +29,36 @@ _GAINS = np.geomspace(1.0, 1e4, 401)
 _DELAY_STEPS_A_TICK = 4
 
 
-def point_blocks(wired: Cascade, point: str, outer: str | None = None) -> list[Block]:
-    """The loop cut at a break point, y over e, one block for each update of it within one period."""
-    program = TickProgram(wired, outer or wired.stages[-1], cut=point)
+def phase_blocks(program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0) -> list[Block]:
+    """From an input held `every` ticks to a signal, one block for each such time within one period."""
     ticks = [program.tick(k) for k in range(program.ticks)]
-    n = wired.interval[wired.producer(point)]
-    return [siso(program, ticks[k : k + n], "cut", point, scale=-1.0) for k in range(0, program.ticks, n)]
+    return [
+        siso(program, ticks[k : k + every], source, signal, scale) for k in range(0, program.ticks, every)
+    ]
 
 
-def _cyclic(blocks: Sequence[Block]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def point_blocks(wired: Drive, point: str) -> list[Block]:
+    """The loop cut at a break point, y over e, one block for each update of it within one period."""
+    program = TickProgram(wired, wired.outermost, cut=point)
+    return phase_blocks(program, wired.interval[wired.producer(point)], "cut", point, scale=-1.0)
+
+
+def cyclic(blocks: Sequence[Block]) -> Block:
     """Time-invariant system of the fundamental: state m holds the response seen at phase m."""
-    M, n = len(blocks), blocks[0].A.shape[0]
-    A, B, C = np.zeros((M * n, M * n)), np.zeros((M * n, 1)), np.zeros((1, M * n))
+    if len(blocks) == 1:
+        return blocks[0]
+    M, n = len(blocks), len(blocks[0].states)
+    stack = np.broadcast_shapes(
+        *(each.shape[:-2] for block in blocks for each in (block.A, block.B, block.C))
+    )
+    A, B, C = (np.zeros((*stack, *shape)) for shape in ((M * n, M * n), (M * n, 1), (1, M * n)))
     for m, block in enumerate(blocks):
         after = (m + 1) % M
-        A[after * n : after * n + n, m * n : m * n + n] = block.A
-        B[after * n : after * n + n] = block.B
-        C[:, m * n : m * n + n] = block.C / M
-    return A, B, C
+        A[..., after * n : after * n + n, m * n : m * n + n] = block.A
+        B[..., after * n : after * n + n, :] = block.B
+        C[..., :, m * n : m * n + n] = block.C / M
+    names = tuple(f"{name}[{m}]" for m in range(M) for name in blocks[0].states)
+    return Block(A, B, C, sum((block.D for block in blocks), np.zeros((1, 1))) / M, names)
 
 
 def fundamental(blocks: Sequence[Block]) -> Block:
@@ -56,8 +68,8 @@ def fundamental(blocks: Sequence[Block]) -> Block:
     """
     if len(blocks) == 1:
         return blocks[0].pruned()
-    A, B, C = _cyclic([block.feedback() for block in blocks])
-    return Block(A + B @ C, B, C, np.zeros((1, 1))).pruned()
+    closed = cyclic([block.feedback() for block in blocks])
+    return replace(closed, A=closed.A + closed.B @ closed.C).pruned()
 
 
 @dataclass(frozen=True)
@@ -119,8 +131,7 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
         raise InputError(f"form = {loops.form!r}: exact_margins needs form='sampled'")
     if point not in loops.break_points:
         raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
-    at = (loops.operating_point, loops.load_Nm, loops.speed_amplitude_rad_s, loops.direction, loops.rotor)
-    wired = cascade(loops.design, *at)
+    wired = wire(loops.design, loops.operating)
     blocks = point_blocks(wired, point)
     radius = _radius(blocks, 1.0)
     nan = float("nan")
@@ -132,13 +143,11 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
     return ExactMargins(True, upper, lower, delay, radius)
 
 
-def _delay_border(wired: Cascade, longest_ticks: float) -> float:
-    control, Ts = wired.design.controller, wired.tick_s
+def _delay_border(wired: Drive, longest_ticks: float) -> float:
+    Ts = wired.tick_s
 
     def excess(ticks: float) -> float:
-        slower = replace(control, computing_delay_s=control.computing_delay_s + ticks * Ts)
-        later = replace(wired, design=replace(wired.design, controller=slower))
-        return _radius(point_blocks(later, "u"), 1.0) - 1
+        return _radius(point_blocks(wired.later(ticks * Ts), "u"), 1.0) - 1
 
     grid = np.arange(0, longest_ticks, 1 / _DELAY_STEPS_A_TICK)
     return _first_border(excess, list(grid), float("inf")) * Ts

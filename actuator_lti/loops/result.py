@@ -11,9 +11,9 @@ InnerLoops = Literal["closed", "open"]
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from actuator_lti.drive.operating import Operating
     from actuator_lti.limiters import LimiterPath
     from actuator_lti.loops.simulation import TickSystem
-    from actuator_lti.plant import OperatingPoint, RotorState
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,10 +72,14 @@ class Loops:
         loops closed. ``"output"`` is the angle fed back to the position controller (output shaft); a speed
         estimated from the angle stays closed.
     limiters : mapping of str to LimiterPath
-        ``"speed"``, ``"acceleration"``, ``"current"``, ``"voltage"``: from the command at the output shaft to
-        what each limiter sees.
+        By the names of `actuator_lti.drive.signals.LIMITERS`, as far as they exist: from the command to what
+        each limiter sees.
     reference_to_output : python-control system or None
-        Command at the output shaft to output angle, feed-forward included.
+        Command at the output shaft to output angle, feed-forward included; of a speed drive the command to
+        the motor's speed, of a torque drive to its current, of a voltage drive to the motor's speed.
+    moment_to_output : python-control system or None
+        Moment on the output shaft, held over every tick, to the output angle, all loops closed: the
+        compliance; its inverse is the dynamic stiffness.
     tick_system : TickSystem or None
         The whole sampled closed loop, tick by tick (form ``"sampled"``).
     period_s : float or None
@@ -84,11 +88,7 @@ class Loops:
 
     design: Design
     form: Form
-    operating_point: OperatingPoint
-    load_Nm: float
-    speed_amplitude_rad_s: float | None
-    direction: int
-    rotor: RotorState
+    operating: Operating
     inner_loops: InnerLoops
     current: Loop | None
     velocity: Loop | None
@@ -96,8 +96,19 @@ class Loops:
     break_points: Mapping[str, Loop]
     limiters: Mapping[str, LimiterPath]
     reference_to_output: Any | None
+    moment_to_output: Any | None
     tick_system: TickSystem | None
     period_s: float | None
+
+    @property
+    def operating_point(self) -> str:
+        """Name of the operating point, see `actuator_lti.drive.operating.Operating`."""
+        return self.operating.point
+
+    @property
+    def load_Nm(self) -> float:
+        """Hinge moment at the output shaft."""
+        return self.operating.load_Nm
 
     @property
     def present(self) -> dict[str, Loop]:
@@ -107,5 +118,5 @@ class Loops:
 
     def __repr__(self) -> str:
         names = ", ".join(self.present)
-        where = f"{self.operating_point}, {self.load_Nm:g} N m, rotor {self.rotor}"
+        where = f"{self.operating_point}, {self.load_Nm:g} N m, rotor {self.operating.rotor}"
         return f"Loops({self.design.name}: {names}; {self.form}, {where})"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from actuator_lti.loops.blocks import Block, siso
-from actuator_lti.loops.cascade import ERRORS, MEASURED, Cascade
-from actuator_lti.loops.periodic import fundamental, point_blocks
+from actuator_lti.drive.wiring import COMMANDS, ERRORS, MEASURED, Drive
+from actuator_lti.loops.blocks import Block
+from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
 from actuator_lti.loops.tick import TickProgram
@@ -19,13 +19,14 @@ def to_control(block: Block, period_s: float, name: str, source: str, signal: st
     """A named python-control system of a block."""
     import control
 
-    return control.ss(
-        block.A, block.B, block.C, block.D, period_s, inputs=[source], outputs=[signal], name=name
-    )
+    names = {"inputs": [source], "outputs": [signal], "name": name}
+    if block.states:
+        names["states"] = [state.replace(".", "_") for state in block.states]
+    return control.ss(block.A, block.B, block.C, block.D, period_s, remove_useless_states=False, **names)
 
 
 def _loop(
-    wired: Cascade, block: Block, name: str, point: str, signals: tuple[str, str], periodic: bool
+    wired: Drive, block: Block, name: str, point: str, signals: tuple[str, str], periodic: bool
 ) -> Loop:
     period = wired.period_s(wired.producer(point))
     error, measured = signals
@@ -44,15 +45,25 @@ def _loop(
     )
 
 
-def stage_loop(wired: Cascade, stage: str, opened: tuple[str, ...] = ()) -> Loop:
-    """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent."""
+def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list[Block]:
+    """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent.
+
+    One block, or several where a slower speed measurement is fed forward inside (then it is periodic).
+    """
     program = TickProgram(wired, stage, ERRORS[stage], opened)
-    ticks = [program.tick(k) for k in range(program.ticks)]
-    block = siso(program, ticks, "cut", MEASURED[stage]).pruned()
-    return _loop(wired, block, stage, wired.target[stage], (ERRORS[stage], MEASURED[stage]), periodic=False)
+    measured = "output" if stage == "position" else MEASURED[stage]
+    scale = wired.ratio if stage == "position" else 1.0
+    return phase_blocks(program, wired.interval[stage], "cut", measured, scale)
 
 
-def point_loop(wired: Cascade, point: str) -> Loop:
+def stage_loop(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Loop:
+    """The loop of a stage, see `stage_blocks`."""
+    blocks = stage_blocks(wired, stage, opened)
+    names = (ERRORS[stage], MEASURED[stage])
+    return _loop(wired, fundamental(blocks), stage, wired.target[stage], names, len(blocks) > 1)
+
+
+def point_loop(wired: Drive, point: str) -> Loop:
     """The loop seen at a break point with all other loops closed."""
     blocks = point_blocks(wired, point)
     return _loop(
@@ -60,16 +71,41 @@ def point_loop(wired: Cascade, point: str) -> Loop:
     )
 
 
-def reference_to_output(wired: Cascade) -> control.StateSpace:
-    """Command at the output shaft to output angle, at the instants of the position loop."""
-    program = TickProgram(wired, "position")
-    ticks = [program.tick(k) for k in range(program.ticks)]
-    block = siso(program, ticks, "ref", "th", scale=1 / wired.ratio).pruned()
-    return to_control(block, wired.period_s("position"), "reference_to_output", "th_ref", "output_angle")
+def reference_to_output(wired: Drive) -> control.StateSpace:
+    """Command to what the outermost stage moves, at its instants (see `Loops.reference_to_output`)."""
+    source, signal, every, label = whole_path(wired)
+    block = fundamental_path(TickProgram(wired, wired.outermost), every, "ref", signal)
+    return to_control(block, every * wired.tick_s, "reference_to_output", source, label)
 
 
-def tick_system(wired: Cascade) -> TickSystem:
+def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:
+    """From an input held `every` ticks to a signal; of a periodic drive the fundamental."""
+    return cyclic(phase_blocks(program, every, source, signal)).pruned()
+
+
+def whole_path(wired: Drive) -> tuple[str, str, int, str]:
+    """Command, controlled signal, ticks between two commands, and name of the output."""
+    stage = wired.outermost
+    signal = {"position": "output_angle", "velocity": "w", "current": "i"}.get(
+        stage, "w" if "w" in wired.plant.states else "i"
+    )
+    label = "output_angle" if stage == "position" else signal
+    return COMMANDS[stage], signal, wired.interval.get(stage, 1), label
+
+
+def moment_to_output(wired: Drive) -> control.StateSpace:
+    """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops
+    closed.
+
+    Its inverse is the dynamic stiffness (model.md section 9). Where the drive has slower stages, the
+    fundamental of the periodic loop.
+    """
+    block = fundamental_path(TickProgram(wired, wired.outermost), 1, "moment", "output_angle")
+    return to_control(block, wired.tick_s, "moment_to_output", "moment", "output_angle")
+
+
+def tick_system(wired: Drive) -> TickSystem:
     """The whole closed loop for the identity of model.md section 4."""
-    program = TickProgram(wired, "position")
+    program = TickProgram(wired, wired.outermost)
     signals = program.tick(0).signals
     return TickSystem(program, tuple(name for name in OUTPUTS if name in signals))

@@ -9,28 +9,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.drive.wiring import COMMANDS
 from actuator_lti.errors import InputError
 from actuator_lti.loops.tick import Tick, TickProgram
 
 if TYPE_CHECKING:
     import control
 
-OUTPUTS = ("th", "w", "i", "u", "i_ref", "w_ref")
+OUTPUTS = ("th", "w", "i", "u", "i_ref", "w_ref", "phi", "W", "T_s", "output_angle")
 
 
 @dataclass(frozen=True)
 class TickSystem:
-    """``x_{k+1} = A_j x_k + B_j [th_ref, T], y_k = C_j x_k + D_j [th_ref, T]``, j = k mod `ticks`.
+    """``x_{k+1} = A_j x_k + B_j v_k, y_k = C_j x_k + D_j v_k``, v = [ref, T, M], j = k mod `ticks`.
 
-    th_ref is the command at the output shaft in rad at t_k, T a torque in N m at the motor shaft that
-    accelerates it, held over the tick (dry friction while w > 0: T = -Tc).  With the feed-forward the command
-    before t_0 counts as 0 unless `initial_state` says otherwise (``ref_prev``, motor side).
+    ref is the command at t_k: of the position at the output shaft (rad), else ``w_ref`` (rad/s at the motor),
+    ``i_ref`` (A) or ``u`` (V); T a torque in N m at the motor shaft that accelerates it, M a moment in N m
+    that pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc; of the
+    load while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
+    `initial_state` says otherwise (``ref_prev``, motor side).
 
     Attributes
     ----------
     program : TickProgram
     outputs : tuple of str
-        Those of ``th, w, i, u, i_ref, w_ref`` that the drive has; motor side, at t_k.
+        Those of `OUTPUTS` that the drive has, at t_k; motor side but for what is behind the coupling.
     """
 
     program: TickProgram
@@ -51,15 +54,18 @@ class TickSystem:
         return [self.program.tick(k) for k in range(self.ticks)]
 
     def matrices(self, phase: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """A, B, C, D of tick ``phase`` (inputs: th_ref, T)."""
+        """A, B, C, D of tick ``phase`` (inputs: ref, T, M)."""
         tick, n = self._phases[phase % self.ticks], len(self.states)
         rows = np.array([tick.signals[name] for name in self.outputs])
-        return tick.A, tick.B[:, :2], rows[:, :n], rows[:, n : n + 2]
+        return tick.A, tick.B[:, :3], rows[:, :n], rows[:, n : n + 3]
 
     def initial_state(self, values: Mapping[str, float] | None = None) -> np.ndarray:
-        """State vector with some states set by name (the others 0)."""
-        x = np.zeros(len(self.states))
-        for name, value in (values or {}).items():
+        """State vector with some states set by name (the others 0); ``phi`` instead of ``twist`` will do."""
+        x, given = np.zeros(len(self.states)), dict(values or {})
+        if "phi" in given and "twist" in self.states:
+            N_c = self.program.drive.design.ratio_to_coupling
+            given["twist"] = given.get("th", 0.0) / N_c - given.pop("phi")
+        for name, value in given.items():
             if name not in self.states:
                 raise InputError(f"state {name!r}: one of {', '.join(self.states)}")
             x[self.states.index(name)] = value
@@ -70,15 +76,16 @@ class TickSystem:
         reference_rad: np.ndarray,
         torque_Nm: np.ndarray | float = 0.0,
         initial: np.ndarray | None = None,
+        moment_Nm: np.ndarray | float = 0.0,
     ) -> dict[str, np.ndarray]:
         """Run the recursion from t_0.
 
         Parameters
         ----------
         reference_rad : ndarray, shape (K,)
-            Command at the output shaft at t_k (read only where the position loop updates).
-        torque_Nm : float or ndarray, shape (K,)
-            Torque at the motor shaft, accelerating.
+            Command at t_k in its own unit (read only where the outermost loop updates).
+        torque_Nm, moment_Nm : float or ndarray, shape (K,)
+            Torque at the motor shaft, accelerating; moment on the output shaft, pushing forward.
         initial : ndarray, optional
             State at t_0, see `initial_state`.
 
@@ -88,7 +95,8 @@ class TickSystem:
             `outputs` at t_k.
         """
         reference = np.asarray(reference_rad, dtype=float)
-        v = np.column_stack([reference, np.broadcast_to(torque_Nm, reference.shape)])
+        given = (torque_Nm, moment_Nm)
+        v = np.column_stack([reference, *(np.broadcast_to(each, reference.shape) for each in given)])
         phases = [self.matrices(j) for j in range(self.ticks)]
         x = self.initial_state() if initial is None else np.array(initial, dtype=float)
         y = np.empty((len(reference), len(self.outputs)))
@@ -99,14 +107,14 @@ class TickSystem:
         return {name: y[:, r] for r, name in enumerate(self.outputs)}
 
     def lifted(self) -> control.StateSpace:
-        """The same over a whole position period n_p Ts, with th_ref and T held over it.
+        """The same over a whole position period n_p Ts, with its inputs held over it.
 
         Outputs are those of every tick in the period, named ``th[0] .. th[n_p-1], w[0], ...``; for n_p = 1
         plain ``th``, ``w``, ...  Good for `control.forced_response`.
         """
         import control
 
-        A, B = np.eye(len(self.states)), np.zeros((len(self.states), 2))
+        A, B = np.eye(len(self.states)), np.zeros((len(self.states), 3))
         C, D, labels = [], [], []
         for j in range(self.ticks):
             A_j, B_j, C_j, D_j = self.matrices(j)
@@ -114,14 +122,14 @@ class TickSystem:
             D.append(C_j @ B + D_j)
             A, B = A_j @ A, A_j @ B + B_j
             labels += [f"{name}[{j}]" if self.ticks > 1 else name for name in self.outputs]
-        period = self.ticks * self.program.cascade.tick_s
+        period = self.ticks * self.program.drive.tick_s
         return control.ss(
             A,
             B,
             np.vstack(C),
             np.vstack(D),
             period,
-            inputs=["th_ref", "torque"],
+            inputs=[COMMANDS[self.program.outer], "torque", "moment"],
             outputs=labels,
-            states=list(self.states),
+            states=[name.replace(".", "_") for name in self.states],
         )

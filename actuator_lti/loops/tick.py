@@ -1,24 +1,26 @@
-"""One controller tick of model.md section 2 as a linear map, with a loop cut anywhere.
+"""The walk in samples: one controller tick of model.md section 2 as a linear map, with a loop cut anywhere.
 
-Every signal is a row vector over (states, inputs) at t_k; running the tick's program once on rows gives
-the state-space matrices.  States: the plant's ``i``, ``w``, ``th``; integrals ``I_current``,
-``I_velocity``; held references ``hold_*`` of slower loops; past inputs ``u1``, ``u2``, ... under a
-delay; ``acc``, ``D1``, ... and ``filter`` of the speed estimate; ``ref_prev`` of the feed-forward.
+Every signal is a row over (states, inputs) at t_k; walking once gives the state-space matrices. States: the
+plant's ``i``, ``w``, ``th``, ``W``, ``twist``; past inputs ``u1``, ``u2``, ... under a delay; a block's own,
+named after its place (``velocity.I``, ``speed.filter``, ``torque1.1``, ``estimate.D1``); held values
+``hold_*`` of slower stages; ``*_prev`` of differences; ``acc``, the angle gained since the last speed
+estimate.
 
-A difference speed is kept as angle gained since the last velocity update (``acc``) and over the
-updates before it (``Dj``), not as stored angles: so the velocity loop has no eigenvalue at 1 that it
-does not see.
+An estimated speed is computed from ``acc`` and not from stored angles: so the velocity loop has no
+eigenvalue at 1 that it does not see.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.loops.cascade import ERRORS, Cascade
-from actuator_lti.sampling import DelayedHold, delayed_hold
+from actuator_lti.drive.blocks import Block, Face
+from actuator_lti.loops.rows import Row, table, total
+from actuator_lti.loops.walk import INPUTS, Program, Walk
 
 
 @dataclass(frozen=True)
@@ -31,184 +33,144 @@ class Tick:
 
 
 @dataclass(frozen=True)
-class TickProgram:
-    """The linear drive, tick by tick, up to a stage, perhaps with one signal cut.
-
-    Attributes
-    ----------
-    cascade : Cascade
-    outer : str
-        Outermost stage that runs; the reference of that stage is an input (``th_ref`` at the output shaft).
-    cut : str or None
-        A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``)
-        that is replaced by the input ``cut`` where it is updated; what arrives is the signal of that
-        name.
-    opened : tuple of str
-        Stages whose feedback is taken away; their controllers stay in the path.
-    """
-
-    cascade: Cascade
-    outer: str
-    cut: str | None = None
-    opened: tuple[str, ...] = ()
+class TickProgram(Program):
+    """The linear drive, tick by tick (see `Program`)."""
 
     @cached_property
-    def stages(self) -> tuple[str, ...]:
-        """Stages that run, innermost first."""
-        names = self.cascade.stages
-        return names[: names.index(self.outer) + 1]
+    def _walked(self) -> dict[tuple[bool, ...], TickWalk]:
+        """A walk for each kind of tick that occurs."""
+        return {self._kind(k): TickWalk(self, k) for k in reversed(range(self.ticks))}
 
-    @property
-    def ticks(self) -> int:
-        """Ticks after which the program repeats."""
-        return self.cascade.interval[self.outer]
-
-    @cached_property
-    def hold(self) -> DelayedHold:
-        """The sampled plant, angle included; the angle is an exact integrator."""
-        plant, control = self.cascade.plant, self.cascade.design.controller
-        hold = delayed_hold(
-            plant.A, plant.B_u[:, None], plant.B_T[:, None], control.period_s, control.computing_delay_s
-        )
-        if plant.states[-1] == "th":
-            hold.Phi[:, -1] = np.eye(len(plant.states))[-1]
-        return hold
-
-    @cached_property
-    def inputs(self) -> tuple[str, ...]:
-        """``ref`` (of the outer stage), ``torque`` (N m at the motor, accelerating), ``cut``."""
-        return ("ref", "torque", "cut")
+    def _kind(self, k: int) -> tuple[bool, ...]:
+        return tuple(k % every == 0 for every in self.drive.interval.values())
 
     @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states, see the module."""
-        cascade, encoder = self.cascade, self.cascade.design.encoder
-        needs_angle = self.outer == "position" or cascade.plant.stiffness_Nm_rad != 0.0
-        names = [s for s in cascade.plant.states if s != "th" or needs_angle]
-        names += [f"u{j}" for j in range(1, self.hold.memory + 1)]
-        names += [f"I_{stage}" for stage in self.stages if cascade.pi(stage).integral_time_s is not None]
-        names += [f"hold_{cascade.target[stage]}" for stage in self.stages if cascade.interval[stage] > 1]
-        if "velocity" in self.stages and "velocity" not in self.opened:
-            if encoder.speed == "difference":
-                names += ["acc", *(f"D{j}" for j in range(1, encoder.difference_samples))]
-            names += ["filter"] if encoder.filter_time_s > 0 else []
-        if self.outer == "position" and cascade.design.controller.position_loop.feedforward != 0.0:
-            names.append("ref_prev")
-        return tuple(names)
+        names = dict.fromkeys(name for walk in self._walked.values() for name in walk.next)
+        return tuple(sorted(names, key=self._order))
+
+    def _order(self, name: str) -> tuple[int, int]:
+        plant = self.drive.plant.states
+        if name in plant:
+            return 0, plant.index(name)
+        return (1, int(name[1:])) if name[0] == "u" and name[1:].isdigit() else (2, 0)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """``ref`` (of the outer stage), ``torque`` (N m at the motor, accelerating), ``moment``, ``cut``."""
+        return INPUTS
+
+    @cached_property
+    def _ticks(self) -> dict[tuple[bool, ...], Tick]:
+        return {kind: walk.finish(self.states) for kind, walk in self._walked.items()}
 
     def tick(self, k: int) -> Tick:
         """The map of tick k (only k modulo `ticks` matters)."""
-        return _Run(self, k).finish()
+        return self._ticks[self._kind(k % self.ticks)]
 
 
-class _Run:
-    """The program of one tick on row vectors."""
+class TickWalk(Walk):
+    """The program of one tick; ``next`` holds the states after it."""
 
     def __init__(self, program: TickProgram, k: int) -> None:
-        self.program, self.cascade, self.k = program, program.cascade, k
-        names = (*program.states, *(f"in:{name}" for name in program.inputs))
-        self.row = dict(zip(names, np.eye(len(names)), strict=True))
-        self.next = {name: self.row[name] for name in program.states}
-        self.zero = np.zeros(len(names))
-        self.signals: dict[str, np.ndarray] = {}
+        super().__init__(program)
+        self.k = k
+        self.next: dict[str, Row] = {}
+        self.angle: Row | None = None
+        self.propagate(self.controllers())
 
-    def at_cut(self, name: str, value: np.ndarray) -> np.ndarray:
-        self.signals[name] = value
-        return self.row["in:cut"] if self.program.cut == name else value
+    def state(self, name: str) -> Row:
+        """A state; it stays as it is unless something writes it."""
+        self.next.setdefault(name, Row.of(name))
+        return Row.of(name)
 
-    def publish(self, stage: str, value: np.ndarray | None) -> np.ndarray:
-        """Pass a stage's output on, from its hold where it was not updated in this tick."""
-        target = self.cascade.target[stage]
-        hold = f"hold_{target}"
+    def updates(self, every: int) -> bool:
+        """Whether k is a multiple."""
+        return self.k % every == 0
+
+    def held(self, name: str, value: Row | None, made: int, used: int) -> Row:
+        """Held from one update to the next."""
+        if made == 1:
+            assert value is not None
+            return value
+        kept = self.state(f"hold_{name}")
         if value is None:
-            self.signals[target] = self.row[hold]
-            return self.row[hold]
-        value = self.at_cut(target, value)
-        if hold in self.next:
-            self.next[hold] = value
+            return kept
+        self.next[f"hold_{name}"] = value
         return value
 
-    def position(self) -> np.ndarray | None:
-        cascade, position = self.cascade, self.cascade.design.controller.position_loop
-        reference = cascade.ratio * self.row["in:ref"]
-        fed_back = cascade.ratio * self.at_cut("output", self.row["th"] / cascade.ratio)
-        self.signals["th"] = self.row["th"]
-        if self.k % cascade.interval["position"]:
-            return None
-        value = position.gain * self.at_cut("e_th", reference - fed_back)
-        if "ref_prev" in self.next:
-            change = (reference - self.row["ref_prev"]) / cascade.period_s("position")
-            value = value + position.feedforward * change
-            self.next["ref_prev"] = reference
-        self.signals["w_cmd"] = value
-        return value
+    def apply(self, name: str, block: Block, value: Row) -> Row:
+        """The sampled face."""
+        return self.face(name, block.states, block.sampled, value)
 
-    def measured_speed(self) -> np.ndarray:
-        encoder, T = self.cascade.design.encoder, self.cascade.period_s("velocity")
-        m, speed = encoder.difference_samples, self.row["w"]
-        if encoder.speed == "difference":
-            past = [self.zero, *(self.row[f"D{j}"] for j in range(1, m))]
-            speed = (self.row["acc"] + past[m - 1]) / (m * T)
-            for j in range(1, m):
-                self.next[f"D{j}"] = self.row["acc"] + past[j - 1]
-            self.next["acc"] = self.zero
-        if "filter" in self.next:
-            old = self.row["filter"]
-            speed = old + T / (encoder.filter_time_s + T) * (speed - old)
-            self.next["filter"] = speed
-        return speed
+    def face(self, name: str, states: tuple[str, ...], face: Face, value: Row) -> Row:
+        """Put a face's states on and give its output."""
+        names = [f"{name}.{state}" for state in states]
+        x = [self.state(each) for each in names]
+        for each, row, gain in zip(names, face.A, face.B, strict=True):
+            self.next[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
+        return total(c * s for c, s in zip(face.C, x, strict=True)) + face.D * value
 
-    def pi(self, stage: str, error: np.ndarray) -> np.ndarray:
-        law, integral = self.cascade.pi(stage), f"I_{stage}"
-        error = self.at_cut(ERRORS[stage], error)
-        if integral not in self.next:
-            return law.gain * error
-        self.next[integral] = self.row[integral] + law.integral_step * error
-        return law.gain * error + self.next[integral]
+    def derivative(self, name: str, value: Row, period_s: Any) -> Row:
+        """(x_k - x_{k-1})/T."""
+        before = self.state(f"{name}_prev")
+        self.next[f"{name}_prev"] = value
+        return (value - before) / period_s
 
-    def velocity(self, reference: np.ndarray) -> np.ndarray | None:
-        if self.k % self.cascade.interval["velocity"]:
-            return None
-        if "velocity" in self.program.opened:
-            return self.pi("velocity", reference)
-        self.signals["w_meas"] = self.measured_speed()
-        return self.pi("velocity", reference - self.signals["w_meas"])
+    def estimated(self, block: Block, speed: Row, angle: Row) -> Row:
+        """From the angle gained since the last update."""
+        self.angle = angle
+        gained = self.state("acc")
+        self.next["acc"] = Row()
+        return self.apply("estimate", block, gained)
 
-    def controllers(self) -> np.ndarray:
-        reference, stages = self.row["in:ref"], self.program.stages
-        if "position" in stages:
-            reference = self.publish("position", self.position())
-        if "velocity" in stages:
-            reference = self.publish("velocity", self.velocity(reference))
-        if "current" in stages:
-            error = reference if "current" in self.program.opened else reference - self.row["i"]
-            reference = self.publish("current", self.pi("current", error))
-        return reference
+    def sensed_angle(self) -> Row | None:
+        """The angle whose gain is counted in every tick, also where nothing is estimated now."""
+        if self.angle is None and self.program.measures_speed | self.program.feeds_back_emf:
+            if self.design.encoder.speed == "ideal":
+                return None
+            velocity = self.control.velocity
+            behind = velocity is not None and velocity.sensor == "output"
+            return self.drive.ratio * self.signals["output_angle"] if behind else self.signals["th"]
+        return self.angle
 
-    def propagate(self, u: np.ndarray) -> None:
-        plant, hold = self.cascade.plant, self.program.hold
-        x = [self.row.get(name, self.zero) for name in plant.states]
-        held = [u, *(self.row[f"u{j}"] for j in range(1, hold.memory + 1))]
-        torque = self.row["in:torque"]
-        if plant.stiffness_Nm_rad:
-            torque = torque + plant.stiffness_Nm_rad * self.row["th"]
+    def propagate(self, u: Row) -> None:
+        """The plant over the tick, with the input and its delay line."""
+        plant, hold = self.drive.plant, self.drive.hold
+        self.signals.setdefault("u", u)
+        held = [u, *(self.state(f"u{j}") for j in range(1, hold.memory + 1))]
+        moment = Row.of("moment")
+        if np.any(plant.stiffness_Nm_rad != 0):
+            moment = moment + plant.stiffness_Nm_rad * self.signals["output_angle"]
+        outer = (Row.of("torque"), moment)
+        angle = self.sensed_angle()
+        x = [self.state(name) for name in plant.states]
+        change: dict[str, Row] = {}
         for r, name in enumerate(plant.states):
-            value = sum((hold.Phi[r, c] * x[c] for c in range(len(x))), hold.Gamma_T[r, 0] * torque)
-            value = value + sum(gain[r] * held[j] for j, gain in hold.gains.items())
-            if name in self.next:
-                self.next[name] = value
-            if name == "th" and "acc" in self.next:
-                self.next["acc"] = self.next["acc"] + (value - x[r])
+            rest = total(_nonzero(hold.Gamma_T[..., r, c]) * outer[c] for c in (0, 1))
+            rest += total(_nonzero(gain[..., r]) * held[j] for j, gain in hold.gains.items())
+            own = [hold.Phi[..., r, c] for c in range(len(x))]
+            self.next[name] = rest + total(_nonzero(own[c]) * x[c] for c in range(len(x)))
+            own[r] = own[r] - 1.0  # exactly 0 for the motor's angle
+            change[name] = rest + total(_nonzero(own[c]) * x[c] for c in range(len(x)))
         for j in range(1, hold.memory + 1):
             self.next[f"u{j}"] = held[j - 1]
+        if angle is not None:
+            self.state("acc")
+            self.next["acc"] += total(value * change[name] for name, value in angle.terms.items())
 
-    def finish(self) -> Tick:
-        for name in ("i", "w", "th"):
-            if name in self.row:
-                self.signals[name] = self.row[name]
-        u = self.controllers()
-        self.signals.setdefault("u", u)
-        self.propagate(u)
-        n = len(self.program.states)
-        rows = np.array([self.next[name] for name in self.program.states])
-        return Tick(rows[:, :n], rows[:, n:], self.signals)
+    def finish(self, states: tuple[str, ...]) -> Tick:
+        """Matrices over the states of the whole program."""
+        n, names = len(states), (*states, *INPUTS)
+        rows = table([self.next.get(name, Row.of(name)) for name in states], names)
+        signals = table(self.signals.values(), names)
+        split = {name: signals[..., k, :] for k, name in enumerate(self.signals)}
+        return Tick(rows[..., :n], rows[..., n:], split)
+
+
+def _nonzero(value: Any) -> Any:
+    """A coefficient of the sampled plant; the float 0 where it is zero, so that structure shows."""
+    if np.ndim(value) == 0:
+        return float(value)
+    return value if np.any(value != 0) else 0.0

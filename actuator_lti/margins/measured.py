@@ -1,8 +1,9 @@
-"""Margins from frequency-response data: bounded by neighbouring points, or refused."""
+"""Margins from frequency-response data: each with the range in which it lies."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,120 +11,233 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.extremes import DISK
 from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
+from actuator_lti.margins.measured_data import MeasuredResponse, measured_response
 from actuator_lti.margins.rational import delay_margins
 from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
 
-LARGEST_TURN_DEG = 60.0
-LARGEST_STEP_DB = 10.0
+_MOST_UNRESOLVED = 0.5
+_TOLD = 6
 _NOTES = (
     "measured data: stability cannot be told from them, and outside of their band nothing is known",
-    "each crossing lies between two neighbouring points (bracket_rad_s); the figure between them is "
-    "interpolated, its bounds are ratio_range and deg_range",
+    "each crossing lies between two points (bracket_rad_s); the figure between them is interpolated, it lies "
+    "in ratio_range or deg_range as far as the loop between the points is no more curved than about them",
     "modulus and disk margin are the smallest values at measured points: upper bounds",
 )
+_QUIET = "no noise is given (MeasuredResponse takes it, or coherence or repeats): the ranges leave it out"
 
 
 def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
-    """Margins from `control.FrequencyResponseData`, see `stability_margins`.
+    """Margins from `control.FrequencyResponseData` or `MeasuredResponse`, see `stability_margins`.
+
+    Every value lies in a circle (noise), every interval between two points in a strip about its chord that
+    the second differences nearby allow (see `Bounds`). A crossing is listed where the strips pass the level
+    from one side to the other, with the range of its margin over all places at which they may. Where the
+    phase betrays a resonance between two points, or a pair of crossings cannot be excluded, a note says so.
 
     Raises
     ------
     InputError
-        More than one input or output, fewer than two points, values that are zero or not finite, or
-        neighbouring points so far apart (60 deg, 10 dB) that a crossing between them could not be bounded.
+        More than one input or output, fewer than two points, values that are zero or not finite, or points
+        so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
     """
-    period_s = float(data.dt) if data.dt not in (None, 0, True) else None
-    omega, L = _points(data, delay_s, band_rad_s)
-    _refuse_coarse(omega, L)
-    phase_margins = _phase_margins(omega, L)
+    response = measured_response(data)
+    omega, L, radius = _points(response, band_rad_s)
+    found = bounds(omega, L, radius, delay_s)
+    _refuse_coarse(omega, L, found)
+    L = L * np.exp(-1j * omega * delay_s)
+    phase_margins, grazed = _phase_margins(omega, found)
+    gain_margins, touched = _gain_margins(omega, found)
     distance, alpha = np.abs(1.0 + L), DISK.distance(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
+    noise = f"noise: {response.source}" if radius.any() else _QUIET
     return StabilityMargins(
         stable=None,
         verdict="undecided",
-        gain_margins=_gain_margins(omega, L),
+        gain_margins=gain_margins,
         phase_margins=phase_margins,
-        delay_margins=delay_margins(phase_margins, period_s),
+        delay_margins=delay_margins(phase_margins, response.dt),
         modulus_margin=float(distance[k]),
         modulus_frequency_rad_s=float(omega[k]),
         disk_margin=DiskMargin(float(alpha[j]), float(omega[j])),
-        period_s=period_s,
+        period_s=response.dt,
         delay_s=delay_s,
         band_rad_s=(float(omega[0]), float(omega[-1])),
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
-        notes=_NOTES,
+        notes=(*_NOTES, noise, *_hidden(omega, found), *_lost(omega, found), *grazed, *touched),
     )
 
 
-def _points(data: Any, delay_s: float, band: tuple[float, float] | None) -> tuple[Real, Complex]:
-    if data.ninputs != 1 or data.noutputs != 1:
-        raise InputError(f"a loop has one input and one output; this has {data.ninputs} and {data.noutputs}")
-    omega = np.asarray(data.omega, dtype=float)
-    L = np.asarray(data.frdata, dtype=complex).reshape(-1)
-    order = omega.argsort()
-    omega, L = omega[order], L[order]
+def _points(data: MeasuredResponse, band: tuple[float, float] | None) -> tuple[Real, Complex, Real]:
+    order = data.omega.argsort()
+    omega, L, radius = data.omega[order], data.frdata[order], data.radius[order]
+    keep = omega > 0.0
     if band is not None:
-        inside = (omega >= band[0]) & (omega <= band[1])
-        omega, L = omega[inside], L[inside]
-    positive = omega > 0.0
-    omega, L = omega[positive], L[positive]
+        keep &= (omega >= band[0]) & (omega <= band[1])
+    omega, L, radius = omega[keep], L[keep], radius[keep]
     if omega.size < 2:
         raise InputError("measured data: at least two points above zero frequency are needed")
     if not (np.isfinite(L).all() and np.isfinite(omega).all()) or (L == 0.0).any():
         raise InputError("measured data: every value must be finite and not zero")
     if (np.diff(omega) <= 0.0).any():
         raise InputError("measured data: a frequency is given twice")
-    return omega, L * np.exp(-1j * omega * delay_s)
+    return omega, L, radius
 
 
-def _refuse_coarse(omega: Real, L: Complex) -> None:
-    ratio = L[1:] / L[:-1]
-    turn, step = np.abs(np.degrees(np.angle(ratio))), np.abs(20.0 * np.log10(np.abs(ratio)))
-    bad = np.flatnonzero((turn > LARGEST_TURN_DEG) | (step > LARGEST_STEP_DB))
-    if bad.size:
-        k = int(bad[0])
-        raise InputError(
-            f"measured data are too coarse between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s: "
-            f"{turn[k]:.1f} deg and {step[k]:.1f} dB from point to point (allowed: {LARGEST_TURN_DEG:g} deg, "
-            f"{LARGEST_STEP_DB:g} dB), a crossing in between could not be bounded; measure more points there"
-        )
+def _refuse_coarse(omega: Real, L: Complex, found: Bounds) -> None:
+    if np.count_nonzero(found.unresolved) <= _MOST_UNRESOLVED * found.unresolved.size:
+        return
+    k = int(found.unresolved.argmax())
+    ratio = L[k + 1] / L[k]
+    raise InputError(
+        f"measured data are too coarse: {np.count_nonzero(found.unresolved)} of {found.unresolved.size} "
+        f"intervals turn by more than 60 deg or 10 dB, the first between {omega[k]:.6g} and "
+        f"{omega[k + 1]:.6g} rad/s ({np.degrees(np.angle(ratio)):+.1f} deg, "
+        f"{20.0 * math.log10(abs(ratio)):+.1f} dB); measure more points"
+    )
 
 
-def _gain_margins(omega: Real, L: Complex) -> tuple[GainMargin, ...]:
-    angle = np.angle(-L)
-    out = []
-    near = (angle[1:] * angle[:-1] <= 0.0) & (np.abs(angle[1:] - angle[:-1]) < math.pi)
-    for k in np.flatnonzero(near).tolist():
-        if angle[k] == 0.0 and k > 0:
-            continue  # counted with the interval before
-        t = float(angle[k] / (angle[k] - angle[k + 1])) if angle[k] != angle[k + 1] else 0.0
-        low, high = -np.log(np.abs(L[k])), -np.log(np.abs(L[k + 1]))
-        ends = sorted((math.exp(low), math.exp(high)))
-        ratio = math.exp(low + t * (high - low))
-        out.append(GainMargin(ratio, _between(omega, k, t), False, _bracket(omega, k), (ends[0], ends[1])))
-    return tuple(out)
+@dataclass(frozen=True)
+class _Group:
+    """Neighbouring intervals first ... last in which a level may be passed, each in its part [t0, t1]."""
+
+    first: int
+    last: int
+    t0: Real
+    t1: Real
+
+    def over(self, strip: Strip) -> tuple[float, float]:
+        """Range of another function wherever the level may be passed."""
+        spans = [
+            strip.over(k, float(a), float(b))
+            for k, a, b in zip(range(self.first, self.last + 1), self.t0, self.t1, strict=True)
+        ]
+        return min(low for low, _ in spans), max(high for _, high in spans)
+
+    def text(self, omega: Real) -> str:
+        """Where, in rad/s."""
+        return f"between {omega[self.first]:.6g} and {omega[self.last + 1]:.6g} rad/s"
 
 
-def _phase_margins(omega: Real, L: Complex) -> tuple[PhaseMargin, ...]:
-    gain = np.log(np.abs(L))
-    out = []
-    for k in np.flatnonzero(gain[1:] * gain[:-1] <= 0.0).tolist():
-        if (gain[k] == 0.0 and k > 0) or gain[k] == gain[k + 1]:
+def _groups(strip: Strip, level: float) -> list[_Group]:
+    t0, t1 = strip.meets(level)
+    out: list[_Group] = []
+    start = None
+    for k in range(t0.size + 1):
+        open_here = k < t0.size and t0[k] <= t1[k]
+        joined = open_here and start is not None and t1[k - 1] >= 1.0 and t0[k] <= 0.0
+        if start is not None and not joined:
+            out.append(_Group(start, k - 1, t0[start:k], t1[start:k]))
+            start = None
+        if open_here and start is None:
+            start = k
+    return out
+
+
+def _passed(strip: Strip, level: float, group: _Group) -> tuple[int, float] | None:
+    """Interval and place in it where the level is passed first; ``None``: not surely passed.
+
+    Both ends of the group have to lie off the level: at an edge of the band they may not.
+    """
+    first, last = group.first, group.last
+    sides = [strip.side(first, 0, level), strip.side(last, 1, level)]
+    part = strip.middle[first : last + 2] - level
+    if first == 0 and part[0] == 0.0:
+        sides[0] = -sides[1]
+    if sides[0] * sides[1] >= 0 or part[0] * part[-1] > 0.0 or part[0] == part[-1]:
+        return None
+    k = int(np.flatnonzero((part[:-1] * part[1:] <= 0.0) & (part[:-1] != part[1:]))[0])
+    return first + k, float(part[k] / (part[k] - part[k + 1]))
+
+
+def _phase_margins(omega: Real, found: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
+    out, notes = [], []
+    gain, phase = found.log_gain, found.phase
+    for group in _groups(gain, 0.0):
+        at = _passed(gain, 0.0, group)
+        if at is None:
+            if not found.unresolved[group.first : group.last + 1].all():  # told already
+                notes.append(
+                    f"{group.text(omega)} the gain comes as near to one as it is known: "
+                    "crossings there are neither sure nor excluded"
+                )
             continue
-        t = float(gain[k] / (gain[k] - gain[k + 1]))
-        low = float(np.degrees(np.angle(-L[k])))
-        turn = float(np.degrees(np.angle(L[k + 1] / L[k])))
-        deg = low + t * turn
-        deg -= 360.0 * math.ceil((deg - 180.0) / 360.0)
-        ends = sorted((low, low + turn))
-        out.append(PhaseMargin(deg, _between(omega, k, t), False, _bracket(omega, k), (ends[0], ends[1])))
-    return tuple(out)
+        k, t = at
+        deg = math.degrees(_chord(phase.middle, k, t)) + 180.0
+        turns = 360.0 * math.ceil((deg - 180.0) / 360.0)
+        low, high = (math.degrees(each) + 180.0 - turns for each in group.over(phase))
+        if high - low >= 360.0:
+            low, high = -180.0, 180.0
+        bracket = float(omega[group.first]), float(omega[group.last + 1])
+        out.append(PhaseMargin(deg - turns, _between(omega, k, t), False, bracket, (low, high)))
+    return tuple(out), notes
+
+
+def _gain_margins(omega: Real, found: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
+    out, notes = [], []
+    gain, phase = found.log_gain, found.phase
+    lowest, highest = float(phase.low.min()), float(phase.high.max())
+    for m in range(
+        math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
+    ):
+        level = (2 * m + 1) * math.pi
+        for group in _groups(phase, level):
+            if found.lost[group.first : group.last + 2].any():
+                continue
+            at = _passed(phase, level, group)
+            if at is None:
+                if not found.unresolved[group.first : group.last + 1].all():  # told already
+                    notes.append(
+                        f"{group.text(omega)} the phase comes as near to -180 deg as it is known: "
+                        "crossings there are neither sure nor excluded"
+                    )
+                continue
+            low, high = group.over(gain)
+            ratio = math.exp(-_chord(gain.middle, *at))
+            bracket = float(omega[group.first]), float(omega[group.last + 1])
+            out.append(
+                GainMargin(ratio, _between(omega, *at), False, bracket, (_inverse(high), _inverse(low)))
+            )
+    return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
+
+
+def _inverse(log_gain: float) -> float:
+    return math.exp(-log_gain) if log_gain > -700.0 else math.inf
+
+
+def _hidden(omega: Real, found: Bounds) -> list[str]:
+    """Notes on what lies between two points."""
+    notes = []
+    places = np.flatnonzero(found.unresolved)
+    for k in places[:_TOLD].tolist():
+        deg = math.degrees(found.turn[k])
+        what = "a resonance" if deg < -25.0 else "an antiresonance" if deg > 25.0 else "something steep"
+        if abs(deg) > 140.0:
+            what = "a resonance or an antiresonance"
+        notes.append(
+            f"between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s the phase turns by {deg:+.0f} deg: {what} "
+            "lies between these points; the gain there is not known, crossings are not excluded"
+        )
+    if places.size > _TOLD:
+        notes.append(
+            f"the same in {places.size - _TOLD} more intervals, up to {omega[places[-1] + 1]:.6g} rad/s"
+        )
+    return notes
+
+
+def _lost(omega: Real, found: Bounds) -> list[str]:
+    if not found.lost.any():
+        return []
+    first, count = omega[found.lost.argmax()], np.count_nonzero(found.lost)
+    return [
+        f"{count} values are smaller than their noise, the first at {first:.6g} rad/s: no gain margin there"
+    ]
+
+
+def _chord(y: Real, k: int, t: float) -> float:
+    return float(y[k] + t * (y[k + 1] - y[k]))
 
 
 def _between(omega: Real, k: int, t: float) -> float:
     return float(omega[k] * (omega[k + 1] / omega[k]) ** t)
-
-
-def _bracket(omega: Real, k: int) -> tuple[float, float]:
-    return float(omega[k]), float(omega[k + 1])

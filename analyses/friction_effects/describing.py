@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.loops.cascade import cascade
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 
 POINTS = 36
@@ -83,7 +84,7 @@ def _mean_dry(design: Design, load_Nm: float) -> float:
 def _matrix(design: Design, load_Nm: float, speed: float) -> tuple[np.ndarray, tuple[str, ...], float]:
     """Give the closed loop over one position period, with its states and that period."""
     known: dict[tuple[bool, ...], np.ndarray] = {}
-    wired = cascade(design, "describing-function", load_Nm, speed)
+    wired = wire(design, Operating(point="describing-function", load_Nm=load_Nm, speed_amplitude_rad_s=speed))
     program = TickProgram(wired, "position")
     A = np.eye(len(program.states))
     for k in range(program.ticks):

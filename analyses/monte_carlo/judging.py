@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import DRIVE_QUANTITIES
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import DRIVE_QUANTITIES, QUANTITIES, judged_loops
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -37,9 +37,7 @@ class Judged:
 
 def loops_of(design: Design) -> tuple[str, ...]:
     """Names of the loops that a design has, innermost first."""
-    control = design.controller
-    present = {"current": control.current, "velocity": control.velocity, "position": control.position}
-    return tuple(name for name, loop in present.items() if loop is not None)
+    return tuple(reversed(design.controller.stages))
 
 
 def drive_column(quantity: str, load_Nm: float | None) -> str:
@@ -51,10 +49,9 @@ def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
     """Columns that a requirement reads."""
     if requirement.quantity in DRIVE_QUANTITIES:
         return (drive_column(requirement.quantity, requirement.load_Nm),)
-    wanted = requirement.loop or "position"
-    loops = loops_of(design) if wanted == "every" else (wanted,)
+    loops = judged_loops(requirement.loop, loops_of(design))
     if not set(loops) <= set(loops_of(design)):
-        raise InputError(f"requirement {requirement.id}: the design has no {wanted} loop")
+        raise InputError(f"requirement {requirement.id}: the design has no {requirement.loop} loop")
     return tuple(f"{loop}.{requirement.quantity}" for loop in loops)
 
 
@@ -62,7 +59,7 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     """Value, distance to the limit and verdict of one requirement for every design."""
     names = source_columns(requirement, design)
     values = np.stack([columns[name] for name in names])
-    if requirement.quantity in ("gain_margin", "phase_margin"):
+    if QUANTITIES[requirement.quantity].absolute:
         values = np.abs(values)  # a margin counts in either direction
     low = -np.inf if requirement.minimum is None else requirement.minimum
     high = np.inf if requirement.maximum is None else requirement.maximum

@@ -11,7 +11,9 @@ import numpy as np
 
 from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
+from actuator_lti.bounds import SAMPLES
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
 from analyses.monte_carlo.judging import judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 _WORST_KEPT = 8
-MOST_SAMPLES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,11 @@ class MonteCarloSettings:
     chunk: int = CHUNK
 
     def __post_init__(self) -> None:
-        if not 1 <= self.samples <= MOST_SAMPLES:
-            raise InputError(f"samples = {self.samples}: from 1 to {MOST_SAMPLES}")
+        SAMPLES.check(self.samples)
+        if self.samples < 1:
+            raise InputError(f"samples = {self.samples}: at least 1")
+        if self.seed < 0:
+            raise InputError(f"seed = {self.seed}: 0 or more")
         if not 1 <= self.chunk <= 1_000_000:
             raise InputError(f"chunk = {self.chunk}: from 1 to 1000000")
 
@@ -177,7 +181,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
 
     found = []
     for place, tally in enumerate(tallies):
-        timed = tally.requirement.quantity in ("rise_time", "overshoot", "settling_time")
+        timed = QUANTITIES[tally.requirement.quantity].timed
         quick = replace(task, step=None, time_figures=timed)
         case = worst_case(quick, tally.requirement, np.array([sample for _, sample, _ in tally.worst]))
         name = f"worst-{place + 1:02d}-{slug(tally.requirement.id)}"

@@ -77,10 +77,14 @@ def step_rows(step: StepCheck, population: Population) -> np.ndarray:
 def _put_plant(population: Population, rows: np.ndarray) -> None:
     from nonlinear._kernels import layout as at
 
-    rows[:, at.RATIO] = population.total_ratio
-    rows[:, at.INERTIA] = population.inertia_kgm2
-    rows[:, at.DRY], rows[:, at.DRY_REVERSE] = population.dry_Nm(0.0, 1), population.dry_Nm(0.0, -1)
-    rows[:, at.VISCOUS], rows[:, at.VISCOUS_REVERSE] = population.viscous(1), population.viscous(-1)
+    rows[:, at.RATIO] = population.stacked.total_ratio
+    rows[:, at.INERTIA] = population.stacked.inertia_kgm2
+    rows[:, at.DRY], rows[:, at.DRY_REVERSE] = (
+        population.stacked.friction.dry_Nm(0.0, way) for way in (1, -1)
+    )
+    rows[:, at.VISCOUS], rows[:, at.VISCOUS_REVERSE] = (
+        population.stacked.friction.viscous(way) for way in (1, -1)
+    )
     places = {
         at.RESISTANCE: "motor.resistance", at.INDUCTANCE: "motor.inductance",
         at.BACK_EMF: "motor.back_emf_constant", at.TORQUE_CONSTANT: "motor.torque_constant",

@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.batch import (
-    DRIVE_QUANTITIES,
-    QUANTITIES,
-    UNITS,
     Population,
     drive_figures,
     linear_figures,
@@ -19,6 +16,7 @@ from actuator_lti.batch import (
 )
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from analyses.engine import Arrays
 from analyses.monte_carlo.judging import drive_column, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
@@ -87,8 +85,7 @@ class SampleTask:
 
     @property
     def _quantities(self) -> tuple[str, ...]:
-        time = {"rise_time", "overshoot", "settling_time"}
-        return tuple(q for q in QUANTITIES if self.time_figures or q not in time)
+        return tuple(n for n, q in LOOP_QUANTITIES.items() if self.time_figures or not q.timed)
 
     @cached_property
     def _drive_wanted(self) -> tuple[tuple[str, float], ...]:
@@ -100,10 +97,10 @@ class SampleTask:
     @property
     def units(self) -> dict[str, str]:
         """Columns of figures (without parameters and stability flags) with their units."""
-        units = {f"{loop}.{q}": UNITS[q] for loop in loops_of(self.design) for q in self._quantities}
-        shown = "deg" if self.design.axis == "rotary" else "m"
-        drive = {"output_rate": f"{shown}/s", "motor_current": "A", "acceleration": f"{shown}/s^2"}
-        units |= {drive_column(q, load): drive[q] for q, load in self._drive_wanted}
+        axis = self.design.axis
+        names = self._quantities
+        units = {f"{loop}.{q}": QUANTITIES[q].unit_for(axis) for loop in loops_of(self.design) for q in names}
+        units |= {drive_column(q, load): QUANTITIES[q].unit_for(axis) for q, load in self._drive_wanted}
         if self.step is not None:
             units |= step_units()
         return units

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.static_threshold import stall_torque_Nm
+from actuator_lti.drive.facts import stall_torque_Nm
 
 POINTS = 41
 

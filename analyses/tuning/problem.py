@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import DRIVE_QUANTITIES, QUANTITIES, Population, linear_figures
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
 from analyses.sampling import Factor
 
@@ -25,8 +26,6 @@ GAINS = (
     "control.position.gain",
 )
 MOST_FACTORS = 10
-_SIZE = {"dB": 6.0, "deg": 45.0, "%": 10.0, "1": 0.5}  # what a limit of zero is measured against
-_TIMED = ("rise_time", "overshoot", "settling_time")
 
 
 @dataclass
@@ -104,9 +103,9 @@ class Problem:
         values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(factors)}
         population = Population(self.design, values, count * many)
         self.evaluations += population.count
-        timed = any(r.quantity in _TIMED for r in self.requirements)
+        timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
         linear = linear_figures(population, time_figures=timed, threads=os.cpu_count() or 1)
-        columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in QUANTITIES}
+        columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in LOOP_QUANTITIES}
         columns |= {f"{loop}.stable": linear.stable(loop).astype(float) for loop in linear.loops}
         out = np.empty((population.count, len(self.requirements)))
         radius = np.max([linear.pole_radius(loop) for loop in linear.loops], axis=0)
@@ -122,14 +121,15 @@ class Problem:
         values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(self.factors)}
         population = Population(self.design, values, count * many)
         self.evaluations += population.count
-        linear = linear_figures(population, time_figures=quantity in _TIMED, threads=os.cpu_count() or 1)
+        timed = QUANTITIES[quantity].timed
+        linear = linear_figures(population, time_figures=timed, threads=os.cpu_count() or 1)
         return linear.quantity(quantity, loop).reshape(count, many)
 
 
 def size_of(requirement: Requirement) -> float:
     """What a distance is measured against: the limit itself, or the usual size of such a figure."""
     limit = limit_of(requirement)
-    return abs(limit) if limit else _SIZE.get(requirement.unit, 1.0)
+    return abs(limit) if limit else QUANTITIES[requirement.quantity].size
 
 
 def limit_of(requirement: Requirement) -> float:

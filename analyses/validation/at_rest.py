@@ -126,11 +126,13 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
     answer is the same but for the images of a held signal.
     """
-    from actuator_lti.loops.cascade import cascade
+    from actuator_lti.drive.operating import Operating
+    from actuator_lti.drive.wiring import wire
     from actuator_lti.loops.sampled import reference_to_output
 
     point = "sliding" if speed_rad_s is None else "describing-function"
-    wired = cascade(design, point, load_Nm, speed_rad_s)  # type: ignore[arg-type]
+    at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
+    wired = wire(design, at)
     return linear_response(reference_to_output(wired), frequency_hz)
 
 

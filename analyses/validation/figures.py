@@ -23,6 +23,7 @@ from nonlinear.simulation import run_row
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
 NEAREST = 6  # points of the interpolating polynomial
+SAME = 1e-9  # of log f: points nearer to each other count as one
 STEP_PART = 0.02  # of the room of the signal
 
 
@@ -88,7 +89,7 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
     fine = refined(setup, sweep, _brackets(sweep, dc), settle_ticks)
     f = fine.frequency_hz
     closed = np.abs(fine.closed_loop) / abs(dc)
-    phase = np.degrees(np.unwrap(np.angle(fine.closed_loop * np.sign(dc))))
+    phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
     crossover, margin = _phase_margin(fine)
     peak_t, at_t = maximum(f, closed)
     peak_s, _ = maximum(f, np.abs(fine.sensitivity))
@@ -120,7 +121,7 @@ def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     """Where to look closer: crossings of T and L, maxima of T and S."""
     f = sweep.frequency_hz
     closed = np.abs(sweep.closed_loop) / abs(dc)
-    phase = np.degrees(np.unwrap(np.angle(sweep.closed_loop * np.sign(dc))))
+    phase = np.degrees(_phase(sweep.closed_loop * np.sign(dc)))
     pairs = []
     for below in (closed < sqrt(0.5), phase < -90.0):
         k = int(np.argmax(below))
@@ -136,21 +137,42 @@ def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
 
 def _phase_margin(sweep: Sweep) -> tuple[float | None, float | None]:
     """Crossover (Hz) and phase margin (deg) nearest to zero."""
-    gain = np.log(np.abs(sweep.open_loop))
-    phase = np.unwrap(np.angle(sweep.open_loop))
+    f, gain = _distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
+    _, phase = _distinct(sweep.frequency_hz, _phase(sweep.open_loop))
     found = []
     for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
-        hertz = _root(sweep.frequency_hz, gain, int(k), 0.0)
-        angle = np.degrees(float(_local(sweep.frequency_hz, phase, int(k))(np.log(hertz))))
+        if not np.isfinite(gain[k : k + 2]).all():
+            continue  # a point that could not be measured hides what lies between
+        hertz = _root(f, gain, int(k), 0.0)
+        angle = np.degrees(float(_local(f, phase, int(k))(np.log(hertz))))
         found.append((hertz, (angle + 180.0 + 180.0) % 360.0 - 180.0))
     return min(found, key=lambda item: abs(item[1]), default=(None, None))
 
 
 def first_fall(frequency_hz: Floats, values: Floats, level: float) -> float | None:
-    """Frequency at which values first fall below a level; ``None`` if never in the range."""
-    below = values < level
+    """Frequency at which values first fall below a level.
+
+    ``None`` if never in the range, or if the point before was not measured (not finite).
+    """
+    f, v = _distinct(frequency_hz, values)
+    below = v < level
     k = int(np.argmax(below))
-    return None if not below[k] or k == 0 else _root(frequency_hz, values, k - 1, level)
+    if not below[k] or k == 0 or not np.isfinite(v[k - 1]):
+        return None
+    return _root(f, v, k - 1, level)
+
+
+def _phase(response: npt.NDArray[np.complex128]) -> Floats:
+    """Unwrapped phase in rad; NaN only where the response is not finite."""
+    out, measured = np.full(response.size, np.nan), np.isfinite(response)
+    out[measured] = np.unwrap(np.angle(response[measured]))
+    return out
+
+
+def _distinct(frequency_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Points without those that lie on the one before."""
+    apart = np.concatenate([[True], np.diff(np.log(frequency_hz)) > SAME])
+    return frequency_hz[apart], values[apart]
 
 
 def maximum(frequency_hz: Floats, values: Floats) -> tuple[float, float]:
@@ -169,7 +191,7 @@ def maximum(frequency_hz: Floats, values: Floats) -> tuple[float, float]:
 
 
 def _root(frequency_hz: Floats, values: Floats, k: int, level: float) -> float:
-    """Where the curve passes a level between points k and k + 1."""
+    """Where the curve passes a level between points k and k + 1, both measured and apart."""
     from scipy.optimize import brentq
 
     curve = _local(frequency_hz, values - level, k)
@@ -182,7 +204,7 @@ def _local(frequency_hz: Floats, values: Floats, k: int) -> Callable[[float], fl
     from scipy.interpolate import BarycentricInterpolator
 
     x = np.log(frequency_hz)
-    good = np.flatnonzero(np.isfinite(values) & np.concatenate([[True], np.diff(x) > 1e-9]))
+    good = np.flatnonzero(np.isfinite(values) & np.concatenate([[True], np.diff(x) > SAME]))
     order = np.argsort(np.abs(x[good] - 0.5 * (x[k] + x[min(k + 1, x.size - 1)])), kind="stable")
     near = np.sort(good[order[:NEAREST]])
     curve = BarycentricInterpolator(x[near], values[near])

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.conditional import Conditional, conditional_stability
@@ -109,11 +110,13 @@ class _Work:
         with self.timed("break points"):
             points = self._points(confirmed) if stable else {}
         with self.timed("margins by amplitude"):
-            released = self._release(confirmed) if stable and self.settings.amplitude_margins else ()
+            wanted = stable and self.settings.amplitude_margins
+            released = attempt("margins by amplitude", lambda: self._release(confirmed), ()) if wanted else ()
         with self.timed("from rest"):
-            rest_sweep, rest_steps = self._rest() if stable else (None, None)
+            nothing = (None, None)
+            rest_sweep, rest_steps = attempt("motion from rest", self._rest, nothing) if stable else nothing
         with self.timed("conditional stability"):
-            conditional = self._conditional() if stable else None
+            conditional = attempt("conditional stability", self._conditional, None) if stable else None
         large, friction, specification = self._others(stable)
         for name, loop in loops.items():
             own = tuple(item for item in confirmed if item.loop == name)
@@ -281,7 +284,7 @@ class _Work:
             if asked and stable:
                 with self.timed(name):
                     try:
-                        result = work()
+                        result = attempt(name, work, None)
                     except InputError as error:
                         self.notes.append(f"{name}: {error}")
             found.append(result)

@@ -9,7 +9,7 @@ import typer
 
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
-    "Designs": ("designs", "init", "objects"),
+    "Designs": ("designs", "init", "keys", "objects"),
     "Linear loops": ("margins", "report", "pdf"),
     "Nonlinear checks": ("simulate", "validate"),
     "Bench records": ("identify", "correlate"),
@@ -44,12 +44,25 @@ def say_version(wanted: bool) -> None:
 
 
 def about(
+    context: typer.Context,
     version: Annotated[
         bool,
         typer.Option("--version", is_eager=True, callback=say_version, help="Print the version and stop."),
     ] = False,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            "--time-limit",
+            min=1.0,
+            metavar="SECONDS",
+            help="A command that takes longer ends with status 3; an hour (studies: a week) where left out.",
+        ),
+    ] = None,
 ) -> None:
     """Linear loop analysis of electromechanical actuators, checked by an exact nonlinear simulator."""
+    from reports.cli import time_limit
+
+    time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
 
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:

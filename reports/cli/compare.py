@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.options import JsonOption, OutOption, QuietOption
+from reports.cli.options import (
+    JsonOption,
+    OutOption,
+    QuietOption,
+    SchedulerOption,
+    TlsOption,
+    WorkersOption,
+)
 
 if TYPE_CHECKING:
     from analyses.study import Study
@@ -32,11 +39,17 @@ def compare(
     change: VariantOption = None,
     validation: ValidateOption = None,
     out: OutOption = Path("out/compare"),
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
     example: ExampleOption = False,
 ) -> None:
-    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what."""
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what.
+
+    What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+    """
     from actuator_lti.errors import InputError
 
     if example:
@@ -45,6 +58,7 @@ def compare(
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
 
+    from analyses.engine import Engine
     from analyses.variants import compare as compared
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
@@ -56,7 +70,13 @@ def compare(
     plan = _study(study, change or [])
     assert plan.base.design is not None
     with progress(f"comparing {plan.name}", quiet=quiet) as computing:
-        found = compared(plan, validation=validation, progress=computing)
+        found = compared(
+            plan,
+            validation=validation,
+            progress=computing,
+            engine=Engine(workers, scheduler, tls=tls) if workers or scheduler else None,
+            folder=out / "designs",
+        )
     made = study_document(
         plan.base.design,
         sections(found),
@@ -90,27 +110,14 @@ def _study(path: str, changes: list[str]) -> Study:
     from dataclasses import replace
 
     from actuator_lti.design import load_design, with_overrides
-    from actuator_lti.errors import InputError
     from analyses.slugs import slug
     from analyses.study import Variant, is_study, load_study, study_of
+    from reports.cli.drive import read_changes
 
     plan = load_study(path) if is_study(path) else study_of(load_design(path))
     assert plan.base.design is not None
     extra = []
     for words in dict.fromkeys(changes):
-        key, equals, value = words.partition("=")
-        if not equals:
-            raise InputError(f"--set {words!r}: allowed: KEY=VALUE")
-        overrides = {key.strip(): _value(value.strip())}
+        overrides = read_changes([words])
         extra.append(Variant(words, slug(words), with_overrides(plan.base.design, overrides), overrides))
     return replace(plan, variants=(*plan.variants, *extra))
-
-
-def _value(words: str) -> str | float | int:
-    """A plain number where it is one, else the text with its unit."""
-    for kind in (int, float):
-        try:
-            return kind(words)
-        except ValueError:
-            continue
-    return words

@@ -1,4 +1,9 @@
-"""Exit statuses: 0 done, 1 a verdict fails, 2 bad input or usage, 3 a numerical failure, 130 interrupted."""
+"""Exit statuses: 0 done, 1 a verdict fails, 2 bad input or usage, 3 no result, 130 interrupted.
+
+There is no result after a numerical failure, after the time limit, or where something happened that nobody
+foresaw. One line says which, and where the traceback lies; what a report lacks because of it stands in
+the report as well.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,13 @@ from collections.abc import Callable
 import typer
 
 from actuator_lti.errors import InputError, NumericalError
+from reports.cli import time_limit
+from reports.cli.crash import write_crash_file
 
 DONE = 0
 VERDICT_FAILED = 1
 BAD_INPUT = 2
-NUMERICAL_FAILURE = 3
+NO_RESULT = 3
 INTERRUPTED = 130
 
 # typer's own usage errors, whichever click it carries: BadParameter -> UsageError -> ClickException.
@@ -33,7 +40,27 @@ def leave_with(passed: bool) -> None:
 
 
 def run(call: Callable[[], object]) -> int:
-    """Run a command and give its exit status; an expected failure becomes one line on standard error."""
+    """Run a command and give its exit status; whatever fails becomes one line on standard error."""
+    from analyses.isolation import drain, reason, traceback_of
+
+    drain()
+    try:
+        status = _run(call)
+    except Exception as error:  # noqa: BLE001 - the one place for what nobody foresaw
+        return _say(f"{reason(error)}; traceback: {write_crash_file(traceback_of(error))}", NO_RESULT)
+    finally:
+        time_limit.stop()
+    missing = drain()
+    if not missing or status not in (DONE, VERDICT_FAILED):
+        return status
+    tracebacks = "\n".join(f"{one.part}\n{one.traceback}" for one in missing if one.traceback)
+    where = f"; tracebacks: {write_crash_file(tracebacks)}" if tracebacks else ""
+    words = ", ".join(f"{one.part} ({one.why})" for one in missing[:3])
+    return _say(f"the report lacks {len(missing)} part(s): {words}{where}", NO_RESULT)
+
+
+def _run(call: Callable[[], object]) -> int:
+    """Run a command; the failures that were foreseen become their lines."""
     output = sys.stdout
     try:
         status = call()
@@ -41,7 +68,7 @@ def run(call: Callable[[], object]) -> int:
     except InputError as error:
         return _say(str(error), BAD_INPUT)
     except NumericalError as error:
-        return _say(f"numerical failure: {error}", NUMERICAL_FAILURE)
+        return _say(f"numerical failure: {error}", NO_RESULT)
     except BrokenPipeError:
         return _quiet_pipe()
     except SystemExit as leaving:
@@ -53,8 +80,10 @@ def run(call: Callable[[], object]) -> int:
         return _say("interrupted", INTERRUPTED)
     except _USAGE_ERRORS as error:
         return _say(_usage_line(error), BAD_INPUT)
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         return _say(_os_line(error), BAD_INPUT)
+    except MemoryError:
+        return _say("not enough memory", NO_RESULT)
     if status == INTERRUPTED:  # typer swallows the interruption and gives its status
         return _say("interrupted", INTERRUPTED)
     return status if isinstance(status, int) else DONE
@@ -62,7 +91,8 @@ def run(call: Callable[[], object]) -> int:
 
 def _say(line: str, status: int) -> int:
     """Print one line on standard error and hand the status on."""
-    sys.stderr.write(f"actuator-lti: {' '.join(line.split())}\n")
+    words = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
+    sys.stderr.write(f"actuator-lti: {words}\n")
     return status
 
 
@@ -74,10 +104,8 @@ def _usage_line(error: BaseException) -> str:
     return f"{message} (see {command} --help)"
 
 
-def _os_line(error: OSError | UnicodeDecodeError) -> str:
+def _os_line(error: OSError) -> str:
     """Name the file and what the system said."""
-    if isinstance(error, UnicodeDecodeError):
-        return f"not a text file in UTF-8: {error}"
     name = f"{error.filename}: " if error.filename else ""
     return f"{name}{error.strerror or error}"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 def margins(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     form: FormOption = "sampled",
     operating_point: OperatingPointOption = "sliding",
     load: LoadOption = 0.0,
@@ -31,7 +33,7 @@ def margins(
 
     Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
     """
-    from actuator_lti.design import load_design, warnings_of
+    from actuator_lti.design import warnings_of
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
     from analyses.requirements import all_pass, evaluate_requirements
@@ -39,7 +41,7 @@ def margins(
     from reports.cli.output import print_warning
     from reports.sections.names import load_unit
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     for warning in warnings_of(drive):
         print_warning(f"{drive.name}: {warning}")
     loops = assemble_loops(

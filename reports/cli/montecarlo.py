@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
@@ -15,6 +16,9 @@ from reports.cli.options import (
     OperatingPointOption,
     OutOption,
     QuietOption,
+    SchedulerOption,
+    TlsOption,
+    WorkersOption,
 )
 
 if TYPE_CHECKING:
@@ -23,12 +27,6 @@ if TYPE_CHECKING:
 
 SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", help="Number of samples.")]
 SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Seed, 0 or more.")]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
-]
 TableOption = Annotated[
     Path | None,
     typer.Option("--from-samples", metavar="FILE", help="CSV or Parquet of identified parameters, SI."),
@@ -56,11 +54,13 @@ _SUBTITLE = "What the tolerances do to the requirements: odds, distributions, wo
 
 def montecarlo(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     samples: SamplesOption = 10_000,
     seed: SeedOption = 0,
     out: OutOption = Path("out/montecarlo"),
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     from_samples: TableOption = None,
     step: StepOption = None,
     duration: DurationOption = 0.5,
@@ -76,14 +76,13 @@ def montecarlo(
 
     Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
     """
-    from actuator_lti.design import load_design
     from analyses.engine import Engine
     from analyses.monte_carlo import MonteCarloSettings, StepCheck, monte_carlo, sample_folder
     from analyses.sampling import read_table
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     table = None if from_samples is None else read_table(from_samples, _varying(drive))
     check = None if step is None else StepCheck(_angle(step, drive), duration, load)
     settings = MonteCarloSettings(samples, seed, operating_point, load, check, table, worst)  # type: ignore[arg-type]
@@ -92,7 +91,9 @@ def montecarlo(
         return
     folder = sample_folder(drive, settings, out)
     with progress(f"sampling {drive.name}", quiet=quiet) as shown:
-        result = monte_carlo(drive, folder, settings, engine=Engine(workers, scheduler), progress=shown)
+        result = monte_carlo(
+            drive, folder, settings, engine=Engine(workers, scheduler, tls=tls), progress=shown
+        )
     leave_with(_written(drive, result, out, at_least, as_json, quiet))
 
 

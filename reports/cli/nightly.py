@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.options import JsonOption, QuietOption
+from actuator_lti.bounds import JOB_MEMORY
+from reports.cli.options import JsonOption, QuietOption, SchedulerOption, TlsOption
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
@@ -32,6 +33,9 @@ LimitOption = Annotated[
     float,
     typer.Option("--time-limit", min=1.0, metavar="SECONDS", help="A design that takes longer is ended."),
 ]
+MemoryOption = Annotated[
+    int, typer.Option("--memory-limit", min=300, metavar="MB", help="A design that needs more is ended.")
+]
 WaitOption = Annotated[
     float,
     typer.Option("--wait", min=0.0, metavar="SECONDS", help="Wait for another nightly on the same site."),
@@ -43,6 +47,10 @@ PdfOption = Annotated[bool, typer.Option("--pdf", help="A PDF beside each report
 PlainOption = Annotated[bool, typer.Option("--no-validation", help="Linear reports only, no simulation.")]
 ByOption = Annotated[str, typer.Option("--by", metavar="NAME", help="Who approves.")]
 ReasonOption = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Why the night is approved.")]
+LostOption = Annotated[
+    bool,
+    typer.Option("--accept-lost-history", help="Begin anew where the history knows less than the site."),
+]
 DesignsOption = Annotated[
     list[str] | None,
     typer.Option("--design", metavar="NAME", help="Approve only this design; may be repeated."),
@@ -54,7 +62,10 @@ def nightly(
     site: SiteOption,
     state: StateOption = None,
     workers: WorkersOption = 2,
+    scheduler: SchedulerOption = None,
+    tls: TlsOption = None,
     time_limit: LimitOption = 900.0,
+    memory_limit: MemoryOption = JOB_MEMORY.most // 1_000_000,
     wait: WaitOption = 0.0,
     keep: KeepOption = 60,
     pdf: PdfOption = False,
@@ -62,6 +73,7 @@ def nightly(
     by: ByOption = "",
     reason: ReasonOption = "",
     design: DesignsOption = None,
+    accept_lost_history: LostOption = False,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -71,19 +83,34 @@ def nightly(
     result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
     --reason TEXT` makes the last night the baseline.
     """
+    from analyses.engine import Engine
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
+    from reports.nightly.memory import HistoryLost
     from reports.nightly.night import Settings, approve, run_night
     from reports.nightly.source import read_study
 
     approving, path = _split(words)
     study = read_study(path, pdf=pdf, validation=False if no_validation else None)
-    settings = Settings(workers=workers, time_limit_s=time_limit, wait_s=wait, keep_reports=keep, state=state)
-    if approving:
-        night = approve(study, site, by=by, reason=reason, names=design or (), settings=settings)
-    else:
-        with progress(f"building {len(study.jobs)} reports", quiet=quiet) as report:
-            night = run_night(study, site, settings, progress=report, say=_warn)
+    settings = Settings(
+        workers=workers,
+        time_limit_s=time_limit,
+        wait_s=wait,
+        keep_reports=keep,
+        state=state,
+        accept_lost_history=accept_lost_history,
+        memory_limit_bytes=memory_limit * 1_000_000,
+        engine=None if scheduler is None else Engine(scheduler=scheduler, tls=tls),
+    )
+    try:
+        if approving:
+            night = approve(study, site, by=by, reason=reason, names=design or (), settings=settings)
+        else:
+            with progress(f"building {len(study.jobs)} reports", quiet=quiet) as report:
+                night = run_night(study, site, settings, progress=report, say=_warn)
+    except HistoryLost as lost:  # no bad input: the gate cannot judge, so it does not open
+        _warn(str(lost))
+        leave_with(False)
     _show(night, site, as_json)
     leave_with(night.exit_status == 0)
 

@@ -20,7 +20,35 @@ OutOption = Annotated[
     Path,
     typer.Option("--out", metavar="DIR", help="Folder for the results.", callback=folder_for_results),
 ]
-LoadOption = Annotated[float, typer.Option("--load", metavar="N_m", help="Hinge moment at the output, N m.")]
+
+
+def read_load(text: str) -> float:
+    """A load with or without its unit: N m (linear axis: N) where it has none."""
+    from actuator_lti.design.units import parse_quantity
+    from actuator_lti.errors import InputError
+
+    try:
+        return float(text)
+    except ValueError:
+        pass
+    for unit in ("N*m", "N"):
+        try:
+            return parse_quantity(text, unit)
+        except InputError as found:
+            message = found.message
+    reason = message.partition("; allowed")[0]
+    raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
+
+
+LoadOption = Annotated[
+    float,
+    typer.Option(
+        "--load",
+        metavar="LOAD",
+        parser=read_load,
+        help='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N).',
+    ),
+]
 FormOption = Annotated[
     str, typer.Option("--form", metavar="FORM", help="Linear form: sampled, continuous or ideal.")
 ]
@@ -29,5 +57,15 @@ OperatingPointOption = Annotated[
     typer.Option(
         "--operating-point", metavar="POINT", help="Friction: sliding, rest or describing-function."
     ),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
+]
+SchedulerOption = Annotated[
+    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
+]
+TlsOption = Annotated[
+    Path | None,
+    typer.Option("--tls", metavar="DIR", help="ca.pem, cert.pem and key.pem for a tls:// scheduler."),
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DEFAULT_OUT,
@@ -37,6 +38,7 @@ PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for sig
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: OutOption = DEFAULT_OUT,
     validation: ValidationOption = True,
     processes: ProcessesOption = 2,
@@ -50,7 +52,6 @@ def report(
     The page needs no network and opens from disk. With --json the document also goes to standard output.
     With --include the results of identify and correlate become sections of it.
     """
-    from actuator_lti.design import load_design
     from reports.build import design_report, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
@@ -58,7 +59,7 @@ def report(
     from reports.document import dumps, load
     from reports.verdict_summary import verdict_words
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]
     if validation:
         added = [*_validated(drive, quiet), *added]
@@ -80,12 +81,11 @@ def report(
 
 def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
     """Put the linear predictions to the simulator, and give the sections about it."""
-    from analyses.validation import validate
+    from reports.build import validation_sections
     from reports.cli.progress import progress
-    from reports.sections.validation import section
 
     with progress(f"validating {drive.name}", quiet=quiet) as validating:
-        return section(validate(drive, progress=validating), timing=False)
+        return validation_sections(drive, validating, timing=False)
 
 
 def _unstable(made: dict[str, object]) -> bool:

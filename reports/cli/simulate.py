@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption, QuietOption
 
 if TYPE_CHECKING:
@@ -60,6 +61,7 @@ EnergyOption = Annotated[bool, typer.Option("--energy", help="Say where the elec
 
 def simulate(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     command: CommandOption = "step",
     amplitude: AmplitudeOption = 1.0,
     frequency: FrequencyOption = 1.0,
@@ -85,12 +87,11 @@ def simulate(
     quiet: QuietOption = False,
 ) -> None:
     """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks."""
-    from actuator_lti.design import load_design
     from nonlinear import commands
     from nonlinear import simulate as run_simulation
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     wanted = build_command(
         drive,
         command,
@@ -173,6 +174,7 @@ def build_command(
     """
     import numpy as np
 
+    from actuator_lti.bounds import TONES
     from actuator_lti.errors import InputError
     from nonlinear import commands
 
@@ -186,6 +188,7 @@ def build_command(
     if kind in ("stepped-sine", "multisine"):
         if count < 1 or frequency <= 0.0 or last <= 0.0:
             raise InputError(f"--count {count}, --frequency {frequency:g}, --to {last:g}: must be positive")
+        TONES.check(count)
         grid = np.geomspace(frequency, last, count)
         if kind == "stepped-sine":
             return commands.stepped_sine(peak, grid.tolist(), cycles, period)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, OutOption, QuietOption
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ _SUBTITLE = "Gains from requirements, over all corners of the tolerances, on the
 
 def tune(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     require: RequireOption = None,
     rounded: RoundOption = True,
     curve: CurveOption = True,
@@ -38,14 +40,13 @@ def tune(
 
     Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements cannot be met.
     """
-    from actuator_lti.design import load_design
     from analyses.tuning import TuningSettings
     from analyses.tuning import tune as tuned
     from analyses.tuning.wishes import read_requirement
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     wanted = tuple(read_requirement(words, drive) for words in require or [])
     with progress(f"tuning {drive.name}", quiet=quiet) as shown:
         result = tuned(drive, TuningSettings(wanted, rounded, curve), progress=shown)

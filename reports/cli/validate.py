@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
+    from analyses.isolation import Missing
     from analyses.validation import Validation
 
 FolderOption = Annotated[
@@ -29,6 +32,7 @@ QuickOption = Annotated[
 
 def validate(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: FolderOption = None,
     as_json: JsonOption = False,
     quick: QuickOption = False,
@@ -39,16 +43,16 @@ def validate(
     Exit status 1 if a prediction fails where it should hold, or if a command within full deflection makes the
     drive diverge. Predictions that cannot hold (friction, a limit) are shown with the reason.
     """
-    from actuator_lti.design import load_design
+    from analyses.isolation import isolated
     from analyses.validation import QUICK, Settings
     from analyses.validation import validate as run
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 
-    drive = load_design(design)
-    with progress(f"validating {drive.name}", quiet=quiet) as report:
+    drive = load_drive(design, changes)
+    with progress(f"validating {drive.name}", quiet=quiet) as report, isolated() as missing:
         found = run(drive, QUICK if quick else Settings(), report)
-    made = _document(found)
+    made = _document(found, missing)
     paths = _write(made, out, quiet) if out is not None else ()
     if as_json:
         _print_json(made)
@@ -57,11 +61,11 @@ def validate(
     leave_with(found.passed and made["verdict"]["passed"])
 
 
-def _document(found: Validation) -> dict[str, Any]:
+def _document(found: Validation, missing: Sequence[Missing]) -> dict[str, Any]:
     """The validation as a document of its own."""
     from actuator_lti.design import design_hash
     from reports import document as doc
-    from reports.build import design_head
+    from reports.build import design_head, notices
     from reports.provenance import provenance
     from reports.sections.validation import section
 
@@ -71,7 +75,7 @@ def _document(found: Validation) -> dict[str, Any]:
         subtitle="Linear predictions against the nonlinear simulation",
         design=design_head(design),
         provenance=provenance(design_hash(design)),
-        sections=section(found),
+        sections=[*notices(missing, "validation"), *section(found)],
         kind="validation",
     )
 

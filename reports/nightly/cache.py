@@ -12,6 +12,7 @@ import json
 import os
 import time
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from reports.nightly.text import sha256
 
 MAGIC = b"actuator-lti/nightly-cache 1 "
 MAX_ENTRY_BYTES = 256_000_000
+MAX_UNPACKED_BYTES = 2_000_000_000
 _COMPRESSION = 3
 
 
@@ -64,6 +66,17 @@ class Cache:
         body = buffer.getvalue()
         self._put(self.path(key), MAGIC + sha256(body).encode() + b"\n" + body)
 
+    def take(self, key: str, data: bytes) -> None:
+        """Store an entry that was made elsewhere.
+
+        Raises
+        ------
+        CorruptEntry
+            Where it is not whole, or that of another key.
+        """
+        _opened(key, data)
+        self._put(self.path(key), data)
+
     @staticmethod
     def _put(path: Path, data: bytes) -> None:
         """Put a file in place whole; what a power cut does to it the checksum finds."""
@@ -91,18 +104,9 @@ class Cache:
             data = path.read_bytes()
         except FileNotFoundError:
             return None
-        header, separator, body = data.partition(b"\n")
-        if not separator or header != MAGIC + sha256(body).encode():
-            raise CorruptEntry("checksum differs")
-        try:
-            with zipfile.ZipFile(io.BytesIO(body)) as archive:
-                meta = json.loads(archive.read("meta.json"))
-        except (zipfile.BadZipFile, KeyError, ValueError) as error:
-            raise CorruptEntry("layout differs") from error
-        if meta.get("key") != key:
-            raise CorruptEntry("stored under another key")
+        entry = _opened(key, data)
         os.utime(path)
-        return Entry(key, meta, body)
+        return entry
 
     def discard(self, key: str) -> None:
         """Remove an entry that is corrupt."""
@@ -118,3 +122,22 @@ class Cache:
                 path.unlink(missing_ok=True)
                 removed += 1
         return removed
+
+
+def _opened(key: str, data: bytes) -> Entry:
+    """Check an entry and read what it holds."""
+    header, separator, body = data.partition(b"\n")
+    if not separator or header != MAGIC + sha256(body).encode():
+        raise CorruptEntry("checksum differs")
+    try:
+        with zipfile.ZipFile(io.BytesIO(body)) as archive:
+            if sum(item.file_size for item in archive.infolist()) > MAX_UNPACKED_BYTES:
+                raise CorruptEntry(f"more than {MAX_UNPACKED_BYTES} bytes unpacked")
+            meta = json.loads(archive.read("meta.json"))
+    except CorruptEntry:
+        raise
+    except (zipfile.BadZipFile, KeyError, ValueError, zlib.error, NotImplementedError) as error:
+        raise CorruptEntry("layout differs") from error
+    if not isinstance(meta, dict) or meta.get("key") != key:
+        raise CorruptEntry("stored under another key")
+    return Entry(key, meta, body)

@@ -37,9 +37,11 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
     InputError, NumericalError
         From reading the designs and from the computations.
     """
+    from analyses.isolation import drain
     from reports import document as doc
     from reports.html import page
 
+    drain()
     if "refused" in payload:
         raise InputError(str(payload["refused"]))
     comparison = "study" in payload
@@ -49,34 +51,24 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
         from reports.pdf import pdf_bytes
 
         files["report.pdf"] = pdf_bytes(plain)
-    return digest({**plain, "sections": []} if comparison else plain), files
+    meta = digest({**plain, "sections": []} if comparison else plain)
+    lacking = [one.part for one in drain() if one.part.startswith("figure ")]  # sections say so themselves
+    meta["failed_sections"] = [*meta["failed_sections"], *(f"{part}, not drawn" for part in lacking)]
+    return meta, files
 
 
 def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     """Compute the report of a design, with validation and Monte Carlo where the settings ask for them."""
-    from reports.build import design_report
+    from reports.build import design_report, validation_sections
 
     design = _design(payload)
     settings: Mapping[str, Any] = payload.get("settings", {})
     sections: list[dict[str, Any]] = []
     if settings.get("validation"):
-        sections += _validation(design)
+        sections += validation_sections(design)
     if settings.get("monte_carlo"):
         sections += _tolerances(design, settings["monte_carlo"])
     return design_report(design, validation=sections)
-
-
-def _validation(design: Design) -> list[dict[str, Any]]:
-    """Put the linear predictions to the simulator; a design that cannot be tested says why."""
-    from analyses.validation import validate
-    from reports import document as doc
-    from reports.sections.validation import section
-
-    try:
-        return section(validate(design))
-    except InputError as error:
-        title = "Linear predictions against simulation"
-        return [doc.section("validation", title, [doc.text(f"Not tested: {error}")], status="warn")]
 
 
 def _tolerances(design: Design, plan: Mapping[str, int]) -> list[dict[str, Any]]:

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import json
 import math
+import secrets
 import sqlite3
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import datetime
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -22,11 +25,48 @@ from actuator_lti.errors import InputError
 from reports.nightly import schema
 from reports.nightly.figures import Figure
 from reports.nightly.job import canonical
+from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, NewResult, Result, Run
 from reports.nightly.text import sha256
 
 PAGE_BYTES = 16384
 RECENT = 8
+MOST_UNPACKED = 64_000_000  # bytes of a list of figures or of parameters
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class DamagedError(Exception):
+    """What was read is not what was written."""
+
+
+def _vector_sha(layout: int, numbers: bytes) -> bytes:
+    """Half of the SHA-256 of a vector of numbers and its layout."""
+    return bytes.fromhex(sha256(f"{layout}:".encode() + numbers))[:16]
+
+
+def _unpacked(data: bytes) -> bytes:
+    """Unpack within bounds."""
+    unpack = zlib.decompressobj()
+    content = unpack.decompress(data, MOST_UNPACKED)
+    if not unpack.eof:
+        raise DamagedError("packed data do not end")
+    return content
+
+
+def _whole(read: Callable[P, R]) -> Callable[P, R]:
+    """A reading method whose misfits (a text where a number belongs, half a JSON) are damage of the file."""
+
+    @wraps(read)
+    def checked(*arguments: P.args, **named: P.kwargs) -> R:
+        try:
+            return read(*arguments, **named)
+        except (TypeError, ValueError, KeyError, IndexError, OverflowError) as error:
+            raise DamagedError(f"{type(error).__name__} while reading: {str(error)[:200]}") from error
+
+    return checked
 
 
 class History:
@@ -84,8 +124,10 @@ class History:
         body = canonical(result.inputs or {})
         inputs = self._id("inputs", "sha", {"sha": sha256(body), "body": zlib.compress(body.encode())})
         values = np.array([np.nan if f.value is None else f.value for f in result.figures], dtype="<f8")
-        digest = bytes.fromhex(sha256(f"{layout}:".encode() + values.tobytes()))[:16]
-        vector = self._id("vectors", "sha", {"sha": digest, "layout": layout, "numbers": values.tobytes()})
+        numbers = values.tobytes()
+        vector = self._id(
+            "vectors", "sha", {"sha": _vector_sha(layout, numbers), "layout": layout, "numbers": numbers}
+        )
         cursor = self.connection.execute(
             "INSERT INTO snapshots(key, vector, input) VALUES (?, ?, ?)", (result.key, vector, inputs)
         )
@@ -135,18 +177,32 @@ class History:
                 f"holds the nights of study {found[0][:80]!r}, not of {study[:80]!r}: use another --site"
             )
 
+    def memory(self) -> Memory:
+        """How much there is, for the site to remember; a history gets its id when it is first asked."""
+        found = self.connection.execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
+        id = found[0] if found else secrets.token_hex(16)
+        if found is None:
+            with self.connection as c:
+                c.execute("INSERT INTO meta VALUES ('id', ?)", (id,))
+        nights = self.connection.execute("SELECT count(*) FROM runs WHERE state = 'done'").fetchone()[0]
+        approvals = self.connection.execute("SELECT count(*) FROM baselines").fetchone()[0]
+        return Memory(str(id), int(nights), int(approvals))
+
     # ---- reading -----------------------------------------------------------------------------------
 
+    @_whole
     def runs(self) -> list[Run]:
         """Return the finished nights, oldest first."""
         rows = self.connection.execute("SELECT * FROM runs WHERE state = 'done' ORDER BY id").fetchall()
-        return [Run(**{**dict(r), "libraries": json.loads(r["libraries"])}) for r in rows]
+        return [_run(r) for r in rows]
 
+    @_whole
     def interrupted(self) -> list[str]:
         """When nights began that never ended."""
         rows = self.connection.execute("SELECT started FROM runs WHERE state = 'interrupted' ORDER BY id")
         return [str(r[0]) for r in rows]
 
+    @_whole
     def baselines(self) -> list[Baseline]:
         """Return all approvals, oldest first."""
         rows = self.connection.execute(
@@ -155,6 +211,7 @@ class History:
         )
         return [Baseline(**dict(r)) for r in rows]
 
+    @_whole
     def results(
         self, *, run: int | None = None, name: str | None = None, good: bool = False, last: int | None = None
     ) -> list[Result]:
@@ -187,6 +244,7 @@ class History:
             rows.reverse()
         return [Result(**{**dict(r), "cached": bool(r["cached"])}) for r in rows]
 
+    @_whole
     def contents(self, runs: Iterable[int]) -> list[tuple[str, str]]:
         """Return name and content address of all that some nights show, each once."""
         ids = sorted(runs)
@@ -197,13 +255,15 @@ class History:
         )
         return [(row[0], row[1]) for row in rows]
 
+    @_whole
     def inputs(self, snapshot: int) -> dict[str, Any]:
         """Return parameters and settings behind a result."""
         row = self.connection.execute(
             "SELECT i.body FROM snapshots s JOIN inputs i ON i.id = s.input WHERE s.id = ?", (snapshot,)
         ).fetchone()
-        return dict(json.loads(zlib.decompress(row[0]))) if row else {}
+        return dict(json.loads(_unpacked(row[0]))) if row else {}
 
+    @_whole
     def figures(self, snapshot: int | None) -> dict[str, Figure]:
         """Return the figures of one result by name."""
         if snapshot is None:
@@ -215,10 +275,7 @@ class History:
         return self._recent[snapshot]
 
     def _read_figures(self, snapshot: int) -> dict[str, Figure]:
-        layout, numbers = self.connection.execute(
-            "SELECT v.layout, v.numbers FROM snapshots s JOIN vectors v ON v.id = s.vector WHERE s.id = ?",
-            (snapshot,),
-        ).fetchone()
+        ((_, layout, numbers),) = self._numbers([snapshot])
         known = self.figure_table()
         values = np.frombuffer(numbers, dtype="<f8").tolist()
         out = {}
@@ -233,6 +290,7 @@ class History:
         query = "SELECT 1 FROM snapshots WHERE key = ?"
         return {key for key in keys if self.connection.execute(query, (key,)).fetchone()}
 
+    @_whole
     def figure_table(self) -> dict[int, Figure]:
         """Return name, unit and direction of every figure by its number (without values)."""
         count = self.connection.execute("SELECT count(*) FROM figures").fetchone()[0]
@@ -244,9 +302,15 @@ class History:
         return self._table
 
     def _layout(self, layout: int) -> list[int]:
-        row = self.connection.execute("SELECT figures FROM layouts WHERE id = ?", (layout,)).fetchone()
-        return [int(v) for v in np.frombuffer(zlib.decompress(row[0]), dtype="<i4")]
+        sha, figures = self.connection.execute(
+            "SELECT sha, figures FROM layouts WHERE id = ?", (layout,)
+        ).fetchone()
+        ids = _unpacked(figures)
+        if sha256(ids) != sha:
+            raise DamagedError(f"layout {layout} is not what was written")
+        return [int(v) for v in np.frombuffer(ids, dtype="<i4")]
 
+    @_whole
     def matrix(self, results: Sequence[Result], figures: Sequence[int]) -> np.ndarray:
         """Values of some figures over some results, (results x figures); NaN where there is none."""
         wanted = sorted({r.snapshot for r in results if r.snapshot is not None})
@@ -271,11 +335,27 @@ class History:
         for start in range(0, len(snapshots), 500):
             part = snapshots[start : start + 500]
             marks = ",".join("?" * len(part))
-            yield from self.connection.execute(
-                "SELECT s.id, v.layout, v.numbers FROM snapshots s JOIN vectors v ON v.id = s.vector"
+            rows = self.connection.execute(
+                "SELECT s.id, v.layout, v.numbers, v.sha FROM snapshots s JOIN vectors v ON v.id = s.vector"
                 f" WHERE s.id IN ({marks})",
                 part,
             ).fetchall()
+            if len(rows) != len(part):
+                raise DamagedError("a result's figures are missing")
+            for snapshot, layout, numbers, sha in rows:
+                if _vector_sha(layout, numbers) != sha:
+                    raise DamagedError(f"the figures of result {snapshot} are not what was written")
+                yield snapshot, layout, numbers
+
+
+def _run(row: sqlite3.Row) -> Run:
+    """Make a night of its row; times that are none are damage."""
+    run = Run(**{**dict(row), "libraries": dict(json.loads(row["libraries"]))})
+    datetime.fromisoformat(run.started)
+    texts = (run.code, run.code_commit, run.study_commit, run.host, *run.libraries.values())
+    if not all(isinstance(text, str) for text in texts):
+        raise ValueError("a text is wanted")
+    return run
 
 
 @contextmanager
@@ -298,6 +378,8 @@ def open_history(path: Path) -> Iterator[History]:
         yield History(connection, notice)
     except sqlite3.OperationalError as error:
         raise InputError(f"cannot be read or written: {error}", where=str(path)) from error
+    except (sqlite3.Error, sqlite3.Warning, zlib.error, DamagedError) as error:
+        raise InputError(f"is damaged ({error}): restore it from a copy", where=str(path)) from error
     finally:
         connection.close()
 
@@ -310,9 +392,9 @@ def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
         notice = schema.prepare(connection, path)
-        damage = (
-            connection.execute("PRAGMA quick_check(1)").fetchone()[0] if path.stat().st_size < 5e6 else "ok"
-        )
+        damage = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+        if damage == "ok" and connection.execute("PRAGMA foreign_key_check").fetchone() is not None:
+            damage = "an entry refers to one that is missing"
     except sqlite3.DatabaseError as error:
         if isinstance(error, sqlite3.OperationalError):
             raise

@@ -7,15 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.text import one_line, sha256
 
 Status = Literal["pass", "fail", "error", "timeout", "crash"]
 BROKEN: tuple[Status, ...] = ("error", "timeout", "crash")
 
-MAX_JOBS = 10_000
 MAX_NAME = 20_000
-MAX_PAYLOAD_BYTES = 32_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +82,7 @@ def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
     """
     if not jobs:
         raise InputError("nothing to build: no design and no variant", where=where)
-    if len(jobs) > MAX_JOBS:
-        raise InputError(f"{len(jobs)} designs and variants: at most {MAX_JOBS} are allowed", where=where)
+    NIGHTLY_JOBS.check(len(jobs), where)
     seen: set[str] = set()
     for job in jobs:
         if len(job.name) > MAX_NAME:
@@ -100,10 +98,5 @@ def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
         if job.name in seen:
             raise InputError(f"name {one_line(job.name, 80)!r} is used twice: names must differ", where=where)
         seen.add(job.name)
-        size = len(canonical(job.payload))
-        if size > MAX_PAYLOAD_BYTES:
-            raise InputError(
-                f"{one_line(job.name, 80)!r}: {size} bytes: at most {MAX_PAYLOAD_BYTES} are allowed",
-                where=where,
-            )
+        JOB_BYTES.check(len(canonical(job.payload)), where, name=repr(one_line(job.name, 80)))
     return jobs

@@ -35,6 +35,7 @@ def summary(night: Overview) -> dict[str, Any]:
             "libraries": dict(night.run.libraries),
         },
         "study_commit": night.run.study_commit,
+        "history": night.memory.plain(),
         "exit_status": night.exit_status,
         "counts": {state: night.count(state) for state in STATE_WORDS},
         "gone": list(night.gone),

@@ -9,8 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
+from analyses.engine import Engine
+from reports.nightly import memory
 from reports.nightly import site as site_files
+from reports.nightly.apart import Cluster
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
@@ -24,6 +28,7 @@ from reports.nightly.text import one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
 
+DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
 Progress = Callable[[int, int], None]
 Say = Callable[[str], None]
 
@@ -57,6 +62,12 @@ class Settings:
         ``module:function`` that makes ``(meta, files)`` of a job's payload.
     state : pathlib.Path, optional
         Folder of history and cache; ``DIR.state`` beside the site where left out.
+    accept_lost_history : bool
+        Go on where the history knows less than the site: a new one, or an older copy.
+    memory_limit_bytes : int
+        Of a worker process; a design that needs more has no result.
+    engine : Engine, optional
+        A Dask cluster to build on in place of worker processes here.
     """
 
     workers: int = 2
@@ -65,6 +76,9 @@ class Settings:
     keep_reports: int = 60
     build: str = "reports.nightly.compute:build"
     state: Path | None = None
+    accept_lost_history: bool = False
+    memory_limit_bytes: int = JOB_MEMORY.most
+    engine: Engine | None = None
 
 
 def state_of(site: Path, settings: Settings) -> Path:
@@ -104,6 +118,8 @@ def run_night(
     ------
     InputError
         Where the lock is held, the site or its state cannot be written, or the history is of a newer version.
+    HistoryLost
+        Where the history knows less than the site.
     """
     use = settings or Settings()
     tell = say or _silent
@@ -116,6 +132,8 @@ def run_night(
             tell(history.notice)
         site_files.remove_leftovers(site, state)
         history.claim(study.name)
+        if not use.accept_lost_history:
+            memory.check(site, history.memory(), state)
         run = history.start_run(_run_row(version, study, clock()))
         outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
         known = history.known(o.key for o in outcomes)
@@ -163,9 +181,12 @@ def approve(
         raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
     state = state_of(site, use)
     if not (state / "history.sqlite").exists():
+        memory.check(site, memory.Memory("", 0, 0), state)
         raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
         history.claim(study.name)
+        if not use.accept_lost_history:
+            memory.check(site, history.memory(), state)
         runs = history.runs()
         if not runs:
             raise InputError("no night has been finished here yet", where=str(site))
@@ -210,13 +231,27 @@ def _outcomes(
     todo = {keys[job.name]: job for job in jobs if job.name not in found}
     if progress is not None:
         progress(len(found), len(jobs))
-    pool = Pool(use.build, cache.folder, use.workers, use.time_limit_s)
-    for done in pool.run([Task(key=key, payload=job.payload) for key, job in todo.items()]):
+    pool = _pool(use, cache.folder)
+    for done in pool.run([_task(key, job) for key, job in todo.items()]):
         job = todo[done.key]
         found[job.name] = _built(cache, job, done)
         if progress is not None:
             progress(len(found), len(jobs))
     return [found[job.name] for job in jobs]
+
+
+def _task(key: str, job: Job) -> Task:
+    """What a job asks of the pool; a comparison takes as long as the designs that it holds."""
+    study = job.payload.get("study")
+    designs = len(study["designs"]) if isinstance(study, Mapping) else 1
+    return Task(key=key, payload=job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
+
+
+def _pool(use: Settings, folder: Path) -> Pool | Cluster:
+    """Who builds: processes here, or a Dask cluster."""
+    if use.engine is not None and use.engine.distributed:
+        return Cluster(use.build, folder, use.engine, use.time_limit_s, use.memory_limit_bytes)
+    return Pool(use.build, folder, use.workers, use.time_limit_s, use.memory_limit_bytes)
 
 
 def _from_cache(cache: Cache, job: Job, key: str, tell: Say) -> Outcome | None:

@@ -7,26 +7,28 @@ import os
 import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.bounds import JOB_MEMORY
 from reports.nightly import worker
 
 START_LIMIT_S = 180.0
 # One thread a worker: the jobs themselves are what runs in parallel.
-_ONE_THREAD = dict.fromkeys(
+ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """Something to build: an address and what the build function gets."""
+    """Something to build: an address, what the build function gets, and how many time limits it may take."""
 
     key: str
     payload: Mapping[str, Any]
+    limits: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,13 +65,23 @@ class Pool:
         Number of processes; 0 builds in this process (no time limit then).
     time_limit_s : float
         A task that takes longer is ended, with its process.
+    memory_limit_bytes : int
+        A process that asks for more gets none; not where ``workers`` is 0.
     """
 
-    def __init__(self, build: str, cache: Path, workers: int, time_limit_s: float) -> None:
+    def __init__(
+        self,
+        build: str,
+        cache: Path,
+        workers: int,
+        time_limit_s: float,
+        memory_limit_bytes: int = JOB_MEMORY.most,
+    ) -> None:
         self._build = build
         self._cache = cache
         self._count = workers
         self._limit = time_limit_s
+        self._memory = memory_limit_bytes
         self._workers: list[_Worker] = []
         self._context = multiprocessing.get_context("spawn")
 
@@ -101,11 +113,13 @@ class Pool:
 
     def _start(self) -> _Worker:
         here, there = self._context.Pipe()
-        before = {name: os.environ.get(name) for name in _ONE_THREAD}
-        os.environ.update(_ONE_THREAD)
+        before = {name: os.environ.get(name) for name in ONE_THREAD}
+        os.environ.update(ONE_THREAD)
         try:
             process = self._context.Process(
-                target=worker.main, args=(there, self._build, self._cache, self._limit), daemon=True
+                target=worker.main,
+                args=(there, self._build, self._cache, self._memory),
+                daemon=True,
             )
             process.start()
         finally:
@@ -150,8 +164,8 @@ class Pool:
             return
         task = queue.popleft()
         now = time.monotonic()
-        one.task, one.started, one.deadline = task, now, now + self._limit
-        one.connection.send((task.key, dict(task.payload)))
+        one.task, one.started, one.deadline = task, now, now + self._limit * task.limits
+        one.connection.send((task.key, dict(task.payload), self._limit * task.limits))
 
     def _replace(self, one: _Worker, queue: deque[Task], status: str) -> Done | None:
         """End a worker, put a fresh one in its place while there is work, and say what became of its task."""
@@ -159,7 +173,8 @@ class Pool:
         self._workers = [w for w in self._workers if w is not one]
         code = one.process.exitcode
         if status == "timeout":
-            message = f"did not end within {self._limit:g} s"
+            limit = START_LIMIT_S if one.task is None else self._limit * one.task.limits
+            message = f"did not end within {limit:g} s"
         else:
             how = f"signal {-code}" if code is not None and code < 0 else f"status {code}"
             message = f"its process ended ({how})"
@@ -184,6 +199,11 @@ class Pool:
             one.process.join(0.5 if one.task is None and one.ready else 0.0)
             _kill(one)
         self._workers = []
+
+
+def ended(done: Done, status: str, message: str) -> Done:
+    """The same task with another end."""
+    return replace(done, status=status, message=message)
 
 
 def _finish(one: _Worker, status: str, message: str, detail: str) -> Done:

@@ -38,6 +38,9 @@ def check_place(site: Path) -> None:
     InputError
         In one line that names the folder.
     """
+    for name in ("", "nights", "reports"):
+        if (site / name).is_symlink():
+            raise InputError("is a symbolic link: a site is a folder of its own", where=str(site / name))
     if site.exists() and not site.is_dir():
         raise InputError("is a file: --site takes a folder", where=str(site))
     if site.is_dir() and not (site / MARKER).exists() and any(site.iterdir()):
@@ -96,6 +99,9 @@ def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) 
     if design.broken:
         return
     folder = site / design.report
+    for part in (folder, folder.parent):
+        if part.is_symlink():
+            raise InputError("is a symbolic link: a site holds its reports itself", where=str(part))
     wanted: Mapping[str, str] = design.meta.get("files", {})
     missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
     if not missing:

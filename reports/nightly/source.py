@@ -65,23 +65,23 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
         name=file.name,
         title=file.title or file.name,
         jobs=tuple(_jobs(file, settings)),
-        origin=Path(path).resolve() if Path(path).exists() else None,
+        origin=Path(path).resolve() if Path(path).is_file() else None,
         tolerances=tolerances,
     )
 
 
 def _read_file(path: Path) -> tuple[StudyFile, dict[str, Any]]:
-    from actuator_lti.design.reading import decode, parse_toml, read_bytes
+    from actuator_lti.reading import read_toml, shown, shown_path
     from analyses.study import study_from_tree
 
-    where = str(path)
-    tree = parse_toml(decode(read_bytes(path, "study file"), where), where)
+    where = shown_path(path)
+    tree = read_toml(path, "study file")
     table = tree.pop("nightly", {})
     if not isinstance(table, dict):
         raise InputError("nightly: allowed: a table, [nightly]", where=where)
     for key in table:
         if key not in _KEYS:
-            raise InputError(f"nightly.{key[:60]!r}: unknown key; allowed: {', '.join(_KEYS)}", where=where)
+            raise InputError(f"nightly.{shown(key)}: unknown key; allowed: {', '.join(_KEYS)}", where=where)
     return study_from_tree(tree, where, path.parent, keep_going=True), table
 
 

@@ -17,6 +17,7 @@ from reports.nightly.code_version import commits_between
 from reports.nightly.figures import Figure, Verdict
 from reports.nightly.history import History
 from reports.nightly.job import BROKEN
+from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.text import slug
 from reports.nightly.trend import WINDOW, flaps, missing_nights
@@ -126,6 +127,7 @@ class Overview:
     missing: tuple[tuple[int, int], ...]
     interrupted: tuple[str, ...]
     tolerances: Any
+    memory: Memory
 
     def count(self, state: str) -> int:
         """How many designs are in a state (see `DesignView.state`)."""
@@ -163,6 +165,7 @@ def overview(
         missing=missing_nights([r.started for r in runs]),
         interrupted=tuple(history.interrupted()),
         tolerances=study.tolerances,
+        memory=history.memory(),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import os
 import signal
-import sys
 import threading
 import traceback
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError
 from reports.nightly.cache import Cache
+from reports.nightly.limits import die_with_parent, limit_memory
 from reports.nightly.text import one_line
 
 # A worker that hangs in compiled code without its parent is ended by the system this long after its limit.
@@ -28,10 +28,11 @@ def resolve(name: str) -> Callable[..., Any]:
     return getattr(importlib.import_module(module), function)
 
 
-def main(connection: Connection, build: str, cache: Path, time_limit_s: float) -> None:
-    """Receive ``(key, payload)``, build, store, answer; ends when the pipe closes or the parent is gone."""
+def main(connection: Connection, build: str, cache: Path, memory_bytes: int) -> None:
+    """Receive ``(key, payload, limit)``, build, store, answer; ends with the pipe or the parent."""
     _end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    limit_memory(memory_bytes)
     function = resolve(build)
     store = Cache(cache)
     connection.send(("ready", "", ""))
@@ -42,7 +43,7 @@ def main(connection: Connection, build: str, cache: Path, time_limit_s: float) -
             return
         if task is None:
             return
-        key, payload = task
+        key, payload, time_limit_s = task
         _alarm(time_limit_s + GRACE_S)
         connection.send(execute(function, store, key, payload))
         _alarm(0)
@@ -59,6 +60,8 @@ def execute(
         meta, files = function(payload)
     except InputError as error:
         return ("error", one_line(str(error), 600), "")
+    except MemoryError:
+        return ("error", "needs more memory than a job may take: see --memory-limit", "")
     except Exception as error:  # noqa: BLE001 - the one place where a design may raise anything
         where = "".join(traceback.format_exception(error)[-6:])
         return ("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:])
@@ -87,7 +90,4 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: also where a build never lets go
+    die_with_parent()

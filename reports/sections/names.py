@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from actuator_lti.design.model import Design
+from actuator_lti.quantities import QUANTITIES as REGISTRY
 
 LOOPS = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 FORMS = {"sampled": "sampled", "continuous": "continuous with delays", "ideal": "ideal, no delay"}
@@ -14,22 +15,7 @@ POINTS = {
     "w_ref": "speed command w_ref",
     "output": "output angle",
 }
-QUANTITIES = {
-    "gain_margin": "gain margin",
-    "phase_margin": "phase margin",
-    "delay_margin": "delay margin",
-    "modulus_margin": "modulus margin",
-    "sensitivity_peak": "peak of S",
-    "bandwidth": "bandwidth (−3 dB)",
-    "bandwidth_90deg": "bandwidth (−90°)",
-    "resonance_peak": "resonance peak",
-    "overshoot": "overshoot",
-    "rise_time": "rise time",
-    "settling_time": "settling time",
-    "output_rate": "output rate",
-    "motor_current": "motor current at top speed",
-    "acceleration": "acceleration",
-}
+QUANTITIES = {name: quantity.words for name, quantity in REGISTRY.items()}
 
 
 def load_unit(design: Design) -> str:

@@ -131,7 +131,11 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
         given["command"] = {"jerk": None, "acceleration": None, "rate": "1 urad/s"}
         given["command"] = given["command"] if axis == "rotary" else {**given["command"], "rate": "1 um/s"}
     if not source:
-        given["temperature"] = {"winding_limit": None, "magnet_coefficient": "-0.11 %/K"}
+        given["temperature"] = {
+            "winding_limit": None,
+            "magnet_coefficient": "-0.11 %/K",
+            "resistance_coefficient": "0.393 %/K",
+        }
         given["supply"] = {"regenerative": False, "capacitance": "2 mF", "brake_voltage": "1e4 V"}
     for name, fixed in given.items():
         if draw(st.booleans()):

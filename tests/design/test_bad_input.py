@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 import tomli_w
 
+from actuator_lti.bounds import TEXT_CHARACTERS, TOML_BYTES
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.loader import design_text
-from actuator_lti.design.reading import MAX_BYTES, MAX_STRING
 from actuator_lti.errors import InputError
 
 AMBER = design_text("ilr33-amber")
@@ -101,7 +101,7 @@ CASES = {
     "amplitude above full": ([("0.5, 1.0]", "0.5, 2.0]")], ["amplitude_fractions[5] = 2.0"]),
     "broken TOML": ([("[motor]", "[motor")], ["not TOML", "line 11, column 7"]),
     "one table for many": ([("[[gear]]", "[gear]"), ("[[gear]]\nname = \"worm\"", "[load2]")], ["load2"]),
-    "long text": ([('title = "ILR', f'title = "{"x" * (MAX_STRING + 1)}')], ["design.title", "at most 10000"]),
+    "long text": ([('title = "ILR', f'title = "{"x" * (TEXT_CHARACTERS.most + 1)}')], ["design.title", "at most 10000"]),
     "many gears": ([("[[gear]]", "[[gear]]\n" * 21)], ["gear: allowed: 1 to 20 items"]),
     "unknown object": ([(FACTS, "[objects.values]\n\"0x23\" = 1\n[[fact]]")], ["0x23", "0x2344.01"]),
 }  # fmt: skip
@@ -155,7 +155,7 @@ def test_the_stages_of_a_force_source_are_held_apart(extra: str, says: str) -> N
         "[" + "a." * 50_000 + "b]",
         "x = 1" + "0" * 10_000,
         "\0",
-        "x = '" + "y" * MAX_BYTES + "'",
+        "x = '" + "y" * TOML_BYTES.most + "'",
         "x = [" + "1," * 30_000 + "]",
         "\n".join(f"k{i} = 1" for i in range(30_000)),
     ],
@@ -175,7 +175,7 @@ def test_files_that_are_no_design_are_refused(tmp_path: Path) -> None:
     assert "is a directory" in line(tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"[design]\nname = '\xff\xfe'")
     assert "byte 17 is not UTF-8" in line(tmp_path / "binary.toml")
-    (tmp_path / "large.toml").write_bytes(b"#" * (MAX_BYTES + 1))
+    (tmp_path / "large.toml").write_bytes(b"#" * (TOML_BYTES.most + 1))
     assert "at most 1 MiB" in line(tmp_path / "large.toml")
     assert "no regular file" in line(Path("/dev/null"))
 

@@ -27,7 +27,7 @@ from actuator_lti.design.model import (
 def amber(
     n_v: int = 1, n_p: int = 1, delay_s: float = 1e-4, feedforward: float = 0.0, **changes: Any
 ) -> Design:
-    """The baseline of hardware.md with J = 1.05e-6 kg m2 in all (J_motor 9.2e-7 + 1.3e-7)."""
+    """The shipped baseline with J = 1.05e-6 kg m2 in all (J_motor 9.2e-7 + 1.3e-7)."""
     design = Design(
         name="amber",
         title="canard drive",
@@ -66,7 +66,7 @@ def without(design: Design, *stages: str, gain: float) -> Design:
 
 
 def emps(delay_s: float = 0.0, **changes: Any) -> Design:
-    """EMPS of cases.md: P-P cascade on a force source, speed by backward difference of two-sample means."""
+    """EMPS as published: P-P cascade on a force source, speed by backward difference of two-sample means."""
     design = Design(
         name="emps",
         title="linear axis",
@@ -87,7 +87,7 @@ def emps(delay_s: float = 0.0, **changes: Any) -> Design:
 
 
 def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> Design:
-    """G6 of cases.md: P position loop on the voltage, no inner loops."""
+    """CTMS motor position (G6): P position loop on the voltage, no inner loops."""
     return Design(
         name="ctms",
         title="motor position",

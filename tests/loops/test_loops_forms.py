@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import control
+import flint
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,8 +16,8 @@ from loop_designs import amber, ctms_position, designs, emps, without
 
 from actuator_lti import DelaySystem, InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Friction, Load
+from actuator_lti.drive.operating import friction_slope
 from actuator_lti.loops import exact_margins
-from actuator_lti.plant import friction_slope
 
 
 def response(system: Any, omega: np.ndarray) -> np.ndarray:
@@ -218,14 +219,32 @@ def test_closed_loops_of_all_break_points_have_the_poles_of_the_one_drive(rates:
         assert np.max(poles) == pytest.approx(largest**updates, rel=1e-6), point
 
 
-def test_exact_margins_agree_with_the_bode_plot_where_the_loop_is_time_invariant() -> None:
+def exactly_stable(loop: control.StateSpace, gain: float, samples: int) -> bool:
+    """Whether gain z^-samples L closes stably, by certified roots; its doubles are taken as rationals."""
+
+    def matrix(values: np.ndarray) -> flint.fmpq_mat:
+        entries = [flint.fmpq(*float(v).as_integer_ratio()) for v in np.ravel(values)]
+        return flint.fmpq_mat(*np.shape(values), entries)
+
+    A, b, c = matrix(loop.A), matrix(loop.B), matrix(loop.C)
+    den = A.charpoly()
+    num = (A - b * c).charpoly() - den + matrix(loop.D)[0, 0] * den
+    closed = den * flint.fmpq_poly([0, 1]) ** samples + flint.fmpq(*gain.as_integer_ratio()) * num
+    return all(abs(root) < 1 for root, _ in closed.numer().complex_roots())
+
+
+def test_exact_margins_are_those_of_the_exact_polynomial_where_the_loop_is_time_invariant() -> None:
     loops = assemble_loops(amber())
     exact = exact_margins(loops, "u")
-    margins = control.stability_margins(loops.break_points["u"].open_loop)
+    loop = loops.break_points["u"].open_loop
     assert exact.stable
-    assert exact.gain_upper == pytest.approx(margins[0], rel=1e-6)
-    # a delay of the hold and of the samples are the same only in whole ticks: 4.81 and 4.69 of them here
-    assert exact.delay_s == pytest.approx(np.radians(margins[1]) / margins[4], rel=0.05)
+    assert exact.gain_upper is not None
+    assert exact.delay_s is not None
+    assert exactly_stable(loop, exact.gain_upper * (1 - 1e-6), 0)
+    assert not exactly_stable(loop, exact.gain_upper * (1 + 1e-6), 0)
+    whole = int(exact.delay_s / loop.dt)  # a delay of the hold and of the samples are the same in whole ticks
+    assert exactly_stable(loop, 1.0, whole)
+    assert not exactly_stable(loop, 1.0, whole + 1)
 
 
 def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:

@@ -1,4 +1,4 @@
-"""Published and independently computed figures: hardware.md baseline, cases.md EMPS, G4 to G6."""
+"""Published and independently computed figures: the baseline, EMPS, G4 to G6."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def test_lifted_system_in_forced_response(rates: tuple[int, int]) -> None:
     torque = -1e-3
     direct = system.respond(command, torque)
     lifted = system.lifted()
-    inputs = np.vstack([command[:: rates[1]], np.full(steps, torque)])
+    inputs = np.vstack([command[:: rates[1]], np.full(steps, torque), np.zeros(steps)])
     answer = control.forced_response(lifted, np.arange(steps) * lifted.dt, inputs)
     stacked = answer.outputs.reshape(rates[1], len(system.outputs), steps).transpose(2, 0, 1)
     for r, name in enumerate(system.outputs):

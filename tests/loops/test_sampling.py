@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actuator_lti import InputError
-from actuator_lti.controllers import PI
+from actuator_lti.drive.blocks import pi
 from actuator_lti.sampling import delayed_hold, held_step, split_delay
 
 
@@ -44,18 +44,18 @@ def test_delay_close_to_whole_ticks_is_whole() -> None:
 
 
 def test_pi_in_z_is_the_recursion() -> None:
-    law, z = PI(2.0, 0.05, 0.01), np.exp(1j * 0.3)
+    law, z = pi(2.0, 0.05, 0.01), np.exp(1j * 0.3)
     k = np.arange(4000)
     e = z**k
-    integral = np.cumsum(law.integral_step * e)
-    v = law.gain * e + integral
-    offset = law.integral_step / (1 - z)  # the start's constant, which the response does not contain
-    np.testing.assert_allclose(v - offset, law.sampled(np.array([30.0]))[0] * e, rtol=1e-9)
-    assert PI(2.0, None, 0.01).sampled(np.array([1.0]))[0] == 2
+    integral = np.cumsum(2.0 * 0.01 / 0.05 * e)
+    v = 2.0 * e + integral
+    offset = 2.0 * 0.01 / 0.05 / (1 - z)  # the start's constant, which the response does not contain
+    np.testing.assert_allclose(v - offset, law.at_z(np.array([30.0]))[0] * e, rtol=1e-9)
+    assert pi(2.0, None, 0.01).at_z(np.array([1.0]))[0] == 2
 
 
 def test_pi_forms_agree_up_to_half_a_period_of_gain() -> None:
     """PI(z) = PI(s) + Kp T/(2 Tn) + O(s T^2)."""
-    law, omega = PI(2.0, 0.05, 0.001), np.array([1.0, 10.0])
-    gap = law.sampled(omega) - law.continuous(omega)
+    law, omega = pi(2.0, 0.05, 0.001), np.array([1.0, 10.0])
+    gap = law.at_z(omega) - law.at_s(omega)
     np.testing.assert_allclose(gap, 2.0 * 0.001 / 0.1, rtol=5e-3)

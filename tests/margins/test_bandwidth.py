@@ -25,7 +25,7 @@ def test_F3_second_order_with_delay(inner: bool) -> None:
     else:
         b = closed_loop_bandwidth(SECOND, delay_s=0.002)
     assert b.minus3db_hz == pytest.approx(38.1605894854, rel=1e-9)
-    assert b.minus90deg_hz == pytest.approx(25.4421530721, rel=1e-9)  # cases.md prints 25.4421, cut off
+    assert b.minus90deg_hz == pytest.approx(25.4421530721, rel=1e-9)  # the source prints 25.4421, cut off
     assert b.resonance_peak_db == pytest.approx(20 * math.log10(1 / math.sqrt(0.75)), abs=1e-9)
     assert b.resonance_hz == pytest.approx(30 * math.sqrt(0.5), rel=1e-6)
 
@@ -114,3 +114,67 @@ def test_no_value_to_fall_from(loop: control.LTI, message: str) -> None:
 def test_unknown_level() -> None:
     with pytest.raises(InputError, match="level"):
         closed_loop_bandwidth(SECOND, level="3")  # type: ignore[arg-type]
+
+
+def test_every_crossing_is_listed_and_the_first_fall_is_meant() -> None:
+    """1/(s + 1) plus a light resonance at 10 rad/s: falls, rises and falls again."""
+    loop = 100 * (s**2 / 64 + 0.02 * s + 1) / ((s + 1) * (s**2 + 0.02 * s + 100))
+    b = closed_loop_bandwidth(loop)
+    omega = np.geomspace(1e-2, 1e3, 2_000_001)
+    above = np.abs(loop(1j * omega)) > math.sqrt(0.5)
+    passes = omega[np.flatnonzero(above[1:] != above[:-1])]
+    assert len(passes) == 3
+    assert b.crossings_rad_s == pytest.approx(passes, rel=2e-5)
+    assert b.minus3db_rad_s == b.crossings_rad_s[0]
+    assert "the first fall of the gain is meant" in str(b)
+    assert "again" not in str(closed_loop_bandwidth(SECOND))
+
+
+@pytest.mark.parametrize("above_db", [80.0, 160.0])
+def test_a_resonance_far_above_the_gain_at_zero_frequency(above_db: float) -> None:
+    """k w s/(s^2 + 2 zeta w s + w^2) + e: its top is k/(2 zeta) at w, whatever the small e."""
+    zeta, w, e = 0.01, 50.0, 10.0 ** (-above_db / 20.0)
+    den = [1.0, 2 * zeta * w, w**2]
+    for system in (control.tf(np.polyadd([0.02 * w, 0.0], e * np.array(den)), den),
+                   control.tf2ss(np.polyadd([0.02 * w, 0.0], e * np.array(den)), den)):  # fmt: skip
+        b = closed_loop_bandwidth(system)
+        assert b.resonance_peak_db == pytest.approx(above_db + 20 * math.log10(1.0 + e), abs=1e-5)
+        assert b.resonance_rad_s == pytest.approx(w, rel=1e-6)
+        assert b.dc_gain == pytest.approx(e, rel=1e-9)
+        assert b.minus3db_rad_s is None  # it ends at e, as it starts, and rises in between
+        assert b.crossings_rad_s == ()
+
+
+def test_turns_of_random_systems_against_their_factors() -> None:
+    """-90 deg and -3 dB of products of known factors, from the phases and gains of these."""
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        poles = -(10.0 ** rng.uniform(-2, 3, int(rng.integers(2, 8))))
+        light = 10.0 ** rng.uniform(-1, 3)
+        zeta = 10.0 ** rng.uniform(-2, 0)
+        system = control.tf([1.0], np.polymul(np.poly(poles), [1.0, 2 * zeta * light, light**2]))
+
+        def phase(w: float, poles: np.ndarray = poles, light: float = light, zeta: float = zeta) -> float:
+            return -np.arctan(w / -poles).sum() - math.atan2(2 * zeta * light * w, light**2 - w**2)
+
+        def gain(w: float, poles: np.ndarray = poles, light: float = light, zeta: float = zeta) -> float:
+            quadratic = abs(complex(1.0 - (w / light) ** 2, 2 * zeta * w / light))
+            return float(1.0 / (np.sqrt(1.0 + (w / poles) ** 2).prod() * quadratic))
+
+        b = closed_loop_bandwidth(system)
+        assert b.minus90deg_rad_s is not None
+        assert phase(b.minus90deg_rad_s) == pytest.approx(-0.5 * math.pi, abs=1e-9)
+        for w in b.crossings_rad_s:
+            assert gain(w) == pytest.approx(math.sqrt(0.5), rel=1e-8)
+        omega = np.geomspace(1e-4, 1e5, 3001)
+        sides = np.array([gain(w) > math.sqrt(0.5) for w in omega])
+        assert len(b.crossings_rad_s) >= np.count_nonzero(sides[1:] != sides[:-1])
+        assert len(b.crossings_rad_s) % 2 == 1
+
+
+def test_fast_sampling_does_not_blur_the_bandwidth() -> None:
+    """1/(s + 1)^4 under a hold, 1e-4 s: four poles near z = 1, state space."""
+    held = control.c2d(control.ss(1 / (s + 1) ** 4), 1e-4)
+    b = closed_loop_bandwidth(held)
+    assert b.minus3db_rad_s == pytest.approx(math.sqrt(2**0.25 - 1), rel=1e-6)
+    assert b.minus90deg_rad_s == pytest.approx(math.tan(math.pi / 8), rel=2e-4)

@@ -35,7 +35,7 @@ LOOPS = {
     "G5": 72 * 0.01 / ((0.01 * s + 0.1) * (0.5 * s + 1) + 0.0001),
 }  # fmt: skip
 # name: stable, gain margins (ratio, rad/s), phase margins (deg, rad/s); the digits of
-# cases.md, and beyond them those of mpmath at 40 digits
+# the reference cases, and beyond them those of mpmath at 40 digits
 EXPECTED: dict[str, tuple[bool, list[tuple[float, float]], list[tuple[float, float]]]] = {
     "A1": (True, [(3.6, math.sqrt(10))], [(29.1103691304, 1.78443562083)]),
     "A2": (True, [(2.05172413793, 5.43741315711), (2351.1389, 10 * math.pi)],
@@ -75,7 +75,7 @@ def test_published_margins(name: str, loop: control.LTI) -> None:
     m = stability_margins(loop)
     assert m.stable is stable
     assert m.agreement.agree
-    if name.startswith("G4 single"):  # cases.md says nothing about its gain margin
+    if name.startswith("G4 single"):  # the source says nothing about its gain margin
         gains = [(g.ratio, g.frequency_rad_s) for g in m.gain_margins]
     assert [g.frequency_rad_s for g in m.gain_margins] == pytest.approx([w for _, w in gains], rel=1e-6)
     assert [g.ratio for g in m.gain_margins] == pytest.approx([k for k, _ in gains], rel=1e-6)

@@ -66,6 +66,8 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
         time.sleep(600)
     if mode == "die":
         os.kill(os.getpid(), signal.SIGKILL)
+    if mode == "eat":
+        bytearray(int(payload["bytes"]))
     if mode == "exit":
         raise SystemExit(7)
     if "log" in payload:

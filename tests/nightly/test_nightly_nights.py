@@ -11,10 +11,11 @@ import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 from site_checks import check_whole
 
+from actuator_lti.bounds import NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.changes import compare_figures
 from reports.nightly.figures import Figure
-from reports.nightly.job import MAX_JOBS, Job
+from reports.nightly.job import Job
 from reports.nightly.night import approve, run_night
 from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.nightly.trend import change_points, flaps, missing_nights
@@ -210,8 +211,13 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
 
 
 def test_too_large_a_study_is_refused_with_the_limit(tmp_path) -> None:
-    with pytest.raises(InputError, match=f"at most {MAX_JOBS}"):
-        run_night(study(*(Job(name=str(k)) for k in range(MAX_JOBS + 1))), tmp_path / "s", INLINE, code=CODE)
+    with pytest.raises(InputError, match=f"at most {NIGHTLY_JOBS.most}"):
+        run_night(
+            study(*(Job(name=str(k)) for k in range(NIGHTLY_JOBS.most + 1))),
+            tmp_path / "s",
+            INLINE,
+            code=CODE,
+        )
     with pytest.raises(InputError, match="used twice"):
         run_night(study(job("a"), job("a")), tmp_path / "s", INLINE, code=CODE)
     with pytest.raises(InputError, match="at most 20000 allowed"):

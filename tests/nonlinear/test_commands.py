@@ -76,7 +76,7 @@ def test_multisine_has_its_lines_and_its_seed() -> None:
         (lambda: commands.sampled([0.0, 0.0], [0.0, 1.0]), "must be later than"),
         (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
         (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
-        (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read"),
+        (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: no such file"),
         (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm or m"),
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
@@ -91,9 +91,9 @@ def test_refusals(make: Callable[[], object], words: str) -> None:
 def test_cells_that_are_no_numbers(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,a\n0,1\n1,x\n")
-    with pytest.raises(InputError, match=r"line 3, column 2 = 'x'"):
+    with pytest.raises(InputError, match=r'line 3, column 2 = "x"'):
         read_columns(path, ("t", "a"))
-    with pytest.raises(InputError, match="no column 'b'; there are t, a"):
+    with pytest.raises(InputError, match='no column "b"; there are "t", "a"'):
         read_columns(path, ("b",))
 
 

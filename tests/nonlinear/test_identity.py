@@ -49,13 +49,15 @@ def ride(
     )  # fmt: skip
     system = assemble_loops(design, load_Nm=load_Nm).tick_system
     T_v = design.controller.velocity.every * design.controller.period_s
-    known = {"w": SPEED, "th": start, "filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
-    known |= {name: int(name[1:]) * T_v * SPEED for name in system.states if name.startswith("D")}
+    known = {"w": SPEED, "th": start, "speed.filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
+    past = [name for name in system.states if name.startswith("estimate.D")]
+    known |= {name: int(name.removeprefix("estimate.D")) * T_v * SPEED for name in past}
     x0 = system.initial_state({name: value for name, value in known.items() if name in system.states})
     lifted = system.lifted()
     n = system.ticks
     torque = -design.friction.dry_Nm(load_Nm) if friction_on else 0.0
-    inputs = np.vstack([run.reference_rad[::n], np.full(TICKS // n, torque)])
+    held = np.ones(TICKS // n)
+    inputs = np.vstack([run.reference_rad[::n], torque * held, 0.0 * held])  # no load moment beside it
     times = np.arange(TICKS // n) * (n * design.controller.period_s)
     response = control.forced_response(lifted, times, inputs, x0)
     outputs = response.outputs.reshape(n, len(system.outputs), -1)
@@ -72,6 +74,7 @@ def assert_identical(run: Trajectory, linear: dict[str, np.ndarray]) -> None:
         "u": run.voltage_V,
         "i_ref": run.current_command_A,
         "w_ref": run.speed_command_rad_s,
+        "output_angle": run.output_angle_rad,
     }
     assert (run.motor_speed_rad_s > 0).all()
     assert not any(use.active for use in run.limits.values())

@@ -175,14 +175,6 @@ def test_an_interrupted_command_says_so(
     assert "interrupted" in one_line(capsys.readouterr().err)
 
 
-def test_a_mistake_of_the_program_is_not_hidden() -> None:
-    def call() -> None:
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        errors.run(call)
-
-
 def test_a_closed_pipe_is_no_error() -> None:
     code = "from reports.cli.main import main; import sys; sys.exit(main(['margins', '--json']))"
     read, write = os.pipe()

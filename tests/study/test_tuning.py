@@ -97,7 +97,7 @@ def test_what_cannot_be_met_is_refused_with_its_distance():
 
 
 def test_the_cascade_of_mathworks():
-    """Designing Cascade Control System with PI Controllers: single PI, and the inner PI (cases.md, G4)."""
+    """Designing Cascade Control System with PI Controllers: single PI, and the inner PI (MathWorks, G4)."""
     omega = 0.20007
     plant = 3 / (1j * omega + 2) * 10 / (1j * omega + 1) ** 3
     gain, time = pi_for_crossover(plant, omega, 59.99)

@@ -21,7 +21,7 @@ from analyses.large_signal.sawtooth import sawtooth
 
 
 def test_h1_rate_limit() -> None:
-    """cases.md H1: 10 deg, 5 Hz, 150 deg/s."""
+    """Reference case H1: 10 deg, 5 Hz, 150 deg/s."""
     found = rate_limited(10.0, 2.0 * math.pi * 5.0, 150.0)
     assert onset_frequency_rad_s(10.0, 150.0) / (2.0 * math.pi) == pytest.approx(2.3873, abs=5e-5)
     assert found.regime == "triangle"
@@ -32,7 +32,7 @@ def test_h1_rate_limit() -> None:
 
 
 def test_h2_acceleration_limit() -> None:
-    """cases.md H2: 20 000 deg/s2 at 20 Hz."""
+    """Reference case H2: 20 000 deg/s2 at 20 Hz."""
     found = acceleration_limited(20_000.0, 20.0)
     assert found.peak == pytest.approx(1.5625)
     assert found.fundamental == pytest.approx(1.6126, abs=5e-5)

@@ -1,0 +1,105 @@
+"""Where the gain of a rational system passes a level, and where it is largest: certified roots, no grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import flint
+
+from actuator_lti.exact_fraction import Fraction, double, roots
+
+_BITS = 128
+_V = flint.fmpq_poly([0, 1])
+
+
+@dataclass(frozen=True)
+class ExactGain:
+    """|H|^2 over v = w^2, a fraction of two polynomials; w = tan(angle/2) for a sampled system.
+
+    Attributes
+    ----------
+    above, below : fmpq_poly
+        |num(j w)|^2 and |den(j w)|^2.
+    real, imag : fmpq_poly
+        num(j w) conj(den(j w)) = real + j w imag.
+    dc : fmpq
+        H at zero frequency, with its sign.
+    """
+
+    above: flint.fmpq_poly
+    below: flint.fmpq_poly
+    real: flint.fmpq_poly
+    imag: flint.fmpq_poly
+    dc: flint.fmpq
+
+    def crossings(self, level_squared: float) -> list[float]:
+        """Every w > 0 at which |H| passes sqrt(level_squared) |H(0)|; where it only touches is left out."""
+        level = flint.fmpq(*level_squared.as_integer_ratio()) * self.dc * self.dc
+        with flint.ctx.workprec(_BITS):
+            return [_root(v) for v, times in _positive_roots(self.above - level * self.below) if times % 2]
+
+    def largest(self) -> tuple[float, float]:
+        """Largest |H|/|H(0)| and its w: 0 where that is zero frequency, infinity at the other end."""
+        with flint.ctx.workprec(_BITS):
+            poles = _positive_roots(self.below)
+            if poles:
+                return math.inf, _root(poles[0][0])
+            slope = self.above.derivative() * self.below - self.above * self.below.derivative()
+            found = [(1.0, 0.0)]
+            for v, _ in _positive_roots(slope):
+                value = flint.arb_poly(self.above)(v) / flint.arb_poly(self.below)(v)
+                found.append((_root(value) / abs(double(self.dc)), _root(v)))
+            n = self.below.degree()
+            end = math.sqrt(double(self.above[n] / self.below[n])) / abs(double(self.dc))
+            found.append((end, math.inf))
+        return max(found, key=lambda pair: pair[0])
+
+    def first_turn(self, floor_squared: float) -> float | None:
+        """w at which the phase first falls below -90 deg against zero frequency.
+
+        Followed as long as |H| is above sqrt(floor_squared) |H(0)|; ``None``: not until then.
+        """
+        fades = self.crossings(floor_squared)
+        half_turns, right = 0, True
+        with flint.ctx.workprec(_BITS):
+            for v, times in _positive_roots(self.real):
+                w = _root(v)
+                if fades and w > fades[0]:
+                    return None
+                if times % 2 == 0:
+                    continue
+                above = bool(flint.arb_poly(self.imag)(v) > 0) == bool(self.dc > 0)
+                half_turns += 1 if above == right else -1
+                right = not right
+                if half_turns < 0:
+                    return w
+        return None
+
+
+def exact_gain(fraction: Fraction, sampled: bool) -> ExactGain | None:
+    """Bring a transfer function into this form; ``None``: a pole at zero frequency."""
+    num, den = fraction.warped() if sampled else (fraction.num, fraction.den)
+    if den[0] == 0:
+        return None
+    (a, b), (c, d) = _split(num), _split(den)  # (a + j w b)/(c + j w d)
+    return ExactGain(
+        a * a + _V * b * b, c * c + _V * d * d, a * c + _V * b * d, b * c - a * d, num[0] / den[0]
+    )
+
+
+def _split(p: flint.fmpq_poly) -> tuple[flint.fmpq_poly, flint.fmpq_poly]:
+    """p(j w) = even(v) + j w odd(v)."""
+    c = p.coeffs()
+    even = flint.fmpq_poly([(-1) ** k * x for k, x in enumerate(c[0::2])])
+    return even, flint.fmpq_poly([(-1) ** k * x for k, x in enumerate(c[1::2])])
+
+
+def _positive_roots(p: flint.fmpq_poly) -> list[tuple[flint.arb, int]]:
+    """Positive real roots with their multiplicities, in order."""
+    real = [(z.real, times) for z, times in roots(p) if z.imag == 0 and z.real > 0]
+    return sorted(real, key=lambda pair: float(pair[0].mid()))
+
+
+def _root(v: flint.arb) -> float:
+    return float(v.sqrt().mid())

@@ -1,0 +1,87 @@
+"""Every key of a design file as a list to read: made from the registry of fields, so it cannot drift."""
+
+from __future__ import annotations
+
+from dataclasses import MISSING, asdict, dataclass, fields
+from math import inf
+from typing import Any
+
+from actuator_lti.design.field import BIG, Field, Structure
+from actuator_lti.design.field_table import ALL_FIELDS
+from actuator_lti.design.model import Axis
+from actuator_lti.design.sections import SECTIONS
+
+
+@dataclass(frozen=True)
+class KeyEntry:
+    """One key: dotted path, unit, default and range as text, meaning and example."""
+
+    path: str
+    section: str
+    key: str
+    symbol: str
+    unit: str
+    default: str
+    allowed: str
+    required: bool
+    description: str
+    example: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return asdict(self)
+
+
+def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
+    """All keys in the order of a design file, with the units of a full cascade on this axis.
+
+    Examples
+    --------
+    >>> entry = next(key for key in key_reference() if key.path == "control.velocity.every")
+    >>> entry.default, entry.allowed
+    ('1', 'at least 1 and at most 1000')
+    """
+    kinds = {section.template: section.kind for section in SECTIONS}
+    structure = Structure(axis)
+    return tuple(_entry(field, kinds.get(field.section), structure) for field in ALL_FIELDS)
+
+
+def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:
+    unit = "1" if field.kind in ("text", "choice", "flag") else field.unit(structure)
+    return KeyEntry(
+        path=field.path,
+        section=field.section,
+        key=field.key,
+        symbol=field.symbol,
+        unit=unit,
+        default=_default(field, kind, unit),
+        allowed=_allowed(field, unit),
+        required=field.required,
+        description=field.description,
+        example=field.example,
+    )
+
+
+def _default(field: Field, kind: type | None, unit: str) -> str:
+    known = {item.name: item.default for item in fields(kind)} if kind is not None else {}
+    value = known.get(field.attribute, MISSING)
+    if value is MISSING or value is None or value in ("", ()):
+        return ""
+    if value == inf:
+        return "none"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return ", ".join(f"{item:g}" for item in value)
+    text = value if isinstance(value, str) else f"{value:.10g}"
+    return text if unit == "1" or value == 0 else f"{text} {unit}"
+
+
+def _allowed(field: Field, unit: str) -> str:
+    if field.kind == "text":
+        return ""
+    if field.kind in ("quantity", "quantities") and field.low == -BIG and field.high == BIG:
+        return ""
+    if field.high == BIG:
+        return "above 0" if field.low > 0 else "0 or more"
+    return field.allowed(unit)

@@ -1,0 +1,237 @@
+"""What a drive can do at a load, in closed form: stall, breakaway, torque gain, top speed, acceleration.
+
+Steady motion and the first instant of it. Every function takes one design or a stacked one (numbers that are
+arrays of shape (K,)) and gives floats or arrays. Sources: paper, equations (1), (2), (9); model.md sections
+1, 6.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_lti.drive.operating import dry_torque, segments
+from actuator_lti.drive.wiring import present
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+NOTHING, SPEED_LIMIT, FORCE, VOLTAGE = range(4)
+RATE_LIMITS = ("nothing", "speed limit", "force", "voltage")
+"""What sets the largest speed, by the number that `Capability.rate_limit` holds."""
+
+
+@dataclass(frozen=True)
+class Capability:
+    """Figures of the whole drive at one hinge moment, the worse of both directions; floats or arrays.
+
+    Attributes
+    ----------
+    output_rate_rad_s : float or ndarray
+        Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it
+        cannot move; ``inf`` without any limit.
+    rate_limit : int or ndarray
+        What sets it, a place in `RATE_LIMITS`.
+    motor_current_A : float or ndarray
+        Current needed at that speed; NaN for an ideal source or where the speed has no bound.
+    acceleration_rad_s2 : float or ndarray
+        Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
+    accelerates_to_limit : bool or ndarray
+        Whether it is the acceleration limit that sets it, and not the torque.
+    """
+
+    output_rate_rad_s: Any
+    rate_limit: Any
+    motor_current_A: Any
+    acceleration_rad_s2: Any
+    accelerates_to_limit: Any
+
+
+def stall_torque_Nm(design: Design) -> Any:
+    """Largest motor torque at rest; ``inf`` without a limit."""
+    motor, limits = design.effective_motor, design.limits
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * limits.voltage_V
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    current = limits.voltage_V / motor.resistance_ohm
+    if design.controller.current is not None:
+        current = np.minimum(current, limits.peak_current_A)
+    return motor.torque_constant_Nm_A * current
+
+
+def torque_gain_Nm_rad(design: Design) -> Any:
+    """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
+    control, motor = design.controller, design.effective_motor
+    gain = control.position_loop.gain * design.total_ratio
+    if control.velocity is not None:
+        gain = gain * control.velocity.gain
+        for item in control.velocity.filters_on("torque"):
+            gain = gain * steady_gain(item)
+    if motor.source_gain_Nm_V is not None:
+        return gain * motor.source_gain_Nm_V
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    if control.current is None:
+        return gain * motor.torque_constant_Nm_A / motor.resistance_ohm
+    gain = gain * motor.torque_constant_Nm_A
+    if control.current.integral_time_s is None:
+        kp, fed = control.current.gain_V_A, control.current.resistance_feedforward * motor.resistance_ohm
+        gain = gain * (kp + fed) / (kp + motor.resistance_ohm)
+    return gain
+
+
+def steady_gain(item: Any) -> Any:
+    """Gain of a filter at DC: 1 but for a sampled biquad."""
+    return sum(item.b) / sum(item.a) if item.kind == "biquad" else 1.0
+
+
+def passed_moment_Nm(design: Design, load_Nm: float) -> Any:
+    """Torque at the motor by a moment on the output shaft; 0 where the load path locks itself."""
+    return load_Nm / design.total_ratio if design.load.path == "back-drivable" else 0.0
+
+
+def breakaway_torque_Nm(design: Design, load_Nm: float, direction: int) -> Any:
+    """Motor torque that starts motion in a direction; 0 where the load already does.
+
+    The breakaway ratio acts on the dry part only, not on the offset and not on the load (model.md section 6).
+    """
+    needed = _held_torque(design, load_Nm, direction) - direction * passed_moment_Nm(design, load_Nm)
+    return np.maximum(needed, 0.0) if np.ndim(needed) else max(float(needed), 0.0)
+
+
+def _held_torque(design: Design, load_Nm: float, direction: int) -> Any:
+    """Largest static friction, and the offset: what the drive torque has to exceed without a load."""
+    friction, behind = design.friction, design.load.friction
+    ratio = friction.breakaway_ratio if friction.law == "coulomb" else 0.0
+    total = dry_torque(design, load_Nm, direction) * ratio + direction * friction.offset_torque_Nm
+    if behind is None or design.coupling is None:
+        return total
+    locked = behind.dry_torque_Nm * behind.breakaway_ratio + direction * behind.offset_torque_Nm
+    return total + _through_train(design, ratio) * locked
+
+
+def _through_train(design: Design, ratio: Any = 1.0) -> Any:
+    """Motor torque per torque at the coupling: what the train passes, and friction that grows with it."""
+    passed = 1 / design.ratio_to_coupling if design.load.path == "back-drivable" else 0.0
+    return passed + ratio * design.friction.load_coefficient * design.ratio_behind_coupling
+
+
+def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
+    """Constant torque at the motor against motion: dry friction, offset, load where it passes."""
+    friction, behind = design.friction, design.load.friction
+    total = dry_torque(design, load_Nm, direction) + direction * friction.offset_torque_Nm
+    total = total + passed_moment_Nm(design, abs(load_Nm))
+    if behind is None or design.coupling is None:
+        return total
+    return total + _through_train(design) * (behind.dry_torque_Nm + direction * behind.offset_torque_Nm)
+
+
+def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
+    """Slope of friction over the motor's speed, piece by piece: (speed from which it holds, slope)."""
+    points = design.friction.map(direction)
+    pieces: list[tuple[float, Any]]
+    pieces = list(segments(points)) if points else [(0.0, design.friction.viscous(direction))]
+    behind = design.load.friction
+    if behind is None or design.coupling is None or not present(behind.viscous_Nms_rad):
+        return pieces
+    more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
+    return [(start, slope + more) for start, slope in pieces]
+
+
+def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:
+    """Largest steady motor speed, what sets it, and the torque against motion there."""
+    motor, limits, stall = design.effective_motor, design.limits, stall_torque_Nm(design)
+    kinds, bounds = [NOTHING], [np.asarray(math.inf)]
+    if design.controller.velocity is not None and "position" in design.controller.stages:
+        kinds.append(SPEED_LIMIT)
+        bounds.append(np.asarray(limits.speed_rad_s, dtype=float))
+    kinds.append(FORCE)
+    bounds.append(_first_root(against - stall, slopes, 0.0))
+    if motor.source_gain_Nm_V is None:
+        R, kM, kE = motor.resistance_ohm, motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+        assert R is not None
+        assert kM is not None
+        assert kE is not None
+        kinds.append(VOLTAGE)
+        bounds.append(_first_root(against - kM * limits.voltage_V / R, slopes, kM * kE / R))
+    stacked = np.stack(np.broadcast_arrays(*bounds))
+    which = np.argmin(stacked, axis=0)
+    speed = np.min(stacked, axis=0)
+    moves = np.asarray(stall > against)
+    speed, cause = np.where(moves, speed, 0.0), np.where(moves, np.array(kinds)[which], FORCE)
+    return speed, cause, against + _speed_torque(slopes, speed)
+
+
+def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
+    """Torque of the speed-dependent part at a speed (0 at an unbounded one, where it has no meaning)."""
+    finite, total, last = np.where(np.isfinite(speed), speed, 0.0), 0.0, 0.0
+    for start, slope in slopes:
+        total = total + (slope - last) * np.maximum(finite - start, 0.0)
+        last = slope
+    return total
+
+
+def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) -> Any:
+    """First speed where ``start_value + friction(w) + more w`` rises through 0; inf where it does not."""
+    found: Any = np.asarray(math.inf)
+    value = np.asarray(start_value, dtype=float)
+    ends = [start for start, _ in slopes[1:]] + [math.inf]
+    for (start, slope), end in zip(slopes, ends, strict=True):
+        rise = np.asarray(slope + more, dtype=float)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.where(rise > 0, start - value / rise, math.inf)
+        hit = (root <= end) & (root >= start) & np.isinf(found)
+        found = np.where(hit, root, found)
+        value = value + rise * (end - start) if math.isfinite(end) else value
+    return found
+
+
+def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
+    """The figures for one direction of motion, the load against it."""
+    against = resistance_Nm(design, load_Nm, direction)
+    speed, cause, torque = _top_speed(design, against, _speed_slopes(design, direction))
+    stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
+    needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
+    starts = (stall > needed) & (stall > against)
+    gain = np.where(starts, (stall - against) / design.inertia_kgm2, 0.0)
+    limit = design.limits.acceleration_rad_s2
+    current = np.where(np.isfinite(speed), torque / kM, np.nan) if kM is not None else np.nan
+    return Capability(
+        output_rate_rad_s=speed / design.total_ratio,
+        rate_limit=cause,
+        motor_current_A=current,
+        acceleration_rad_s2=np.minimum(gain, limit) / design.total_ratio,
+        accelerates_to_limit=limit < gain,
+    )
+
+
+def capability(design: Design, load_Nm: float = 0.0) -> Capability:
+    """Rate, current and acceleration at a hinge moment (either sign): the worse of both directions.
+
+    Worse is the slower direction, then the weaker, then the one that needs more current. On a back-drivable
+    path the moment is against the motion.
+
+    Raises
+    ------
+    InputError
+        If the load is not finite.
+    """
+    if not math.isfinite(load_Nm):
+        raise InputError(f"load_Nm = {load_Nm}: must be finite")
+    ahead, back = (_one_way(design, load_Nm, direction) for direction in (1, -1))
+    with np.errstate(invalid="ignore"):
+        rate = np.where(
+            np.equal(ahead.output_rate_rad_s, back.output_rate_rad_s),
+            0.0,
+            back.output_rate_rad_s - ahead.output_rate_rad_s,
+        )
+        acceleration = back.acceleration_rad_s2 - ahead.acceleration_rad_s2
+        current = np.nan_to_num(back.motor_current_A) - np.nan_to_num(ahead.motor_current_A)
+    worse = (rate < 0) | ((rate == 0) & ((acceleration < 0) | ((acceleration == 0) & (current > 0))))
+    names = Capability.__dataclass_fields__
+    return Capability(**{n: np.where(worse, getattr(back, n), getattr(ahead, n)) for n in names})

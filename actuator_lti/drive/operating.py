@@ -1,0 +1,162 @@
+"""The operating point about which a drive is made linear: friction, contact, load, direction of motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import cos, isfinite, pi
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, FrictionPoint
+
+OperatingPoint = Literal["sliding", "rest", "describing-function", "driving", "driven", "gap"]
+RotorState = Literal["free", "locked"]
+CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the load-dependent friction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Operating:
+    """Where a drive stands when it is made linear (model.md sections 3 and 6).
+
+    Attributes
+    ----------
+    point : str
+        ``sliding``: the viscous slope, as the dry part is a constant while the speed keeps its sign.
+        ``rest``: plus Tc/w_s, the slope of the tanh law at zero speed. ``describing-function``: the slope
+        that dry friction has for a sinusoidal speed. ``driving``, ``driven`` (only with a coupling): sliding,
+        with the coupling's torque against or with the motion, which decides the sign of the load-dependent
+        friction; ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
+    load_Nm : float
+        Hinge moment at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
+    speed_amplitude_rad_s : float or None
+        W (peak, motor side), for the describing function.
+    direction : {1, -1}
+        Direction of motion, for asymmetric friction.
+    rotor : {"free", "locked"}
+    speed_rad_s : float
+        Motor speed at which the slope of a friction map is taken.
+    angle_rad : float
+        Output angle at which gravity is made linear.
+    """
+
+    point: OperatingPoint = "sliding"
+    load_Nm: float = 0.0
+    speed_amplitude_rad_s: float | None = None
+    direction: int = 1
+    rotor: RotorState = "free"
+    speed_rad_s: float = 0.0
+    angle_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no operating point."""
+        if self.point not in get_args(OperatingPoint):
+            raise InputError(
+                f"operating_point = {self.point!r}: one of {', '.join(get_args(OperatingPoint))}"
+            )
+        if self.direction not in (1, -1):
+            raise InputError(f"direction = {self.direction!r}: 1 or -1")
+        if self.rotor not in get_args(RotorState):
+            raise InputError(f"rotor = {self.rotor!r}: free or locked")
+        for name in ("load_Nm", "speed_rad_s", "angle_rad"):
+            if not isfinite(getattr(self, name)):
+                raise InputError(f"{name} = {getattr(self, name)}: must be finite")
+        amplitude = self.speed_amplitude_rad_s
+        if self.point == "describing-function" and (amplitude is None or not 0 < amplitude < float("inf")):
+            raise InputError(f"speed_amplitude_rad_s = {amplitude}: must be positive (motor side)")
+
+    def checked(self, design: Design) -> Operating:
+        """The same, refused where the design has no such operating point."""
+        if self.point in ("driving", "driven", "gap") and design.coupling is None:
+            raise InputError(f"operating_point = {self.point!r}: the design has no coupling")
+        return self
+
+
+def friction_slope(
+    design: Design,
+    operating_point: OperatingPoint = "sliding",
+    load_Nm: float = 0.0,
+    speed_amplitude_rad_s: float | None = None,
+    direction: int = 1,
+    speed_rad_s: float = 0.0,
+) -> Any:
+    """Slope of the motor's friction torque over speed, in N m s/rad (motor side).
+
+    ``sliding``: Cv, or the slope of the friction map at a speed. ``rest``: plus Tc/w_s. Describing function:
+    Cv + 4 Tc/(pi W), exact for the fundamental; where friction differs by direction, the mean of both; of a
+    map exact as well, every bend being a dead zone. A float, or an array for stacked designs.
+
+    Raises
+    ------
+    InputError
+        As `Operating`.
+    """
+    at = Operating(
+        point=operating_point,
+        load_Nm=load_Nm,
+        speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction,
+        speed_rad_s=speed_rad_s,
+    )
+    return slope_at(design, at)
+
+
+def slope_at(design: Design, at: Operating) -> Any:
+    """The friction slope at an `Operating`, see `friction_slope`."""
+    if at.point == "describing-function":
+        return sum(_described(design, at, way) for way in (1, -1)) / 2
+    points = design.friction.map(at.direction)
+    slope = _map_slope(points, abs(at.speed_rad_s)) if points else design.friction.viscous(at.direction)
+    if at.point == "rest":
+        slope = slope + dry_torque(design, at.load_Nm, at.direction) / design.friction.smoothing_speed_rad_s
+    return slope
+
+
+def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
+    """Tc = C0 + CM |M_ext| in N m at the motor; C0 is the first torque of a friction map."""
+    points, dry = design.friction.map(direction), design.friction.dry_Nm(load_Nm, direction)
+    if not points:
+        return dry
+    return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
+
+
+def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
+    """(speed from which it holds, slope) of each straight piece of a friction map; the last continues."""
+    found = [
+        (a.speed_rad_s, (b.torque_Nm - a.torque_Nm) / (b.speed_rad_s - a.speed_rad_s))
+        for a, b in pairwise(points)
+    ]
+    return found or [(0.0, 0.0)]
+
+
+def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> float:
+    return [slope for start, slope in segments(points) if start <= speed][-1]
+
+
+def _described(design: Design, at: Operating, way: int) -> Any:
+    W, points = at.speed_amplitude_rad_s, design.friction.map(way)
+    assert W is not None
+    dry = 4 * dry_torque(design, at.load_Nm, way) / (pi * W)
+    if not points:
+        return design.friction.viscous(way) + dry
+    total, last = dry, 0.0
+    for start, slope in segments(points):
+        total, last = total + (slope - last) * _dead_zone(start / W), slope
+    return total
+
+
+def _dead_zone(x: float) -> float:
+    """Describing function of a dead zone of half width x times the amplitude (model.md section 9)."""
+    return 0.0 if x >= 1 else 1.0 - 2.0 / pi * float(np.arcsin(x) + x * np.sqrt(1 - x * x))
+
+
+def moment_slope(design: Design, at: Operating) -> Any:
+    """dM_ext/d(output angle) in N m/rad: the load's slope and gravity's at the operating angle."""
+    load = design.load
+    if load.gravity is None:
+        return load.moment_slope_Nm_rad
+    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * cos(at.angle_rad + load.gravity.offset_rad)

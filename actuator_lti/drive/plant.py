@@ -1,0 +1,179 @@
+"""The continuous plant of a drive at an operating point, rigid or with an elastic coupling.
+
+Equations (1), (2), (14), and model.md section 6.
+
+Coefficients may be arrays of shape (K,) stacked over designs: then the matrices have K in front.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, Motor
+
+
+@dataclass(frozen=True)
+class Plant:
+    """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive.
+
+    Attributes
+    ----------
+    states : tuple of str
+        ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source; ``("i",)``
+        with the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and ``"twist"`` =
+        th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop
+        sees.
+    A : ndarray, shape (..., n, n)
+        Without the load's stiffness, see `stiffness_Nm_rad`.
+    B_u, B_T, B_M : ndarray, shape (..., n)
+        Effect of the voltage (V, or the drive signal of a torque source), of a torque in N m that accelerates
+        the motor, and of a moment in N m that pushes the output shaft forward.
+    stiffness_Nm_rad : float or ndarray
+        dM_ext/d(output angle), where the moment reaches the plant; M_ext is held over a tick.
+    rows : dict of str to dict of str to float
+        Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle
+        behind the coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees).
+    """
+
+    states: tuple[str, ...]
+    A: np.ndarray
+    B_u: np.ndarray
+    B_T: np.ndarray
+    B_M: np.ndarray
+    stiffness_Nm_rad: Any
+    rows: dict[str, dict[str, Any]]
+
+
+def matrix(names: tuple[str, ...], entries: dict[tuple[str, str], Any]) -> np.ndarray:
+    """A square matrix over named states, stacked where an entry is an array of shape (K,)."""
+    out = np.zeros((*_stack(entries.values()), len(names), len(names)))
+    for (row, column), value in entries.items():
+        out[..., names.index(row), names.index(column)] = value
+    return out
+
+
+def vector(names: tuple[str, ...], entries: dict[str, Any]) -> np.ndarray:
+    """A vector over named states, stacked as `matrix`."""
+    out = np.zeros((*_stack(entries.values()), len(names)))
+    for name, value in entries.items():
+        out[..., names.index(name)] = value
+    return out
+
+
+def _stack(values: Iterable[Any]) -> tuple[int, ...]:
+    return np.broadcast_shapes(*(np.shape(value) for value in values))
+
+
+def motor_plant(design: Design, at: Operating | None = None) -> Plant:
+    """State space of equations (1), (2), (14), and of section 6 with a coupling.
+
+    Raises
+    ------
+    InputError
+        For an operating point that the design does not have, or a locked rotor without a current.
+
+    Examples
+    --------
+    >>> from actuator_lti.design.model import Controller, Design, Limits, Motor, PositionLoop, Validation
+    >>> from actuator_lti.design.model import Friction
+    >>> design = Design(
+    ...     name="force source", title="", motor=Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
+    ...     controller=Controller(period_s=1e-3, computing_delay_s=0.0, position=PositionLoop(gain=1.0)),
+    ...     limits=Limits(voltage_V=10.0), validation=Validation(full_deflection_rad=1.0),
+    ...     friction=Friction(viscous_Nms_rad=6.0))
+    >>> plant = motor_plant(design)
+    >>> plant.states, plant.A[0].tolist(), plant.B_u.tolist()
+    (('w', 'th'), [-3.0, 0.0], [2.0, 0.0])
+    """
+    at = (at or Operating()).checked(design)
+    motor = design.effective_motor
+    if at.rotor == "locked":
+        if not motor.has_electrical_dynamics:
+            raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
+        A, B = _electrical(motor)
+        names = ("i",)
+        none = np.zeros(1)
+        return Plant(names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, 0.0, {})
+    return _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
+
+
+def _electrical(motor: Motor) -> tuple[dict[tuple[str, str], Any], dict[str, Any]]:
+    """Equation (1): entries of the current's row, and of B_u."""
+    R, L, kE = motor.resistance_ohm, motor.inductance_H, motor.back_emf_constant_Vs_rad
+    if R is None or L is None or kE is None or motor.torque_constant_Nm_A is None:
+        raise InputError(
+            "motor: resistance, inductance, torque_constant and back_emf_constant, or source_gain"
+        )
+    return {("i", "i"): -R / L, ("i", "w"): -kE / L}, {"i": 1 / L}
+
+
+def _motor_side(motor: Motor, J: Any, slope: Any) -> tuple[dict[tuple[str, str], Any], dict[str, Any]]:
+    """Entries of the motor's own equations (1), (2), (14)."""
+    own = {("w", "w"): -slope / J, ("th", "w"): 1.0}
+    if motor.source_gain_Nm_V is not None:
+        return own, {"w": motor.source_gain_Nm_V / J}
+    A, B = _electrical(motor)
+    return {**A, ("w", "i"): motor.torque_constant_Nm_A / J, **own}, B
+
+
+def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
+    J, N = design.inertia_kgm2, design.total_ratio
+    A, B_u = _motor_side(motor, J, slope_at(design, at))
+    names = ("i", "w", "th") if motor.has_electrical_dynamics else ("w", "th")
+    reaches = design.load.path == "back-drivable"
+    return Plant(
+        states=names,
+        A=matrix(names, A),
+        B_u=vector(names, B_u),
+        B_T=vector(names, {"w": 1 / J}),
+        B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}),
+        stiffness_Nm_rad=moment_slope(design, at) if reaches else 0.0,
+        rows={"output_angle": {"th": 1 / N}, "load_speed": {"w": 1.0}},
+    )
+
+
+def reaction(design: Design, at: Operating) -> Any:
+    """Share of the coupling's torque that the motor feels: 1/N_c (back-drivable) + CM' sgn(w T_s)."""
+    passed = 1 / design.ratio_to_coupling if design.load.path == "back-drivable" else 0.0
+    sign = CONTACT.get(at.point, 0.0)
+    return passed + sign * design.friction.load_coefficient * design.ratio_behind_coupling
+
+
+def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
+    coupling, friction = design.coupling, design.load.friction
+    assert coupling is not None
+    J_m, J_l = design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
+    N_c, N_r = design.ratio_to_coupling, design.ratio_behind_coupling
+    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
+    A, B_u = _motor_side(motor, J_m, slope_at(design, at))
+    names = ("i", "w", "th", "W", "twist") if motor.has_electrical_dynamics else ("w", "th", "W", "twist")
+    spring = {} if at.point == "gap" else {"twist": k, "w": c / N_c, "W": -c}
+    felt = reaction(design, at)
+    for name, value in spring.items():
+        A["w", name] = A.get(("w", name), 0.0) - felt * value / J_m
+        A["W", name] = value / J_l
+    A["W", "W"] = A.get(("W", "W"), 0.0) - (friction.viscous_Nms_rad if friction else 0.0) / J_l
+    A |= {("twist", "w"): 1 / N_c, ("twist", "W"): -1.0}
+    phi = {"th": 1 / N_c, "twist": -1.0}
+    return Plant(
+        states=names,
+        A=matrix(names, A),
+        B_u=vector(names, B_u),
+        B_T=vector(names, {"w": 1 / J_m}),
+        B_M=vector(names, {"W": 1 / (N_r * J_l)}),
+        stiffness_Nm_rad=moment_slope(design, at),
+        rows={
+            "output_angle": {name: value / N_r for name, value in phi.items()},
+            "phi": phi,
+            "T_s": spring,
+            "load_speed": {"W": N_c},
+        },
+    )

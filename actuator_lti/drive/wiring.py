@@ -1,0 +1,194 @@
+"""How the stages of a drive are wired: who drives whom, how often, and in which units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_lti.drive import blocks
+from actuator_lti.drive.blocks import Block
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.plant import Plant, motor_plant
+from actuator_lti.drive.signals import SIGNALS
+from actuator_lti.errors import InputError
+from actuator_lti.sampling import DelayedHold, delayed_hold
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, Filter
+
+ERRORS = {"current": "e_i", "velocity": "e_w", "position": "e_th"}
+MEASURED = {"current": "i", "velocity": "w_meas", "position": "th"}
+COMMANDS = {"voltage": "u", "current": "i_ref", "velocity": "w_ref", "position": "th_ref"}
+
+
+def present(value: Any) -> bool:
+    """Whether a coefficient (an array: of any design) is there at all."""
+    return value is not None and bool(np.any(value != 0))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A design (its numbers may be arrays, stacked over designs) at an operating point, as the loops need it.
+
+    Attributes
+    ----------
+    design : Design
+    operating : Operating
+    stages : tuple of str
+        The stages present, innermost first, of ``"current"``, ``"velocity"``, ``"position"``.
+    interval : dict
+        Ticks between two updates of each stage, and of the speed measurement (``"speed"``).
+    target : dict
+        The signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
+    """
+
+    design: Design
+    operating: Operating
+    stages: tuple[str, ...]
+    interval: dict[str, int]
+    target: dict[str, str]
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The plant at the operating point."""
+        return motor_plant(self.design, self.operating)
+
+    @cached_property
+    def hold(self) -> DelayedHold:
+        """The sampled plant; the angle is an exact integrator. Second inputs: torque at the motor, moment."""
+        plant, control = self.plant, self.design.controller
+        B = np.stack(np.broadcast_arrays(plant.B_T, plant.B_M), axis=-1)
+        hold = delayed_hold(plant.A, plant.B_u[..., None], B, control.period_s, control.computing_delay_s)
+        if "th" in plant.states:
+            hold.Phi[..., :, plant.states.index("th")] = np.eye(len(plant.states))[plant.states.index("th")]
+        return hold
+
+    @property
+    def tick_s(self) -> Any:
+        """Base period Ts."""
+        return self.design.controller.period_s
+
+    @property
+    def ratio(self) -> Any:
+        """N, motor angle over output angle."""
+        return self.design.total_ratio
+
+    def period_s(self, stage: str) -> Any:
+        """Period T of a stage in s."""
+        return self.interval[stage] * self.tick_s
+
+    @property
+    def outermost(self) -> str:
+        """The stage that takes the command; ``"voltage"`` where there is no loop."""
+        return self.stages[-1] if self.stages else "voltage"
+
+    def law(self, stage: str) -> Block:
+        """The PI of a stage in its own period (of the position loop without its derivative part)."""
+        control, T = self.design.controller, self.period_s(stage)
+        if stage == "current" and control.current is not None:
+            return blocks.pi(control.current.gain_V_A, control.current.integral_time_s, T)
+        if stage == "velocity" and control.velocity is not None:
+            return blocks.pi(control.velocity.gain, control.velocity.integral_time_s, T)
+        return blocks.pi(control.position_loop.gain, control.position_loop.integral_time_s, T)
+
+    def filters(self, place: str) -> tuple[Filter, ...]:
+        """Filters of the velocity loop on ``"speed"`` or ``"torque"``, in order."""
+        velocity = self.design.controller.velocity
+        return () if velocity is None else velocity.filters_on(place)  # type: ignore[arg-type]
+
+    @property
+    def command_filter(self) -> Block | None:
+        """The filter of the command at the period of the outermost stage, in Tustin's form."""
+        from actuator_lti.design.model import Filter
+
+        command = self.design.command
+        if not present(command.filter_time_s):
+            return None
+        item = Filter(
+            kind="lowpass",
+            frequency_rad_s=1 / command.filter_time_s,
+            order=command.filter_order,
+            damping=command.filter_damping,
+        )
+        T = self.period_s(self.outermost) if self.stages else self.tick_s
+        return blocks.biquad(item, T)
+
+    @property
+    def torque_per_target(self) -> Any:
+        """Motor torque per unit of what drives it (A: kM; V: kM/R at rest; a source's gain)."""
+        motor = self.design.effective_motor
+        if motor.source_gain_Nm_V is not None:
+            return motor.source_gain_Nm_V
+        assert motor.torque_constant_Nm_A is not None
+        assert motor.resistance_ohm is not None
+        per_ampere = motor.torque_constant_Nm_A
+        return per_ampere if self.design.controller.current is not None else per_ampere / motor.resistance_ohm
+
+    @property
+    def acceleration_gain(self) -> Any:
+        """J/kM (J over `torque_per_target`), what an acceleration of the motor needs."""
+        return self.design.inertia_kgm2 / self.torque_per_target
+
+    def producer(self, signal: str) -> str:
+        """The stage that updates a break point (``"output"`` is read by the position stage)."""
+        for stage, target in self.target.items():
+            if target == signal:
+                return stage
+        return "position"
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The break points that exist, from the motor outwards."""
+        return (
+            *(self.target[stage] for stage in self.stages),
+            *(("output",) if "position" in self.stages else ()),
+        )
+
+    def inside(self, stage: str) -> tuple[str, ...]:
+        """The stages inside a stage."""
+        return self.stages[: self.stages.index(stage)]
+
+    def unit(self, signal: str) -> str:
+        """Unit of a signal (motor side, except ``"output"``), for a rotary or a linear axis."""
+        return SIGNALS[signal].unit_for(self.design.axis)
+
+    def later(self, delay_s: float) -> Drive:
+        """The same drive with more computing delay."""
+        control = self.design.controller
+        slower = replace(control, computing_delay_s=control.computing_delay_s + delay_s)
+        return replace(self, design=replace(self.design, controller=slower))
+
+
+def wire(design: Design, operating: Operating | None = None) -> Drive:
+    """Wire a design up at an operating point; with the rotor locked only the current loop remains.
+
+    Raises
+    ------
+    InputError
+        For stages that do not fit, or an operating point that the design does not have.
+    """
+    at = (operating or Operating()).checked(design)
+    control = design.controller
+    if control.current is not None and not design.motor.has_electrical_dynamics:
+        raise InputError("control.current: an ideal torque source has no current to control")
+    if at.rotor == "locked" and not design.motor.has_electrical_dynamics:
+        raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
+    kept = control.stages if at.rotor == "free" else tuple(s for s in control.stages if s == "current")
+    stages = tuple(str(stage) for stage in reversed(kept))
+    signals = {"current": "i_ref", "velocity": "w_ref"}
+    target, inner = {}, "u"
+    for stage in stages:
+        target[stage] = inner
+        inner = signals.get(stage, "")
+    every = {
+        "current": 1,
+        "velocity": control.velocity.every if control.velocity else 1,
+        "position": control.position.every if control.position else 1,
+    }
+    if every["position"] % every["velocity"] and "position" in stages:
+        raise InputError(f"control.position.every = {every['position']}: a multiple of {every['velocity']}")
+    interval = {stage: every[stage] for stage in stages} | {"speed": every["velocity"]}
+    return Drive(design, at, stages, interval, target)

@@ -1,0 +1,227 @@
+"""One walk over the drive, from the command to the voltage: model.md sections 2 and 7 as a program on rows.
+
+What time is, the algebra says that a walk runs in: `actuator_lti.loops.tick` (samples) or
+`actuator_lti.loops.flow` (derivatives and delays). The walk knows which signal goes where, and nothing else.
+
+Signals that it leaves behind (motor side, before a cut): the plant's ``i``, ``w``, ``th``, ``W``, ``phi``,
+``T_s`` and ``output_angle``; ``output``, the angle fed back; ``w_cmd`` and ``torque_command`` in front of
+their limiters; ``w_meas``; the errors ``e_*``; the break points ``u``, ``i_ref``, ``w_ref``. The friction
+feed-forward has a step in it and no linear part.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from actuator_lti.drive import blocks
+from actuator_lti.drive.blocks import Block
+from actuator_lti.drive.wiring import ERRORS, Drive, present
+from actuator_lti.loops.rows import Row, total
+
+INPUTS = ("ref", "torque", "moment", "cut")
+
+
+@dataclass(frozen=True)
+class Program:
+    """The linear drive up to a stage, perhaps with one signal cut.
+
+    Attributes
+    ----------
+    drive : Drive
+    outer : str
+        Outermost stage that runs; its reference is the input ``ref`` (of the position at the output shaft).
+    cut : str or None
+        A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``)
+        that is replaced by the input ``cut`` where it is updated; what arrives is the signal of that
+        name.
+    opened : tuple of str
+        Stages whose feedback is taken away; their controllers stay in the path.
+    """
+
+    drive: Drive
+    outer: str
+    cut: str | None = None
+    opened: tuple[str, ...] = ()
+
+    @cached_property
+    def stages(self) -> tuple[str, ...]:
+        """Stages that run, innermost first."""
+        names = self.drive.stages
+        return names[: names.index(self.outer) + 1] if names else ()
+
+    @property
+    def measures_speed(self) -> bool:
+        """Whether the velocity feedback is there."""
+        return "velocity" in self.stages and "velocity" not in self.opened
+
+    @property
+    def feeds_back_emf(self) -> bool:
+        """Whether the measured speed is fed forward to the voltage."""
+        current = self.drive.design.controller.current
+        if current is None or "current" not in self.stages or self.drive.operating.rotor == "locked":
+            return False
+        return present(current.back_emf_feedforward)
+
+    @property
+    def ticks(self) -> int:
+        """Ticks after which the program repeats."""
+        every = self.drive.interval
+        return max([every[s] for s in self.stages] + ([every["speed"]] if self.feeds_back_emf else [1]))
+
+
+class Walk(ABC):
+    """The program once; an algebra fills in what time does to a signal."""
+
+    def __init__(self, program: Program) -> None:
+        self.program, self.drive = program, program.drive
+        self.design, self.control = program.drive.design, program.drive.design.controller
+        self.signals: dict[str, Row] = {}
+        self.extra = Row()  # feed-forward of acceleration, to the torque command
+
+    # -- what an algebra provides -------------------------------------------------------------------------
+
+    @abstractmethod
+    def state(self, name: str) -> Row:
+        """The value of a state."""
+
+    @abstractmethod
+    def updates(self, every: int) -> bool:
+        """Whether something that runs every so many ticks runs now."""
+
+    @abstractmethod
+    def held(self, name: str, value: Row | None, made: int, used: int) -> Row:
+        """A value made every `made` ticks as one sees it that looks every `used` (``None``: not made now)."""
+
+    @abstractmethod
+    def apply(self, name: str, block: Block, value: Row) -> Row:
+        """A block's output, its states named after its place."""
+
+    @abstractmethod
+    def derivative(self, name: str, value: Row, period_s: Any) -> Row:
+        """What the drive takes for a derivative: the difference over a period."""
+
+    @abstractmethod
+    def estimated(self, block: Block, speed: Row, angle: Row) -> Row:
+        """A speed estimated from an angle."""
+
+    # -- the drive ----------------------------------------------------------------------------------------
+
+    def controllers(self) -> Row:
+        """The cascade, outermost stage first; what it gives to the plant."""
+        self.plant_signals()
+        stages = self.program.stages
+        if not stages:
+            value = self.command() if self.updates(1) else None
+            return self.held("u", value, 1, 1)
+        reference = None
+        for k in reversed(range(len(stages))):
+            stage, every = stages[k], self.drive.interval[stages[k]]
+            target, value = self.drive.target[stage], None
+            if self.updates(every):
+                reference = self.command() if stage == stages[-1] else reference
+                assert reference is not None
+                value = self.at_cut(target, getattr(self, stage)(reference))
+            reference = self.held(target, value, every, self.drive.interval[stages[k - 1]] if k else 1)
+            self.signals.setdefault(target, reference)
+        assert reference is not None
+        return reference
+
+    def plant_signals(self) -> None:
+        """Name the plant's states and what is a combination of them."""
+        plant = self.drive.plant
+        self.signals |= {name: self.state(name) for name in plant.states}
+        for name, terms in plant.rows.items():
+            self.signals[name] = total(value * self.state(state) for state, value in terms.items())
+
+    def at_cut(self, name: str, value: Row) -> Row:
+        """Leave a signal behind; what goes on is the cut's input where it is cut here."""
+        self.signals[name] = value
+        return Row.of("cut") if self.program.cut == name else value
+
+    def command(self) -> Row:
+        """The reference of the outermost stage, behind the command's filter where it is the drive's own."""
+        value, block = Row.of("ref"), self.drive.command_filter
+        if block is None or self.program.outer != self.drive.outermost:
+            return value
+        return self.apply("command", block, value)
+
+    def position(self, reference: Row) -> Row:
+        """P, PI or PID on the angle, and the feed-forward of speed and acceleration."""
+        law, N, T = self.control.position_loop, self.drive.ratio, self.drive.period_s("position")
+        command = N * reference
+        sensed = self.signals["output_angle" if law.sensor == "output" else "th"]
+        own = sensed if law.sensor == "output" else sensed / N
+        error = self.at_cut("e_th", command - N * self.at_cut("output", own))
+        value = self.apply("position", self.drive.law("position"), error)
+        if present(law.derivative_time_s):
+            slope = self.derivative("e_th", error, T)
+            if present(law.derivative_filter_s):
+                slope = self.apply("derivative", blocks.lag(law.derivative_filter_s, T), slope)
+            value = value + law.gain * law.derivative_time_s * slope
+        if present(law.feedforward) or present(law.acceleration_feedforward):
+            rate = self.derivative("ref", command, T)
+            value = value + law.feedforward * rate
+        if present(law.acceleration_feedforward):
+            gain = law.acceleration_feedforward * self.drive.acceleration_gain
+            made = gain * self.derivative("rate", rate, T)
+            if "velocity" not in self.program.stages:
+                value = value + made
+            else:
+                self.extra = made
+        self.signals["w_cmd"] = value
+        return value
+
+    def measured_speed(self) -> Row:
+        """The speed as the drive knows it, every velocity period."""
+        velocity, encoder, T = self.control.velocity, self.design.encoder, self.drive.period_s("speed")
+        behind = velocity is not None and velocity.sensor == "output"
+        speed = self.signals["load_speed" if behind else "w"]
+        angle = self.drive.ratio * self.signals["output_angle"] if behind else self.signals["th"]
+        block = blocks.speed_estimate(encoder, T)
+        if block is not None:
+            speed = self.estimated(block, speed, angle)
+        if present(encoder.filter_time_s):
+            speed = self.apply("speed", blocks.lag(encoder.filter_time_s, T), speed)
+        for k, item in enumerate(self.drive.filters("speed"), 1):
+            speed = self.apply(f"speed{k}", blocks.biquad(item, T), speed)
+        self.signals["w_meas"] = speed
+        return speed
+
+    def velocity(self, reference: Row) -> Row:
+        """PI on the speed, the feed-forward of acceleration, and the torque filters."""
+        error = reference - self.measured_speed() if self.program.measures_speed else reference
+        value = self.apply("velocity", self.drive.law("velocity"), self.at_cut(ERRORS["velocity"], error))
+        if "position" in self.program.stages and present(self.control.position_loop.acceleration_feedforward):
+            every = self.drive.interval
+            made = self.extra if self.updates(every["position"]) else None
+            value = value + self.held("i_ff", made, every["position"], every["velocity"])
+        self.signals["torque_command"] = value
+        for k, item in enumerate(self.drive.filters("torque"), 1):
+            value = self.apply(f"torque{k}", blocks.biquad(item, self.drive.period_s("velocity")), value)
+        return value
+
+    def current(self, reference: Row) -> Row:
+        """PI on the current, and the feed-forward of back-EMF and resistance voltage."""
+        law, motor = self.control.current, self.design.effective_motor
+        assert law is not None
+        assert motor.back_emf_constant_Vs_rad is not None
+        assert motor.resistance_ohm is not None
+        error = reference if "current" in self.program.opened else reference - self.signals["i"]
+        value = self.apply("current", self.drive.law("current"), self.at_cut(ERRORS["current"], error))
+        if self.program.feeds_back_emf:
+            gain = law.back_emf_feedforward * motor.back_emf_constant_Vs_rad
+            value = value + gain * self.speed_for_voltage()
+        if present(law.resistance_feedforward):
+            value = value + law.resistance_feedforward * motor.resistance_ohm * reference
+        return value
+
+    def speed_for_voltage(self) -> Row:
+        """The measured speed as the current stage has it."""
+        every = self.drive.interval["speed"]
+        value = None
+        if self.updates(every):
+            value = self.signals["w_meas"] if "w_meas" in self.signals else self.measured_speed()
+        return self.held("w_meas", value, every, 1)

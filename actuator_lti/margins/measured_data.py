@@ -1,0 +1,181 @@
+"""Frequency-response data with what is known about their noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.loop import Complex, Real
+
+CONFIDENCE = 0.99
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """A measured loop L with the radius of a circle about each value that holds the true one.
+
+    `stability_margins` takes it as it takes `control.FrequencyResponseData`; the ranges that it states are
+    widened by the radius.
+
+    Attributes
+    ----------
+    omega : array (m,)
+        Angular frequencies, rad/s.
+    frdata : array (m,), complex
+        Measured values.
+    radius : array (m,)
+        Radius of the circle, at the confidence of the range (0.99 by default).
+    dt : float or None
+        Sampling period, s; ``None`` for a continuous loop.
+    source : str
+        Where the radius comes from.
+    """
+
+    omega: Real
+    frdata: Complex
+    radius: Real
+    dt: float | None
+    source: str
+
+    @classmethod
+    def with_noise(
+        cls, data: Any, standard_deviation: ArrayLike, confidence: float = CONFIDENCE
+    ) -> MeasuredResponse:
+        """Noise that is given.
+
+        Parameters
+        ----------
+        data : FrequencyResponseData
+            One input, one output.
+        standard_deviation : array_like
+            Root mean square of the complex error of each value, sqrt(E |e|^2), in the unit of L; a number or
+            one for each frequency. The error is taken as circular and Gaussian: |e| exceeds the radius
+            sigma sqrt(-ln(1 - confidence)) in 1 - confidence of all cases.
+        confidence : float
+            Of the circle.
+
+        Raises
+        ------
+        InputError
+            A negative or infinite standard deviation, or a confidence outside (0, 1).
+        """
+        omega, L, dt = _read(data)
+        sigma = _per_point(standard_deviation, L.size, "standard_deviation", 0.0, math.inf)
+        radius = sigma * math.sqrt(-math.log(1.0 - _checked(confidence)))
+        return cls(omega, L, radius, dt, "noise as given")
+
+    @classmethod
+    def from_coherence(
+        cls, data: Any, coherence: ArrayLike, averages: int, confidence: float = CONFIDENCE
+    ) -> MeasuredResponse:
+        """Noise from the coherence of an averaged measurement.
+
+        The error of L = S_xy/S_xx over n averages lies within |e|^2 = F |L|^2 (1 - g^2)/(g^2 (n - 1)), with
+        the coherence g^2 as estimated and F the quantile of F(2, 2 n - 2) (Bendat, Piersol, Random Data,
+        chapter 9).
+
+        Parameters
+        ----------
+        data : FrequencyResponseData
+        coherence : array_like
+            Ordinary coherence g^2 of each value, in (0, 1].
+        averages : int
+            Independent averages, at least 2.
+        confidence : float
+
+        Raises
+        ------
+        InputError
+            A coherence outside (0, 1], fewer than 2 averages.
+        """
+        omega, L, dt = _read(data)
+        g2 = _per_point(coherence, L.size, "coherence", 0.0, 1.0)
+        if not (g2 > 0.0).all():
+            raise InputError("coherence: every value must lie in (0, 1]")
+        if averages < 2:
+            raise InputError(f"averages = {averages}: at least 2")
+        sigma = np.abs(L) * np.sqrt((1.0 - g2) / (g2 * (averages - 1)))
+        radius = sigma * _student(averages - 1, _checked(confidence))
+        return cls(omega, L, radius, dt, f"coherence of {averages} averages")
+
+    @classmethod
+    def from_repeats(cls, repeats: Sequence[Any], confidence: float = CONFIDENCE) -> MeasuredResponse:
+        """Noise from the scatter of repeated measurements at the same frequencies; L is their mean.
+
+        With n repeats |e|^2 over the estimated variance of the mean follows F(2, 2 n - 2): the radius grows
+        where there are few.
+
+        Raises
+        ------
+        InputError
+            Fewer than 2 repeats, or other frequencies.
+        """
+        if len(repeats) < 2:
+            raise InputError("repeats: at least two measurements are needed to see the scatter")
+        read = [_read(each) for each in repeats]
+        omega, _, dt = read[0]
+        if any(w.shape != omega.shape or (np.abs(w - omega) > 1e-9 * omega).any() for w, _, _ in read):
+            raise InputError("repeats: every one must have the same frequencies")
+        values = np.array([L for _, L, _ in read])
+        n = len(repeats)
+        sigma = np.sqrt((np.abs(values - values.mean(axis=0)) ** 2).sum(axis=0) / (n - 1) / n)
+        radius = sigma * _student(n - 1, _checked(confidence))
+        return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
+
+    @property
+    def ninputs(self) -> int:
+        """One."""
+        return 1
+
+    @property
+    def noutputs(self) -> int:
+        """One."""
+        return 1
+
+
+def measured_response(data: Any) -> MeasuredResponse:
+    """Bring data of either kind into this form; plain ones count as free of noise.
+
+    Raises
+    ------
+    InputError
+        More than one input or output.
+    """
+    if isinstance(data, MeasuredResponse):
+        return data
+    omega, L, dt = _read(data)
+    return MeasuredResponse(omega, L, np.zeros(L.size), dt, "")
+
+
+def _read(data: Any) -> tuple[Real, Complex, float | None]:
+    if data.ninputs != 1 or data.noutputs != 1:
+        raise InputError(f"a loop has one input and one output; this has {data.ninputs} and {data.noutputs}")
+    dt = float(data.dt) if data.dt not in (None, 0, True) else None
+    L = np.asarray(data.frdata, dtype=complex).reshape(-1)
+    return np.asarray(data.omega, dtype=float), L, dt
+
+
+def _per_point(values: ArrayLike, count: int, name: str, low: float, high: float) -> Real:
+    array = np.asarray(values, dtype=float)
+    if array.shape not in ((), (count,)):
+        raise InputError(f"{name}: one number, or one for each of the {count} frequencies")
+    if not (np.isfinite(array) & (array >= low) & (array <= high)).all():
+        raise InputError(f"{name}: every value must be finite and lie in [{low:g}, {high:g}]")
+    return np.broadcast_to(array, (count,)).astype(float)
+
+
+def _checked(confidence: float) -> float:
+    if not 0.0 < confidence < 1.0:
+        raise InputError(f"confidence = {confidence}: between 0 and 1")
+    return confidence
+
+
+def _student(freedom: int, confidence: float) -> float:
+    """Root of the quantile of F(2, 2 freedom), which has a closed form."""
+    return math.sqrt(freedom * ((1.0 - confidence) ** (-1.0 / freedom) - 1.0))

@@ -1,0 +1,123 @@
+"""The registry of figures that a requirement may limit: each declared once, what reads them loops over it.
+
+A figure of a loop is read from an object with the parts ``margins``, ``bandwidth`` and ``step`` (one
+design), or is a column of `actuator_lti.batch.LinearFigures` of its own name (many). A figure of the whole
+drive is an attribute of `actuator_lti.drive.facts.Capability`, for one design or many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import degrees
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Axis
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A figure of merit.
+
+    Attributes
+    ----------
+    name : str
+        As a requirement names it.
+    unit, linear_unit : str
+        In reports; on a linear axis, where that differs.
+    scope : {"loop", "drive"}
+    description : str
+        How it is defined, for people who write requirements.
+    words : str
+        What reports call it.
+    reader : str
+        Where it is found: ``"margins.gain_margin_db"``, or the attribute of a `Capability`.
+    better : {1, -1}
+        Whether larger or smaller is better.
+    absolute : bool
+        Whether its magnitude counts: a gain margin down as one up, a lead as a lag.
+    closed : bool
+        Whether it is a figure of the closed loop, which an unstable one has not.
+    timed : bool
+        Whether it is one of the step response: stairs of samples, without a slope.
+    size : float
+        Its usual size: what a distance to a limit of 0 is measured by.
+    """
+
+    name: str
+    unit: str
+    scope: Literal["loop", "drive"]
+    description: str
+    words: str
+    reader: str
+    better: Literal[1, -1]
+    linear_unit: str = ""
+    absolute: bool = False
+    closed: bool = True
+    timed: bool = False
+    size: float = 1.0
+
+    def unit_for(self, axis: Axis) -> str:
+        """The unit in which this figure is reported."""
+        return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
+
+    def read(self, found: Any, axis: Axis = "rotary") -> Any:
+        """The figure in its unit, from figures of a loop or a `Capability`; ``None`` where there is none."""
+        value = found
+        for part in self.reader.split("."):
+            value = getattr(value, part, None)
+            if value is None:
+                return None
+        if self.absolute:
+            return abs(value)
+        return value * degrees(1.0) if self.unit_for(axis).startswith("deg/") else value
+
+
+_LIST = (
+    Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down", "gain margin",
+             "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0),
+    Quantity("phase_margin", "deg", "loop", "smallest phase margin", "phase margin",
+             "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0),
+    Quantity("delay_margin", "s", "loop", "smallest delay margin", "delay margin",
+             "margins.delay_margin_s", 1),
+    Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
+             "margins.modulus_margin", 1, closed=False, size=0.5),
+    Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
+             "margins.sensitivity_peak_db", -1, closed=False, size=6.0),
+    Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB", "bandwidth (\N{MINUS SIGN}3 dB)",
+             "bandwidth.minus3db_hz", 1),
+    Quantity("bandwidth_90deg", "Hz", "loop", "closed loop -90 deg", "bandwidth (\N{MINUS SIGN}90°)",
+             "bandwidth.minus90deg_hz", 1),
+    Quantity("resonance_peak", "dB", "loop", "peak of |T| over its value at DC", "resonance peak",
+             "bandwidth.resonance_peak_db", -1, size=6.0),
+    Quantity("overshoot", "%", "loop", "of the step of the closed loop", "overshoot",
+             "step.overshoot_percent", -1, timed=True, size=10.0),
+    Quantity("rise_time", "s", "loop", "10 % to 90 %", "rise time", "step.rise_time_s", -1, timed=True),
+    Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
+             "step.settling_time_s", -1, timed=True),
+    Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
+             "output_rate_rad_s", 1, "m/s"),
+    Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
+             "motor current at top speed", "motor_current_A", -1),
+    Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
+             "acceleration", "acceleration_rad_s2", 1, "m/s^2"),
+)  # fmt: skip
+
+QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
+"""Every quantity that a requirement may name."""
+LOOP_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "loop"}
+DRIVE_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "drive"}
+LOOPS = ("current", "velocity", "position")
+"""The loops that a requirement may name, innermost first."""
+
+
+def judged_loops(loop: str | None, present: Iterable[str]) -> tuple[str, ...]:
+    """The loops that a requirement on a figure of loops holds for: the one that it names, else every one.
+
+    Examples
+    --------
+    >>> judged_loops(None, ("velocity", "position")), judged_loops("position", ("velocity", "position"))
+    (('velocity', 'position'), ('position',))
+    """
+    return tuple(present) if loop in (None, "every") else (str(loop),)

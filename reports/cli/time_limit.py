@@ -1,0 +1,62 @@
+"""Every command ends within a stated time: first by an error that says so, then the hard way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+
+from actuator_lti.bounds import COMMAND_SECONDS, STUDY_SECONDS
+from actuator_lti.errors import NumericalError
+
+STUDIES = ("compare", "montecarlo", "nightly", "tune")
+HARD_FACTOR, HARD_EXTRA_S = 1.25, 30.0  # the rest of a report is written between the two
+_timers: list[threading.Timer] = []
+
+
+def usual(command: str | None) -> float:
+    """The limit of a command that was given none, in s."""
+    return float((STUDY_SECONDS if command in STUDIES else COMMAND_SECONDS).most)
+
+
+def start(seconds: float) -> None:
+    """Set both limits: the error after ``seconds``, the end of the process some time later.
+
+    Compiled code and libraries keep the interpreter from raising the error while they run; the second
+    limit does not depend on them.
+    """
+    stop()
+    if threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, lambda _number, _frame: _refuse(seconds))
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+    timer = threading.Timer(
+        min(HARD_FACTOR * seconds + HARD_EXTRA_S, threading.TIMEOUT_MAX), _end, (seconds,)
+    )
+    timer.daemon = True
+    timer.start()
+    _timers.append(timer)
+
+
+def stop() -> None:
+    """Take both limits away."""
+    while _timers:
+        _timers.pop().cancel()
+        if threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+
+
+def _refuse(seconds: float) -> None:
+    raise NumericalError(_words(seconds))
+
+
+def _end(seconds: float) -> None:
+    """End the process where the error did not get through."""
+    sys.stderr.write(f"actuator-lti: numerical failure: {_words(seconds)}\n")
+    sys.stderr.flush()
+    os._exit(3)
+
+
+def _words(seconds: float) -> str:
+    return f"not finished within {seconds:g} s; allow more with 'actuator-lti --time-limit SECONDS ...'"

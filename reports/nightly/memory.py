@@ -1,0 +1,85 @@
+"""What a site remembers of its history, so that a lost one does not pass for a first night.
+
+``summary.json`` is published with the site and survives where the state folder does not (a cache that was
+not restored, a deleted file). A night is refused where the history knows less than the site.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from actuator_lti.errors import InputError
+from actuator_lti.reading import read_json
+
+
+class HistoryLost(Exception):
+    """The history beside a site is missing, empty or older than the site; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """How much a history held when the site was published.
+
+    Attributes
+    ----------
+    id : str
+        Of the history file; empty where it is not known.
+    nights, approvals : int
+    """
+
+    id: str
+    nights: int
+    approvals: int
+
+    def plain(self) -> dict[str, Any]:
+        """As it stands in ``summary.json``."""
+        return asdict(self)
+
+
+def remembered(site: Path) -> Memory | None:
+    """What a site remembers; ``None`` where nothing was ever published there."""
+    if not (site / "index.html").exists() and not (site / "summary.json").exists():
+        return None
+    try:
+        found = read_json(site / "summary.json", "summary.json").get("history")
+    except (InputError, AttributeError):
+        found = None
+    if not isinstance(found, Mapping):
+        return Memory("", 1, 0)  # published by an older version, or damaged: at least one night
+    numbers = [found.get(key) for key in ("nights", "approvals")]
+    nights, approvals = (n if isinstance(n, int) and not isinstance(n, bool) else 0 for n in numbers)
+    return Memory(str(found.get("id", "")), max(nights, 1), max(approvals, 0))
+
+
+def check(site: Path, now: Memory, state: Path) -> None:
+    """Refuse a history that knows less than its site.
+
+    Raises
+    ------
+    HistoryLost
+        One line: what is missing, how to restore it, how to go on without it on purpose.
+    """
+    before = remembered(site)
+    if before is None:
+        return
+    if now.nights == 0:
+        what = "is missing or empty"
+    elif before.id and now.id != before.id:
+        what = "is that of another site"
+    elif now.nights < before.nights or now.approvals < before.approvals:
+        what = f"holds {_words(now.nights, now.approvals)}"
+    else:
+        return
+    knows = _words(before.nights, before.approvals)
+    raise HistoryLost(
+        f"{state / 'history.sqlite'}: {what}, but the site knows of {knows}: "
+        "regressions cannot be told. Restore the state folder from a copy, or begin anew on purpose "
+        "with --accept-lost-history"
+    )
+
+
+def _words(nights: int, approvals: int) -> str:
+    return f"{nights} night(s) and {approvals} approval(s)"

@@ -1,0 +1,39 @@
+"""Every reference of the sources to the model page resolves inside the repository."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SECTIONS = set(re.findall(r"(?m)^## ([0-9]+)\.", (ROOT / "docs" / "model.md").read_text(encoding="utf-8")))
+OTHERS = {"README.md", "CHANGELOG.md", "SECURITY.md", "summary.md"}  # the last is written by a nightly build
+CITED = re.compile(r"model\.md,?\s+sections?\s+([0-9]+(?:(?:\s*,\s*|\s+and\s+|\s+to\s+)[0-9]+)*)")
+
+
+def sources() -> list[Path]:
+    folders = ("actuator_lti", "nonlinear", "analyses", "reports", "tests", "benchmarks")
+    return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def test_every_section_that_a_source_cites_exists() -> None:
+    missing, found = [], 0
+    for path in sources():
+        text = path.read_text(encoding="utf-8")
+        for match in CITED.finditer(text):
+            found += 1
+            numbers = set(re.findall(r"[0-9]+", match[1]))
+            missing += [f"{path.relative_to(ROOT)}: section {n}" for n in sorted(numbers - SECTIONS)]
+    assert found > 20
+    assert not missing
+
+
+def test_no_source_cites_a_page_that_is_not_here() -> None:
+    pages = {path.name for path in (ROOT / "docs").rglob("*.md")} | OTHERS
+    cited = re.compile(r"\b([A-Za-z][A-Za-z0-9_-]*\.md)\b")
+    missing = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in sources()
+        if path.name != Path(__file__).name
+        for name in cited.findall(path.read_text(encoding="utf-8"))
+        if name[0].lower() + name[1:] not in pages and name not in pages
+    ]
+    assert not missing

@@ -1,0 +1,152 @@
+"""What would fill the memory or the night is refused before it is allocated, in one line with its option."""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from actuator_lti import bounds
+from actuator_lti.design import load_design
+from actuator_lti.errors import InputError, NumericalError
+from analyses.monte_carlo import MonteCarloSettings
+from analyses.sampling import read_table
+from analyses.study import load_study
+from nonlinear import commands, loads, simulate
+from nonlinear.batch import run_rows
+from nonlinear.parameters import design_row
+
+ROOT = Path(__file__).parents[2]
+PERIOD_S = 1e-4
+LIGHT_BYTES = 60_000_000
+
+
+@pytest.fixture(autouse=True)
+def light() -> Iterator[None]:
+    """What is refused takes no memory worth the name."""
+    tracemalloc.start()
+    yield
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < LIGHT_BYTES
+
+
+def refused(call: Callable[[], object], *words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        call()
+    line = str(caught.value)
+    assert line.isprintable()
+    assert len(line) < 400
+    for word in words:
+        assert word in line
+
+
+def amber():
+    return load_design("ilr33-amber")
+
+
+def test_two_rows_a_billion_seconds_apart() -> None:
+    far = commands.sampled([0.0, 1e9], [0.0, 1.0])
+    refused(lambda: simulate(amber(), far, 1e9), "duration_s = 1e+09", "at most 1000000000")
+    refused(lambda: simulate(amber(), far, 2e4), "--duration", "at most 50000000")
+    refused(lambda: simulate(amber(), commands.step(0.1), 1e300), "duration_s = 1e+300")
+    years = loads.series([0.0, 1e9], [0.0, 1.0])
+    refused(lambda: simulate(amber(), commands.step(0.1), 2e4, years), "at most 50000000")
+
+
+def test_a_history_beyond_the_memory() -> None:
+    refused(lambda: simulate(amber(), commands.step(0.1), 9e4), "does not fit into memory", "record_every")
+
+
+def test_millions_of_tones() -> None:
+    refused(lambda: commands.stepped_sine(0.1, range(1, 10**7), 5, PERIOD_S), "--count", "at most 10000")
+    refused(lambda: commands.stepped_sine(0.1, [1e-9], 5, PERIOD_S), "--frequency", "at most 50000000")
+    refused(lambda: commands.multisine(0.1, range(1, 10**9), 1.0, PERIOD_S), "--count", "at most 10000")
+    refused(lambda: commands.multisine(0.1, [1.0], 1e9, PERIOD_S), "--duration")
+    refused(lambda: commands.multisine(0.1, [1.0] * 5000, 4000.0, PERIOD_S), "lines times ticks")
+    refused(lambda: commands.multisine(0.1, [1.0], 1.0, PERIOD_S, seed=-1), "seed = -1")
+
+
+def test_a_batch_that_would_take_days() -> None:
+    from nonlinear._kernels import layout as at
+
+    row = design_row(amber())
+    row[at.TICKS] = 3e10
+    with pytest.raises(NumericalError, match="3e\\+10 ticks"):
+        run_rows(row[None, :])
+
+
+def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("t,x\n" + "0,1\n" * 200)
+    small = bounds.Bound(what="rows", most=100, reason="", asked_by="--record")
+    monkeypatch.setattr("nonlinear.records.TABLE_ROWS", small)
+    refused(lambda: commands.recorded(path), "r.csv", "--record", "at most 100")
+    with path.open("wb") as file:
+        file.truncate(bounds.TABLE_BYTES.most + 1)  # a hole: takes no disk
+    tracemalloc.stop()  # reading up to the bound is allowed
+    refused(lambda: commands.recorded(path), "r.csv", "at most 256 MiB")
+    tracemalloc.start()
+
+
+def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path) -> None:
+    import numpy as np
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = tmp_path / "s.parquet"
+    pq.write_table(
+        pa.table({"motor.resistance": np.zeros(bounds.TABLE_ROWS.most + 1)}), path, compression="zstd"
+    )
+    assert path.stat().st_size < 100_000
+    import pandas  # noqa: F401 - not what is measured
+
+    tracemalloc.reset_peak()
+    refused(lambda: read_table(path, ("motor.resistance",)), "--from-samples", "at most 5000000")
+
+
+GRID = '[study]\nbase = "ilr33-amber"\n[[grid]]\naxes = [{}]\n'
+AXIS = '{ parameter = "motor.resistance", from = "50 mohm", to = "60 mohm", points = 1000 }'
+
+
+def test_a_grid_of_a_thousand_to_the_sixty(tmp_path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(GRID.format(", ".join([AXIS] * 60)))
+    refused(lambda: load_study(path), "grid[1].axes", "60 axes", "at most 20")
+    path.write_text(GRID.format(", ".join([AXIS] * 20)))
+    refused(lambda: load_study(path), "grid[1]", "1e+60 variants", "at most 10000")
+
+
+def test_sweeps_stop_at_the_first_variant_too_many(tmp_path, monkeypatch) -> None:
+    path = tmp_path / "s.toml"
+    sweep = AXIS.replace("1000", "20")[2:-2].replace(", ", "\n")
+    path.write_text('[study]\nbase = "ilr33-amber"\n' + f"[[sweep]]\n{sweep}\n" * 500)
+    made: list[int] = []
+    small = bounds.Bound(what="variants", most=25, reason="", asked_by="[[sweep]]")
+    monkeypatch.setattr("analyses.study.STUDY_VARIANTS", small)
+    from analyses.study import _Maker
+
+    whole = _Maker._made
+
+    def count(self, *arguments):
+        made.append(1)
+        return whole(self, *arguments)
+
+    monkeypatch.setattr(_Maker, "_made", count)
+    refused(lambda: load_study(path), "[[sweep]]", "at most 25")
+    assert len(made) == 26
+
+
+def test_samples_without_end() -> None:
+    refused(lambda: MonteCarloSettings(samples=10**12), "--samples", "at most 100000000")
+    refused(lambda: MonteCarloSettings(seed=-1), "seed = -1")
+
+
+def test_the_table_in_the_documentation_is_this_one() -> None:
+    assert (ROOT / "docs" / "limits.md").read_text(encoding="utf-8") == bounds.markdown()
+    assert len(bounds.table()) > 25
+    for name, bound in bounds.table().items():
+        assert bound.most > 0, name
+        assert bound.reason, name

@@ -1,0 +1,88 @@
+"""A comparison that is stopped goes on: each finished design is kept, damaged ones are computed again."""
+
+from __future__ import annotations
+
+import pytest
+
+from analyses import variants
+from analyses.engine import Engine
+from analyses.study import load_study
+from analyses.variants import compare
+
+STUDY = """
+[study]
+base = "ctms-motor-position"
+[[sweep]]
+parameter = "control.position.gain"
+values = ["9 V/rad", "12 V/rad", "15 V/rad", "18 V/rad"]
+[[requirement]]
+id = "margin"
+quantity = "gain_margin"
+loop = "every"
+minimum = "6 dB"
+"""
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text(STUDY)
+    return load_study(path)
+
+
+@pytest.fixture
+def counted(monkeypatch) -> list[str]:
+    """Names of the designs that were computed; the fourth of them stops the run where asked."""
+    done: list[str] = []
+    whole = variants._evaluated
+
+    def evaluated(variant, *rest):
+        done.append(variant.name)
+        if len(done) == 4 and "stop" in done[:1]:
+            raise KeyboardInterrupt
+        return whole(variant, *rest)
+
+    monkeypatch.setattr(variants, "_evaluated", evaluated)
+    return done
+
+
+def test_what_was_finished_is_not_computed_again_and_is_the_same(study, counted, tmp_path) -> None:
+    folder = tmp_path / "designs"
+    counted.append("stop")
+    with pytest.raises(KeyboardInterrupt):
+        compare(study, folder=folder)
+    kept = len(list(folder.rglob("*.json")))
+    assert kept >= 2
+    counted.clear()
+    resumed = compare(study, folder=folder)
+    assert len(counted) == 5 - kept
+    counted.clear()
+    again = compare(study, folder=folder)
+    assert counted == []
+    fresh = compare(study)
+    for one in (resumed, again):
+        assert one.base == fresh.base
+        assert one.variants == fresh.variants
+        assert one.names == fresh.names
+
+
+def test_a_damaged_or_foreign_entry_is_computed_again(study, counted, tmp_path) -> None:
+    folder = tmp_path / "designs"
+    fresh = compare(study, folder=folder)
+    paths = sorted(folder.rglob("*.json"))
+    assert len(paths) == 5
+    paths[0].write_bytes(paths[0].read_bytes()[:-3])
+    paths[1].write_text("")
+    paths[2].write_bytes(paths[3].read_bytes().replace(b'"figures"', b'"figure"', 1))
+    paths[4].write_bytes(b"\xff" * 10)
+    counted.clear()
+    assert compare(study, folder=folder).variants == fresh.variants
+    assert len(counted) == 4
+    assert len(list(folder.rglob("*.json"))) == 5
+
+
+def test_a_cluster_finds_the_same(study, tmp_path) -> None:
+    here = compare(study)
+    there = compare(study, engine=Engine(workers=1), folder=tmp_path / "designs")
+    assert there.variants == here.variants
+    assert there.variants[0].loops.keys() == here.variants[0].loops.keys()

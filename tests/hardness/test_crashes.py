@@ -1,0 +1,145 @@
+"""A crash is no verdict: one line, exit 3, the traceback on disk, and the rest of the report is written."""
+
+from __future__ import annotations
+
+import json
+import re
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.errors import InputError, NumericalError
+from reports.cli import time_limit
+from reports.cli.errors import run
+from reports.cli.main import main
+
+REPORT = ("report", "ilr33-amber", "--processes", "1", "--quiet")
+
+# What is broken on purpose (module, function), and the sections that must be there all the same.
+BROKEN = {
+    "analyses.loop_survey:survey_loops": {"parameters", "provenance"},
+    "analyses.loop_survey:_other_forms": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:_locked": {"margins", "loop-current", "parameters"},
+    "analyses.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:_operating_points": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:_onset": {"margins", "loop-position", "parameters"},
+    "analyses.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},
+    "reports.sections.margins:section": {"loop-position", "parameters"},
+    "reports.sections.loop:section": {"margins", "parameters"},
+    "reports.sections.forms:section": {"margins", "loop-position", "parameters"},
+    "reports.sections.requirements:section": {"margins", "loop-position", "parameters"},
+}
+
+
+def broken(*_arguments: object, **_named: object) -> None:
+    raise ZeroDivisionError("by\nzero\x1b[31m")
+
+
+def traceback_file(line: str) -> Path:
+    found = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
+    assert found, line
+    return Path(found[1])
+
+
+@pytest.fixture
+def unpainted(monkeypatch) -> None:
+    """Reports without pictures, which take most of the time."""
+    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: '<svg viewBox="0 0 9 9"></svg>')
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize("place", BROKEN)
+def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, monkeypatch, capsys) -> None:
+    module, _, name = place.partition(":")
+    monkeypatch.setattr(import_module(module), name, broken)
+    assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert line.strip().isprintable()
+    assert "ZeroDivisionError" in line
+    file = traceback_file(line)
+    assert "ZeroDivisionError" in file.read_text(encoding="utf-8")
+    file.unlink()
+    made = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    ids = {part["id"] for part in made["sections"]}
+    assert ids >= BROKEN[place] | {"missing-linear"}
+    notice = next(part for part in made["sections"] if part["id"] == "missing-linear")
+    assert notice["status"] == "fail"
+    assert "Parts of this report that could not be computed" in (tmp_path / "report.html").read_text("utf-8")
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_a_validation_that_crashes_leaves_the_linear_report(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(import_module("analyses.validation"), "validate", broken)
+    assert main([*REPORT, "--out", str(tmp_path)]) == 3
+    traceback_file(capsys.readouterr().err).unlink()
+    ids = [part["id"] for part in json.loads((tmp_path / "report.json").read_text("utf-8"))["sections"]]
+    assert "missing-validation" in ids
+    assert "margins" in ids
+
+
+def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, capsys) -> None:
+    def draw(name: str, *arguments: object, **named: object) -> str:
+        return broken() if name == "nyquist" else '<svg viewBox="0 0 9 9"></svg>'
+
+    monkeypatch.setattr("reports.drawing.draw_svg", draw)
+    assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3
+    line = capsys.readouterr().err
+    assert "(nyquist)" in line
+    traceback_file(line).unlink()
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "This figure could not be drawn" in page
+    assert "loop-position" in page
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "words"),
+    [
+        (KeyError("x"), 3, "unforeseen KeyError"),
+        (ValueError("f(a) and f(b) must have different signs"), 3, "different signs"),
+        (RecursionError(), 3, "unforeseen RecursionError"),
+        (MemoryError(), 3, "not enough memory"),
+        (NumericalError("no root"), 3, "numerical failure: no root"),
+        (InputError("motor.x = 1: no"), 2, "motor.x = 1: no"),
+        (FileNotFoundError(2, "No such file", "a\nb"), 2, "No such file"),
+    ],
+)
+def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, capsys) -> None:
+    def call() -> None:
+        raise error
+
+    assert run(call) == status
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert line.strip().isprintable()
+    assert words in line
+    if "traceback: " in line:
+        traceback_file(line).unlink()
+
+
+def test_a_command_ends_at_its_time_limit(capsys, monkeypatch) -> None:
+    import time
+
+    from actuator_lti import design
+
+    monkeypatch.setattr(design, "load_design", lambda _name: time.sleep(60))
+    assert main(["--time-limit", "1", "margins", "ilr33-amber"]) == 3
+    assert "not finished within 1 s" in capsys.readouterr().err
+    assert not time_limit._timers
+
+
+def test_the_hard_limit_ends_what_the_soft_one_cannot(tmp_path) -> None:
+    import subprocess
+    import sys
+
+    script = (
+        "import signal, time\nfrom reports.cli import time_limit\ntime_limit.HARD_EXTRA_S = 0.0\n"
+        "signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})\ntime_limit.start(0.2)\ntime.sleep(60)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=50, check=False
+    )
+    assert done.returncode == 3
+    assert "not finished within 0.2 s" in done.stderr

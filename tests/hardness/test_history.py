@@ -1,0 +1,188 @@
+"""A history that is lost or damaged is told, by name, and never opens the gate."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+from nightly_fakes import CODE, INLINE, job, study
+
+from actuator_lti.errors import InputError
+from reports.cli.main import main
+from reports.nightly.history import open_history
+from reports.nightly.memory import HistoryLost, Memory, remembered
+from reports.nightly.night import Settings, approve, run_night
+
+AGAIN = Settings(workers=0, build=INLINE.build, accept_lost_history=True)
+DAMAGE_ROUNDS = 250
+
+
+def night(site: Path, margin: float, settings: Settings = INLINE):
+    return run_night(study(job("a", margin), job("b")), site, settings, code=CODE)
+
+
+def state(site: Path) -> Path:
+    return site.with_name(site.name + ".state")
+
+
+@pytest.fixture
+def site(tmp_path) -> Path:
+    """Two nights and an approval."""
+    site = tmp_path / "site"
+    night(site, 10.0)
+    approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
+    night(site, 10.5)
+    return site
+
+
+def forget_all(site: Path) -> None:
+    shutil.rmtree(state(site))
+
+
+def forget_history(site: Path) -> None:
+    for path in state(site).glob("history.sqlite*"):
+        path.unlink()
+
+
+def empty_history(site: Path) -> None:
+    forget_history(site)
+    (state(site) / "history.sqlite").touch()
+
+
+def forget_last_night(site: Path) -> None:
+    with sqlite3.connect(state(site) / "history.sqlite") as database:
+        database.execute("DELETE FROM results WHERE run = (SELECT max(id) FROM runs)")
+        database.execute("DELETE FROM runs WHERE id = (SELECT max(id) FROM runs)")
+    database.close()
+
+
+def forget_baseline(site: Path) -> None:
+    with sqlite3.connect(state(site) / "history.sqlite") as database:
+        database.execute("DELETE FROM baselines")
+    database.close()
+
+
+def take_that_of_another(site: Path) -> None:
+    other = site.with_name("other")
+    for margin in (1.0, 2.0, 3.0):
+        night(other, margin)
+    forget_history(site)
+    shutil.copy(state(other) / "history.sqlite", state(site) / "history.sqlite")
+
+
+@pytest.mark.parametrize(
+    "lose",
+    [forget_all, forget_history, empty_history, forget_last_night, forget_baseline, take_that_of_another],
+)
+def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lose) -> None:
+    index = (site / "index.html").read_bytes()
+    lose(site)
+    for _ in range(2):  # the first refusal must not make the second night pass
+        with pytest.raises(HistoryLost, match="--accept-lost-history") as caught:
+            night(site, 3.0)
+        assert "2 night(s) and 1 approval(s)" in str(caught.value)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(HistoryLost):
+        approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
+    assert (site / "index.html").read_bytes() == index
+    assert night(site, 12.0, AGAIN).exit_status in (0, 1)
+    night(site, 12.0)  # from here on it is known again
+    with open_history(state(site) / "history.sqlite") as history:
+        assert remembered(site) == history.memory()
+
+
+def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(site) -> None:
+    summary = site / "summary.json"
+    for text in ("{}", "[]", "{", '{"history": {"nights": "many", "approvals": true}}', ""):
+        summary.write_text(text)
+        found = remembered(site)
+        assert found == Memory("", 1, 0), text
+    summary.unlink()
+    assert remembered(site) == Memory("", 1, 0)
+    forget_history(site)
+    with pytest.raises(HistoryLost, match="1 night"):
+        night(site, 3.0)
+
+
+def test_the_command_exits_1_with_one_line(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("reports.nightly.compute.build", lambda payload: pytest.fail("built"))
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / ".nightly-site").write_text("x")
+    (site / "summary.json").write_text(json.dumps({"history": {"id": "i", "nights": 7, "approvals": 1}}))
+    assert main(["nightly", "ilr33-amber", "--site", str(site), "--quiet"]) == 1
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "7 night(s) and 1 approval(s)" in line
+
+
+def test_any_damage_is_told_or_harmless(site, tmp_path) -> None:
+    """Bytes are overwritten, cut off and inserted; a night never ends otherwise than well or named."""
+    path = state(site) / "history.sqlite"
+    with sqlite3.connect(path) as database:
+        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    database.close()
+    whole, draw, lines = path.read_bytes(), random.Random(18), []
+    target = tmp_path / "h.sqlite"
+    for _ in range(DAMAGE_ROUNDS):
+        data = bytearray(whole)
+        for _ in range(draw.choice((1, 1, 4, 40))):
+            place = draw.randrange(len(data))
+            data[place : place + draw.randrange(1, 9)] = draw.randbytes(draw.randrange(1, 9))
+        if draw.random() < 0.1:
+            del data[draw.randrange(len(data)) :]
+        target.write_bytes(bytes(data))
+        for beside in tmp_path.glob("h.*sqlite-*"):
+            beside.unlink()
+        try:
+            with open_history(target) as history:
+                everything(history)
+        except InputError as error:
+            lines.append(str(error))
+    assert all(line.isprintable() and "h.sqlite" in line for line in lines)
+    assert len(lines) > DAMAGE_ROUNDS // 10
+
+
+def everything(history) -> None:
+    history.runs()
+    history.baselines()
+    history.memory()
+    found = history.results()
+    for one in found:
+        history.figures(one.snapshot)
+        if one.snapshot is not None:
+            history.inputs(one.snapshot)
+    history.matrix(found, list(history.figure_table()))
+
+
+def rewritten(site: Path, statement: str, *values: object) -> None:
+    with sqlite3.connect(state(site) / "history.sqlite") as database:
+        database.execute("PRAGMA foreign_keys = OFF")
+        database.execute(statement, values)
+    database.close()
+
+
+@pytest.mark.parametrize(
+    ("statement", "value"),
+    [
+        ("UPDATE vectors SET numbers = zeroblob(length(numbers))", None),
+        ("UPDATE vectors SET numbers = substr(numbers, 9)", None),
+        ("UPDATE layouts SET figures = ?", b"no zlib"),
+        ("UPDATE inputs SET body = ?", b"\x78\x9c"),
+        ("UPDATE runs SET libraries = ?", "{"),
+        ("UPDATE runs SET started = ?", "yesterday"),
+        ("DELETE FROM figures WHERE id = 1", None),
+        ("DELETE FROM snapshots", None),
+    ],
+)
+def test_what_sqlite_cannot_see_is_told_when_it_is_read(site, statement, value) -> None:
+    rewritten(site, statement, *([] if value is None else [value]))
+    damaged = pytest.raises(InputError, match=r"history\.sqlite: is damaged .*restore it from a copy")
+    with damaged, open_history(state(site) / "history.sqlite") as history:
+        everything(history)
+    with pytest.raises((InputError, HistoryLost), match=r"history\.sqlite"):
+        night(site, 4.0)

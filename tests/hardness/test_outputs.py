@@ -1,0 +1,138 @@
+"""Devices, pipes and links as outputs: written through or refused, never replaced."""
+
+from __future__ import annotations
+
+import os
+import socket
+import stat
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from nightly_fakes import CODE, INLINE, job, study
+
+from actuator_lti import atomic
+from actuator_lti.errors import InputError
+from reports.nightly.night import run_night
+
+SIMULATE = ("simulate", "ilr33-amber", "--duration", "0.01", "--quiet")
+
+
+def simulate(*options: str, **named: object) -> subprocess.CompletedProcess[str]:
+    code = "import sys; from reports.cli.main import main; sys.exit(main())"
+    command = [sys.executable, "-c", code, *SIMULATE, *options]
+    return subprocess.run(command, text=True, timeout=120, check=False, **{"capture_output": True, **named})
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_a_device_stays_a_device() -> None:
+    done = simulate("--csv", "/dev/full")
+    assert done.returncode == 2
+    assert "/dev/full: cannot write: No space left" in done.stderr
+    assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+    atomic.write_text("/dev/null", "x")
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+
+
+def test_a_node_of_a_device_elsewhere_is_not_replaced(tmp_path) -> None:
+    node = tmp_path / "full"
+    try:
+        os.mknod(node, 0o666 | stat.S_IFCHR, os.makedev(1, 7))
+        node.open("wb").close()
+    except OSError:
+        pytest.skip("only root may make a node, and not everywhere")
+    with pytest.raises(InputError, match="full: cannot write: No space left"):
+        atomic.write_text(node, "x")
+    assert stat.S_ISCHR(node.stat().st_mode)
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="Linux")
+def test_standard_output_gets_the_rows_and_a_file_behind_it_stays(tmp_path) -> None:
+    assert simulate("--csv", "/dev/stdout").stdout.startswith('"time_s"')
+    log = tmp_path / "log"
+    with log.open("wb") as file:
+        before = os.fstat(file.fileno()).st_ino
+        done = simulate("--csv", "/dev/stdout", capture_output=False, stdout=file)
+    assert done.returncode == 0
+    assert log.stat().st_ino == before
+    assert log.read_bytes().startswith(b'"time_s"')
+    assert log.read_bytes().rstrip().endswith(b"wrote /dev/stdout")
+
+
+def test_a_pipe_gets_everything_or_is_refused_at_once(tmp_path) -> None:
+    pipe, got = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="pipe: cannot write"):
+        atomic.write_text(pipe, "nobody reads")
+    holder = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    os.set_blocking(holder, True)
+
+    def read() -> None:
+        while piece := os.read(holder, 1 << 16):
+            got.append(piece)
+
+    writer = os.open(pipe, os.O_WRONLY)  # keeps the reader waiting until all is written
+    reader = threading.Thread(target=read)
+    reader.start()
+    atomic.write_bytes(pipe, b"x" * 300_000)
+    os.close(writer)
+    reader.join(30)
+    os.close(holder)
+    assert sum(map(len, got)) == 300_000
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+def test_a_socket_and_a_directory_are_refused(tmp_path) -> None:
+    name = tmp_path / "s"
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(name))
+        with pytest.raises(InputError, match="is no file"):
+            atomic.write_text(name, "x")
+    (tmp_path / "d").mkdir()
+    with pytest.raises(InputError, match="d: cannot write"):
+        atomic.write_text(tmp_path / "d", "x")
+    with pytest.raises(InputError, match="null"):
+        atomic.write_text(tmp_path / "a\0b", "x")
+
+
+def test_links_are_followed_and_stay_links(tmp_path) -> None:
+    (tmp_path / "real").mkdir()
+    file, link, dangling = tmp_path / "real" / "a", tmp_path / "link", tmp_path / "dangling"
+    file.write_text("old")
+    link.symlink_to(file)
+    dangling.symlink_to(tmp_path / "real" / "b")
+    atomic.write_together({link: b"new", dangling: b"there"})
+    assert (link.is_symlink(), dangling.is_symlink()) == (True, True)
+    assert file.read_text() == "new"
+    assert sorted(os.listdir(tmp_path / "real")) == ["a", "b"]
+    assert sorted(os.listdir(tmp_path)) == ["dangling", "link", "real"]
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    with pytest.raises(InputError, match="loop"):
+        atomic.write_text(loop, "x")
+
+
+@pytest.mark.parametrize("name", ["nights", "reports"])
+def test_a_site_that_leads_elsewhere_is_refused(tmp_path, name) -> None:
+    site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (site / name).rename(elsewhere)
+    before = sorted(path.relative_to(elsewhere) for path in elsewhere.rglob("*"))
+    (site / name).symlink_to(elsewhere)
+    with pytest.raises(InputError, match=f"{name}: is a symbolic link"):
+        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
+    assert sorted(path.relative_to(elsewhere) for path in elsewhere.rglob("*")) == before
+
+
+def test_a_report_folder_that_leads_elsewhere_is_refused(tmp_path) -> None:
+    site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (folder,) = (site / "reports").iterdir()
+    folder.rename(elsewhere)
+    folder.symlink_to(elsewhere)
+    count = len(list(elsewhere.rglob("*")))
+    with pytest.raises(InputError, match="is a symbolic link"):
+        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
+    assert len(list(elsewhere.rglob("*"))) == count

@@ -1,0 +1,137 @@
+"""Many designs at once are each of them alone: random drives over decades, every stage left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from loop_designs import amber, emps, without
+from two_mass import drive_d, drive_e
+
+from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.design import parameter_value
+from actuator_lti.design.access import stacked
+from actuator_lti.design.model import Command, Design, Encoder, Filter, Load, PositionLoop
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.periodic import fundamental
+from actuator_lti.loops.sampled import fundamental_path, stage_blocks
+from actuator_lti.loops.tick import TickProgram
+
+FILTERS = (
+    Filter(kind="lowpass", frequency_rad_s=2000.0, order=2),
+    Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
+    Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=1500.0),
+    Filter(kind="lowpass", frequency_rad_s=3000.0, on="speed"),
+)
+
+
+def everything() -> Design:
+    """A position loop in front of a spring, every slot of the controller filled."""
+    base = drive_e()
+    control = base.controller
+    assert control.velocity is not None
+    assert control.current is not None
+    position = PositionLoop(
+        gain=20.0, every=4, feedforward=0.8, integral_time_s=0.2, derivative_time_s=2e-3,
+        derivative_filter_s=1e-3, acceleration_feedforward=0.7, sensor="output",
+    )  # fmt: skip
+    controller = replace(
+        control,
+        computing_delay_s=3e-4,
+        position=position,
+        velocity=replace(control.velocity, every=2, filters=FILTERS),
+        current=replace(control.current, back_emf_feedforward=0.9, resistance_feedforward=0.5),
+    )
+    encoder = Encoder(speed="tracking", bandwidth_rad_s=800.0, filter_time_s=2e-4)
+    command = Command(filter_time_s=3e-3, filter_order=2)
+    load = replace(base.load, moment_slope_Nm_rad=-30.0)
+    return replace(base, controller=controller, encoder=encoder, command=command, load=load)
+
+
+DRIVES = {
+    "cascade": amber(2, 10, delay_s=1.5e-4),
+    "difference": amber(encoder=Encoder(speed="difference", difference_samples=3, filter_time_s=2e-4)),
+    "elastic load": amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0)),
+    "no current": without(amber(), "current", gain=0.01),
+    "no velocity": without(amber(), "velocity", gain=1.0),
+    "position only": without(amber(), "current", "velocity", gain=0.05),
+    "force source": emps(delay_s=5e-4),
+    "speed drive": drive_d(),
+    "torque drive": replace(drive_d(), controller=replace(drive_d().controller, velocity=None)),
+    "everything": everything(),
+}
+
+
+def scattered(design: Design, count: int) -> dict[str, Any]:
+    """Every number that is not 0, over four decades in all (those of the clock over one)."""
+    rng = np.random.default_rng(3)
+    values = {}
+    for path in variable_paths(design):
+        nominal = parameter_value(design, path)
+        if nominal == 0.0 or not np.isfinite(nominal) or path.endswith(("filter_time", "computing_delay")):
+            continue
+        decades = 0.5 if path == "control.period" else 2.0
+        values[path] = nominal * 10 ** rng.uniform(-decades, decades, count)
+    if design.command.filter_time_s:
+        values["control.period"] = np.minimum(values["control.period"], 3e-4)
+    for path in values:  # what a filter may be is bounded by its period
+        if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
+            velocity = design.controller.velocity
+            assert velocity is not None
+            values[path] = np.minimum(values[path], 2.5 / (velocity.every * values["control.period"]))
+    return values
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_stacked_blocks_are_the_single_ones(name: str) -> None:
+    design, count = DRIVES[name], 6
+    values = scattered(design, count)
+    ticks = design.controller.computing_delay_s / design.controller.period_s
+    values["control.computing_delay"] = ticks * values["control.period"]
+    many = wire(stacked(design, values), Operating())
+    for k in range(count):
+        alone = wire(stacked(design, {path: float(array[k]) for path, array in values.items()}), Operating())
+        for stage in many.stages:
+            blocks = [fundamental(stage_blocks(each, stage)) for each in (many, alone)]
+            same(blocks, k)
+        paths = [
+            fundamental_path(TickProgram(each, each.outermost), each.interval[each.outermost], "ref", "w")
+            for each in (many, alone)
+        ]
+        same(paths, k)
+
+
+def same(blocks: list[Any], k: int) -> None:
+    """Equal to 1e-9, each state in its own unit: rows and columns over their own size."""
+    many, alone = blocks
+    assert many.states == alone.states
+    for part in ("A", "B", "C", "D"):
+        one = getattr(alone, part)
+        mine = np.broadcast_to(getattr(many, part), (6, *one.shape))[k]
+        scale = np.abs(one)
+        scale = np.maximum(scale, 1e-3 * np.sqrt(scale.max(0, keepdims=True) * scale.max(1, keepdims=True)))
+        np.testing.assert_array_less(np.abs(mine - one), 1e-9 * scale + 1e-300)
+
+
+def test_many_designs_figures_know_the_wide_drive() -> None:
+    """The figures of one stacked design are those of its loops, notch and output sensor and all."""
+    from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
+
+    design = everything()
+    figures = linear_figures(Population(design, {}, 1))
+    loops = assemble_loops(design)
+    for name, loop in loops.present.items():
+        truth = stability_margins(loop.open_loop)
+        assert figures.stable(name)[0] == truth.stable, name
+        for quantity in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
+            mine = figures.quantity(quantity.removesuffix("_db").removesuffix("_deg"), name)[0]
+            assert mine == pytest.approx(getattr(truth, quantity), rel=1e-6), (name, quantity)
+    width, step = (f(loops.reference_to_output) for f in (closed_loop_bandwidth, step_figures))
+    pairs = {"bandwidth": width.minus3db_hz, "resonance_peak": width.resonance_peak_db,
+             "overshoot": step.overshoot_percent, "rise_time": step.rise_time_s}  # fmt: skip
+    for quantity, expected in pairs.items():
+        found = figures.quantity(quantity, "position")[0]
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity

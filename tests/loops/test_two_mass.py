@@ -1,0 +1,190 @@
+"""Two masses and a spring: the published digits K1 to K4, closed forms, and the rigid limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from loop_designs import amber
+from two_mass import drive_d, drive_e
+
+from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti.design.model import (
+    Coupling,
+    Design,
+    Filter,
+    Friction,
+    FrictionPoint,
+    Gravity,
+    Load,
+    PositionLoop,
+)
+from actuator_lti.drive.blocks import biquad
+from actuator_lti.drive.operating import friction_slope
+
+NOTCH = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
+
+
+def table(margins: list) -> list[tuple[float, float]]:  # type: ignore[type-arg]
+    return sorted((m.deg, m.frequency_rad_s) for m in margins)
+
+
+def same(found: list[tuple[float, float]], expected: list[tuple[float, float]], digits: float) -> None:
+    assert len(found) == len(expected)
+    for have, want in zip(found, sorted(expected), strict=True):
+        assert have == pytest.approx(want, rel=digits)
+
+
+def test_k1_current_loop_with_the_rotor_free() -> None:
+    loop = assemble_loops(drive_d()).current
+    assert loop is not None
+    margins = stability_margins(loop.open_loop)
+    phases = [(77.98855712, 610.7379071), (166.4429489, 645.4654402), (77.45285893, 1612.214119)]
+    same(table(margins.phase_margins), phases, 1e-8)
+    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(6.503072809, 10479.30493)], 1e-8)
+
+
+def test_k2_velocity_loop() -> None:
+    loop = assemble_loops(drive_d()).velocity
+    assert loop is not None
+    margins = stability_margins(loop.open_loop)
+    phases = [(74.46418674, 245.4593817), (-129.7195634, 541.7421541), (62.39378704, 872.8623258)]
+    same(table(margins.phase_margins), phases, 1e-8)
+    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(7.624731944, 2860.527035)], 1e-8)
+
+
+def test_k3_notch() -> None:
+    face = biquad(NOTCH, 2e-4).sampled
+    b = [face.D, face.B[0] + face.D * -face.A[0][0], face.B[1] + face.D * -face.A[1][0]]
+    np.testing.assert_allclose(b, [0.9721668107471211, -1.922292822062545, 0.9659816575798147], rtol=1e-13)
+    np.testing.assert_allclose(
+        [-face.A[0][0], -face.A[1][0]], [-1.922292822062545, 0.9381484683269357], rtol=1e-13
+    )
+    loop = assemble_loops(drive_d(NOTCH)).velocity
+    assert loop is not None
+    margins = stability_margins(loop.open_loop)
+    same(table(margins.phase_margins), [(63.34614837, 241.6147984)], 1e-8)
+    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(8.849712773, 3101.308198)], 1e-8)
+
+
+def test_k4_dynamic_stiffness() -> None:
+    compliance = assemble_loops(drive_e()).moment_to_output
+    rows = [
+        (1, 16.9017216631, -53.84128746),
+        (20, 67.434351877, 146.7856309),
+        (80, 729.024662292, 99.71033514),
+    ]
+    for frequency, size, angle in rows:
+        stiffness = 1 / compliance(np.exp(2j * np.pi * frequency * 2e-4))
+        assert abs(stiffness) == pytest.approx(size, rel=1e-10)
+        assert np.angle(stiffness, deg=True) == pytest.approx(angle, abs=1e-7)
+
+
+def undamped(design: Design) -> Design:
+    assert design.coupling is not None
+    return replace(
+        design,
+        motor=replace(design.motor, back_emf_constant_Vs_rad=1e-12),
+        friction=Friction(),
+        load=replace(design.load, friction=None),
+        coupling=replace(design.coupling, damping_Nms_rad=0.0),
+    )
+
+
+def test_resonance_and_antiresonance() -> None:
+    """sqrt(k/J_l) and sqrt(k (1/J_l + 1/(J_m N_c^2))), the closed forms of model.md section 6."""
+    from actuator_lti.drive.plant import motor_plant
+
+    plant = motor_plant(undamped(drive_d()))
+    poles = np.linalg.eigvals(plant.A)
+    assert np.max(poles.imag) == pytest.approx(np.sqrt(400 * (1 / 2e-3 + 1 / 2e-3)), rel=1e-12)
+    held = [k for k, name in enumerate(plant.states) if name in ("W", "twist")]  # the motor held still
+    assert np.max(np.linalg.eigvals(plant.A[np.ix_(held, held)]).imag) == pytest.approx(447.213595, rel=1e-8)
+
+
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
+    free = replace(drive_d(), load=replace(drive_d().load, friction=None))
+    rigid = assemble_loops(replace(free, coupling=None), form)  # type: ignore[arg-type]
+    omega = np.geomspace(1, 2000, 12)
+    gaps = []
+    for k in (4e5, 4e7):
+        # damping that keeps the mode's damping ratio, as it moves out
+        stiff = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k))
+        loops = assemble_loops(replace(free, coupling=stiff), form)  # type: ignore[arg-type]
+        worst = 0.0
+        for name, loop in rigid.present.items():
+            points = np.exp(1j * omega * loop.period_s) if form == "sampled" else 1j * omega
+            ratio = getattr(loops, name).open_loop(points) / loop.open_loop(points)
+            worst = max(worst, float(np.max(np.abs(ratio - 1))))
+        gaps.append(worst)
+    assert gaps[0] / gaps[1] > 30
+    assert gaps[1] < 1e-3
+
+
+def test_driving_and_driven_change_the_reaction() -> None:
+    """With CM the motor feels T_s (1/N_c + CM' sgn(w T_s)); a gap takes the spring away."""
+    from actuator_lti.drive.operating import Operating
+    from actuator_lti.drive.plant import motor_plant
+
+    design = replace(drive_d(), friction=Friction(load_coefficient=0.02))
+    for point, share in (("driving", 0.1 + 0.02), ("driven", 0.1 - 0.02)):
+        plant = motor_plant(design, Operating(point=point))  # type: ignore[arg-type]
+        w, twist = plant.states.index("w"), plant.states.index("twist")
+        assert plant.A[w, twist] == pytest.approx(-share * 400 / 2e-5, rel=1e-14)
+    gap = motor_plant(design, Operating(point="gap"))
+    assert gap.A[gap.states.index("W"), gap.states.index("twist")] == 0
+    with pytest.raises(InputError, match="no coupling"):
+        assemble_loops(amber(), operating_point="driving")
+
+
+def test_output_sensor_sees_the_spring() -> None:
+    """Below the resonance both sensors agree; above it the output lags the motor by half a turn."""
+    design = drive_e()
+    control = replace(design.controller, position=PositionLoop(gain=20.0, sensor="output"))
+    motor, output = (
+        assemble_loops(each, "ideal").position for each in (design, replace(design, controller=control))
+    )
+    assert motor is not None
+    assert output is not None
+    s = 1j * np.array([1.0, 3000.0])
+    ratio = output.open_loop(s) / motor.open_loop(s)
+    # phi N_c/th = (c s + k)/(J_l s^2 + (c + Cv_l) s + k)
+    expected = (0.1 * s + 400) / (2e-3 * s**2 + 0.11 * s + 400)
+    np.testing.assert_allclose(ratio, expected, rtol=1e-9)
+
+
+def test_gravity_is_a_stiffness_at_its_angle() -> None:
+    base = replace(drive_d(), coupling=None, friction=Friction())
+    hanging = replace(base, load=Load(path="back-drivable", gravity=Gravity(mass_kg=2.0, arm_m=0.3)))
+    slope = replace(
+        base, load=Load(path="back-drivable", moment_slope_Nm_rad=2.0 * 9.80665 * 0.3 * np.cos(2.5))
+    )
+    one, other = assemble_loops(hanging, angle_rad=2.5).velocity, assemble_loops(slope).velocity
+    assert one is not None
+    assert other is not None
+    np.testing.assert_allclose(one.open_loop.A, other.open_loop.A, rtol=1e-13)
+
+
+def test_slope_and_describing_function_of_a_friction_map() -> None:
+    points = tuple(
+        FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 0.02), (10.0, 0.01), (50.0, 0.03))
+    )
+    design = replace(drive_d(), friction=Friction(points=points))
+    assert friction_slope(design) == pytest.approx(-1e-3)
+    assert friction_slope(design, speed_rad_s=-80.0) == pytest.approx(5e-4)
+    # fundamental of the torque of a sinusoidal speed, by quadrature over a quarter turn
+    W = 40.0
+    edges = np.arcsin(np.array([0.0, 10.0, W]) / W)
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    whole = 0.0
+    for low, high in pairwise(edges):
+        x = low + (high - low) * (nodes + 1) / 2
+        speed = W * np.sin(x)
+        torque = np.where(speed < 10, 0.02 - 1e-3 * speed, 0.01 + 5e-4 * (speed - 10))
+        whole += float(np.sum(weights * torque * np.sin(x)) * (high - low) / 2)
+    expected = 4 / np.pi * whole / W
+    found = friction_slope(design, "describing-function", speed_amplitude_rad_s=W)
+    assert found == pytest.approx(expected, rel=1e-12)

@@ -1,0 +1,39 @@
+"""Which kinds of machine this one can act as: environment variables by name; as a script, for the makefile.
+
+A kernel for instructions that the processor does not have would end the process: it is left out.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+_KERNELS = {  # OpenBLAS core type: what the processor must have
+    "Nehalem": ("SSE42",),
+    "Sandybridge": ("AVX",),
+    "Haswell": ("AVX2", "FMA3"),
+    "SkylakeX": ("AVX2", "FMA3", "AVX512F", "AVX512_SKX"),
+}
+
+
+def kernels() -> list[str]:
+    """Core types of OpenBLAS that run here, oldest first."""
+    return [name for name, needs in _KERNELS.items() if all(__cpu_features__.get(each) for each in needs)]
+
+
+def kinds() -> dict[str, dict[str, str]]:
+    """Kernels, two threads, numpy without its vector instructions, numba for any processor."""
+    one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    found = {name: {**one, "OPENBLAS_CORETYPE": name} for name in kernels()}
+    found["two threads"] = {"OPENBLAS_NUM_THREADS": "2", "MKL_NUM_THREADS": "2"}
+    plain = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
+    if plain:
+        found["plain numpy"] = {**one, "NPY_DISABLE_CPU_FEATURES": " ".join(plain)}
+    found["any processor"] = {**one, "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    return found
+
+
+if __name__ == "__main__":
+    found = kernels()
+    sys.stdout.write("\n".join(dict.fromkeys([*found[:1], *found[-2:]])) + "\n")

@@ -1,0 +1,58 @@
+"""Every kind of machine says the same: discrete facts exactly, figures to 1e-9."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from machine_kinds import kernels, kinds
+
+SCRIPT = Path(__file__).with_name("machine_facts.py")
+_ASKED = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+
+
+@functools.cache
+def facts(kind: str | None) -> dict[str, Any]:
+    """What the script prints on a machine of a kind; ``None``: as this machine is."""
+    environment = {name: value for name, value in os.environ.items() if name not in _ASKED}
+    environment |= kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(SCRIPT)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert not done.stderr
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("kind", sorted(kinds()))
+def test_a_machine_of_another_kind_says_the_same(kind: str) -> None:
+    here, there = facts(None), facts(kind)
+    assert here["discrete"].keys() == there["discrete"].keys()
+    differing = {name: (value, there["discrete"][name]) for name, value in here["discrete"].items()
+                 if value != there["discrete"][name]}  # fmt: skip
+    assert not differing
+    far = {}
+    for name, values in here["figures"].items():
+        a, b = np.array(values), np.array(there["figures"][name])
+        error = np.abs(a - b) / np.maximum(np.abs(a), 1.0)
+        if (error > 1e-9).any():
+            far[name] = float(error.max())
+    assert not far
+
+
+def test_there_are_several_kinds() -> None:
+    assert len(kinds()) >= 2
+    if sys.platform == "linux" and os.uname().machine == "x86_64":
+        assert len(kernels()) >= 1
