@@ -86,8 +86,8 @@ def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
 @scalar
 def transition(p, reverse, dt, work, at, out):  # type: ignore[no-untyped-def]
     """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
-    plant(p, reverse, dt, work, at, 5)
-    exponential(work, at, 5)
+    plant(p, reverse, dt, work, at, int(5))
+    exponential(work, at, int(5))
     e = at + MATRIX
     p[out + layout.A11], p[out + layout.A12] = work[e], work[e + 1]
     p[out + layout.A21], p[out + layout.A22] = work[e + 5], work[e + 6]

@@ -165,9 +165,8 @@ LENGTH = DECAY + 2  # of the two segments, s
     RELAX,  # R/L
     LOCKED_GAIN,  # 1/R; 0 for a torque source
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
-    LOOK,  # 1: energies are asked for, or w' may turn twice in a segment: no short cut
+    LOOK,  # 1: no short way over a segment: energies, tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
-    RARE_MOTION,  # 1: tanh law or an elastic drive train
     RARE_LOAD,  # 1: the load changes from tick to tick
     RARE_SENSE,  # 1: instruments or the supply are modelled
     RARE_COMMAND,  # 1: the outermost stage is more than the P loop of position
@@ -187,11 +186,11 @@ LENGTH = DECAY + 2  # of the two segments, s
     PROBE_RING,  # length of one ring
     AT_WORK,  # of the work space
     STATE_SIZE,
-) = range(LENGTH + 2, LENGTH + 27)
+) = range(LENGTH + 2, LENGTH + 26)
 
 # integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
 FORM = 34
-FORMS = LENGTH + 27  # four: direction, segment
+FORMS = LENGTH + 26  # four: direction, segment
 ELASTIC = FORMS + 4 * FORM  # parameters of the elastic drive train
 ELASTIC_SIZE = 1
 P_SIZE = ELASTIC + ELASTIC_SIZE

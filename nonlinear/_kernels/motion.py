@@ -107,12 +107,10 @@ def motion(p, s, io):  # type: ignore[no-untyped-def]
     if p[layout.RARE_LOAD] > 0.0:
         put_load(p, s, hinge_moment(p, s, io), io[layout.IN_TORQUE])
     events = 0.0
-    if p[layout.SPLIT] > 0.0 and quick(p, s, 0, s[layout.S_QUEUE]) == 0:
-        events = closely(p, s, 0, s[layout.S_QUEUE], events)
-    held = s[layout.S_QUEUE + 1]
-    if events >= 0.0 and quick(p, s, 1, held) == 0:
-        events = closely(p, s, 1, held, events)
-    s[layout.S_HELD] = held
+    for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
+        if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:
+            events = closely(p, s, part, s[layout.S_QUEUE + part], events)
+    s[layout.S_HELD] = s[layout.S_QUEUE + 1]
     if events != 0.0:
         count_events(s, events)
     if not (abs(s[layout.S_SPEED]) < FINITE):  # the other states pass through w

@@ -57,23 +57,21 @@ def any_of(p, first, count):  # type: ignore[no-untyped-def]
 @scalar
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
-    more = max(any_of(p, layout.POSITION_INTEGRAL, 2), any_of(p, layout.OUTPUT_SENSOR, 4))
+    more = max(any_of(p, layout.POSITION_INTEGRAL, int(2)), any_of(p, layout.OUTPUT_SENSOR, int(4)))
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, 1)))
+    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, int(1))))
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
     p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
-    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, 2), any_of(p, layout.TORQUE_FILTERS, 1))
-    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, 1))
-    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, 2), any_of(p, layout.CURRENT_WINDUP, 1))
+    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, int(2)), any_of(p, layout.TORQUE_FILTERS, int(1)))
+    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, int(1)))
+    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, int(2)), any_of(p, layout.CURRENT_WINDUP, int(1)))
     p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
     more = max(p[layout.SUPPLY], p[layout.OUTPUT_SENSOR])
-    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, 5))
+    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, int(5)))
     tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
     varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
     p[layout.RARE_LOAD] = 1.0 if varying else 0.0
-    elastic = any_of(p, layout.ELASTIC, 1)
-    p[layout.RARE_MOTION] = max(p[layout.LAW], elastic)
 
 
 @scalar
@@ -99,7 +97,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
     same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
     p[layout.SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
-    p[layout.LOOK] = max(ringing, p[layout.WITH_ENERGY])
+    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC]))
 
 
 @scalar

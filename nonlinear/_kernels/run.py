@@ -65,7 +65,7 @@ def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: i
     the run.
     """
     clear(p, out)
-    ticks, k = int(p[layout.TICKS]), 0
+    ticks, k = int(p[layout.TICKS]), int(s[layout.S_TICK])
     # nobody sees the command between updates of the outermost stage unless the run is looked at
     looked_at = flag_history.shape[0] > 0 or p[layout.WINDOW] > 0.0 or p[layout.WITH_EXTREMES] > 0.0
     stride = 1 if looked_at else int(p[layout.OUTER_EVERY])

@@ -36,10 +36,10 @@ def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
 
     Column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2.
     """
-    plant(p, 0, t, work, at, 7)
+    plant(p, int(0), t, work, at, int(7))
     work[at + 4 * 7 + 5] = t / h
     work[at + 5 * 7 + 6] = t / h
-    exponential(work, at, 7)
+    exponential(work, at, int(7))
 
 
 @scalar
@@ -60,8 +60,8 @@ def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
 def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
     """Fill the coefficients of one step length at ``p[o]``."""
     at = int(p[layout.AT_WORK])
-    transition(p, 0, 0.5 * h, s, at, o + HALF)
-    transition(p, 0, h, s, at, o + FULL)
+    transition(p, int(0), 0.5 * h, s, at, o + HALF)
+    transition(p, int(0), h, s, at, o + FULL)
     e = at + MATRIX
     phi_columns(p, 0.5 * h, 0.5 * h, s, at)
     for r in range(3):
@@ -145,7 +145,7 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-
     sum_iw = form_of_seven(p, form + FORM_IW, i, w, u, Tb, n0, nm, nc)
     sum_ww = form_of_seven(p, form + FORM_WW, i, w, u, Tb, n0, nm, nc)
     sum_nw = form_of_seven(p, form + FORM_NW, i, w, u, Tb, n0, nm, nc)
-    add_slip(p, s, 0, u, Tb, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
+    add_slip(p, s, int(0), u, Tb, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
     s[layout.S_ENERGY + layout.ENERGY_DRY] -= sum_nw
 
 
