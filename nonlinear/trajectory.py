@@ -130,10 +130,10 @@ class Trajectory:
     Attributes
     ----------
     limit_flags : ndarray of uint8
-        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32 current
-        limit behind the torque filters, 64 overload protection, 128 profile of the command.
+        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32 limit in
+        front of the torque filters, 64 overload protection, 128 profile of the command.
     limits : mapping
-        `LimitUse` by name: speed, acceleration, current, voltage; torque filter, overload and profile where
+        `LimitUse` by name: speed, acceleration, current, voltage; torque-command, overload and profile where
         the design has them.
     events : int
         Landings, breakaways and reversals; ``events_per_tick`` is the most in one tick.
@@ -205,7 +205,7 @@ class Trajectory:
         linear = self.axis == "linear"
         out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
         for name in self.limits:
-            out[f"{name.replace(' ', '_')}_limit_active"] = self.limit_active(name)
+            out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
         out["at_rest"] = (self.limit_flags & at.FLAG_STICK) != 0
         for record in self.probes.values():
             out[f"probe_{record.point}_before"], out[f"probe_{record.point}_after"] = (

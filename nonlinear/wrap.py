@@ -16,12 +16,12 @@ LIMITERS_OF_A_ROW = (
     ("acceleration", at.ACCELERATION_LIMIT, "rad/s2"),
     ("current", at.CURRENT_LIMIT, "A"),
     ("voltage", at.VOLTAGE_LIMIT, "V"),
-    ("torque filter", at.CURRENT_LIMIT, "A"),
+    ("torque-command", at.CURRENT_LIMIT, "A"),
     ("overload", at.CONTINUOUS_CURRENT, "A"),
     ("profile", at.PROFILE_RATE, "rad/s"),
 )
 ALWAYS = 4  # named in every run, even where the drive has no such limit
-PRESENT = {"torque filter": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
+PRESENT = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
 
 
 def wrap(

@@ -46,16 +46,16 @@ def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
     out, integral, hit = velocity_regulator(p, s, e, limit)
     s[layout.S_VELOCITY_INTEGRATOR] = integral
-    flags = 0.0
-    if hit > 0.0:
-        flags = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
+    stage = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
     count = int(p[layout.TORQUE_FILTERS])
-    if count > 0:
-        filtered = chain(p, layout.TORQUE_CHAIN, count, s, layout.S_TORQUE_CHAIN, out)
-        out = clamp(filtered, limit)
-        if out != filtered:
-            flags += float(layout.FLAG_TORQUE_FILTER)
-    s[layout.S_FLAGS_VELOCITY] = flags
+    if count <= 0:
+        s[layout.S_FLAGS_VELOCITY] = hit * stage
+        return out
+    s[layout.S_FLAGS_VELOCITY] = hit * float(layout.FLAG_TORQUE_COMMAND)
+    filtered = chain(p, layout.TORQUE_CHAIN, count, s, layout.S_TORQUE_CHAIN, out)
+    out = clamp(filtered, limit)
+    if out != filtered:
+        s[layout.S_FLAGS_VELOCITY] += stage
     return out
 
 

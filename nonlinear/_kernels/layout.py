@@ -25,6 +25,7 @@ from __future__ import annotations
     TORQUE_CONSTANT,  # kM
     INERTIA,  # J
     SOURCE,  # 1: no electrical dynamics
+    ELASTIC_DRIVE,  # 1: coupling or friction map: the plant of the elastic block
     SOURCE_GAIN,  # N m/V
     RATIO,  # N
     LAW,  # 0 coulomb, 1 tanh
@@ -121,7 +122,7 @@ from __future__ import annotations
     GRAVITY,  # m g l, N m
     GRAVITY_ANGLE,  # offset
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(108)
+) = range(109)
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
 SIGNAL_SIZE = 8
@@ -191,11 +192,11 @@ LENGTH = DECAY + 2  # of the two segments, s
 # integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
 FORM = 34
 FORMS = LENGTH + 26  # four: direction, segment
-ELASTIC = FORMS + 4 * FORM  # parameters of the elastic drive train
-ELASTIC_SIZE = 1
-P_SIZE = ELASTIC + ELASTIC_SIZE
+P_SIZE = FORMS + 4 * FORM
 
-# --- behind that, only with the tanh law: two segments, LEVELS step lengths, LEVEL numbers each -------------
+# --- behind that, either the block of an elastic drive train, as long as it needs ---------------------
+ELASTIC = P_SIZE
+# --- or the tanh law's coefficients: two segments, LEVELS step lengths, LEVEL numbers each -------------
 TANH = P_SIZE
 LEVELS = 16
 # one level: transition over h/2 (12), over h (12), phi1 at h/2 (3), weights of N(u), N(a)+N(b), N(c) (9)
@@ -343,10 +344,10 @@ HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 
 # --- limiters: name, and its bit in the flags ---------------------------------------------------------
-LIMITERS = ("speed", "acceleration", "current", "voltage", "torque filter", "overload", "profile")
+LIMITERS = ("speed", "acceleration", "current", "voltage", "torque-command", "overload", "profile")
 FLAG_SPEED, FLAG_ACCELERATION, FLAG_CURRENT, FLAG_VOLTAGE = 1, 2, 4, 8
 FLAG_STICK = 16
-FLAG_TORQUE_FILTER, FLAG_OVERLOAD, FLAG_PROFILE = 32, 64, 128
+FLAG_TORQUE_COMMAND, FLAG_OVERLOAD, FLAG_PROFILE = 32, 64, 128
 LIMITER_BITS = (1, 2, 4, 8, 32, 64, 128)
 LIMITER_COUNT = 7
 

@@ -97,7 +97,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
     same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
     p[layout.SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
-    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC]))
+    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
 @scalar

@@ -15,7 +15,7 @@ from nonlinear._kernels.smooth import tanh_torque
 @scalar
 def output_angle(p, s):  # type: ignore[no-untyped-def]
     """Angle of the output shaft."""
-    return s[layout.S_OUTPUT] if p[layout.ELASTIC] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
+    return s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
 
 
 @scalar
@@ -63,7 +63,7 @@ def sense(p, s, io):  # type: ignore[no-untyped-def]
     if p[layout.JITTER] > 0.0:
         late = clamp(p[layout.JITTER] * normal(s, layout.NOISE_INSTANT), 0.5 * p[layout.PERIOD])
         di, dw = slopes(p, s)
-        rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC] > 0.0 else w / p[layout.RATIO]
+        rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
         i, th, y = i + late * di, th + late * (w + 0.5 * late * dw), y + late * rate
         w += late * dw
     if p[layout.CURRENT_NOISE] > 0.0:

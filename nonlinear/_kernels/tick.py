@@ -107,7 +107,7 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
     else:
         control(p, s, io, i, w, th)
     io[layout.IO_REFERENCE] = io[layout.IN_COMMAND]
-    io[layout.IO_OUTPUT] = s[layout.S_OUTPUT] if p[layout.ELASTIC] > 0.0 else th / p[layout.RATIO]
+    io[layout.IO_OUTPUT] = s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else th / p[layout.RATIO]
     io[layout.IO_SPEED], io[layout.IO_CURRENT], io[layout.IO_ANGLE] = w, i, th
     io[layout.IO_VOLTAGE], io[layout.IO_CURRENT_COMMAND] = s[layout.S_VOLTAGE], s[layout.S_CURRENT_REFERENCE]
     io[layout.IO_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE]
