@@ -6,7 +6,7 @@ It is a function of its own: with measurements written into ``io`` it runs witho
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar
 from nonlinear._kernels.estimate import measured_speed
 from nonlinear._kernels.filters import chain
 from nonlinear._kernels.position import limited, outer_rare, probed_output, put_current, put_outer, put_voltage
@@ -131,7 +131,7 @@ def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
         current(p, s, io, i, w, th)
 
 
-@scalar
+@entry
 def control_tick(p, s, io):  # type: ignore[no-untyped-def]
     """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
     if p[layout.SUPPLY] > 0.0:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.expm import transition
 from nonlinear._kernels.modal import COMPLEX, describe
 from nonlinear._kernels.smooth import prepare_tanh
 
 
-@scalar
+@entry
 def prepare_sizes(p):  # type: ignore[no-untyped-def]
     """Places of the parts of the state whose lengths differ from drive to drive, and its length."""
     p[layout.DELAY_LINE] = p[layout.DELAY_TICKS] + 2.0
@@ -100,7 +100,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
-@scalar
+@entry
 def prepare(p, s):  # type: ignore[no-untyped-def]
     """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space."""
     prepare_periods(p)

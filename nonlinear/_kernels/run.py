@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.record import record
 from nonlinear._kernels.reduce import clear, note_limits, reduce
 from nonlinear._kernels.signals import feed, fill_block
@@ -56,7 +56,7 @@ def finish(s, k, out):  # type: ignore[no-untyped-def]
         out[layout.OUT_ENERGY + j] = s[layout.S_ENERGY + j]
 
 
-@scalar
+@entry
 def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 

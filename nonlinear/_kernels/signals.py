@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar
 
 TWO_PI = 2.0 * math.pi
 NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
@@ -60,7 +60,7 @@ def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
 
-@scalar
+@entry
 def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignore[no-untyped-def]
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)

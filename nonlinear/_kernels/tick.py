@@ -6,7 +6,7 @@ All rows are flat.  A state copied out and set again elsewhere goes on with the 
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar
 from nonlinear._kernels.control import control
 from nonlinear._kernels.estimate import TRACKING, counted
 from nonlinear._kernels.filters import settle
@@ -78,7 +78,7 @@ def init_lines(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = y
 
 
-@scalar
+@entry
 def init(p, s):  # type: ignore[no-untyped-def]
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
@@ -138,21 +138,21 @@ def step(p, s, io):  # type: ignore[no-untyped-def]
     s[layout.S_TICK] += 1.0
 
 
-@scalar
+@entry
 def tick(p, s, io):  # type: ignore[no-untyped-def]
     """`step` to be called from outside; returns the status."""
     step(p, s, io)
     return int(s[layout.S_STATUS])
 
 
-@scalar
+@entry
 def get(p, s, to):  # type: ignore[no-untyped-def]
     """Copy the state out."""
     for j in range(int(p[layout.STATE_SIZE])):
         to[j] = s[j]
 
 
-@scalar
+@entry
 def set_state(p, s, source):  # type: ignore[no-untyped-def]
     """Copy a state in."""
     for j in range(int(p[layout.STATE_SIZE])):
