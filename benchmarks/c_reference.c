@@ -2,7 +2,7 @@
  * stick and breakaway in closed form, limits with conditional integration, histories of eight columns.
  *
  * What the baseline needs: coulomb friction, self-locking load, real eigenvalues, any computing delay.
- * Transition coefficients arrive in `k`, in the layout of nonlinear/_kernels/segment.py:
+ * Transition coefficients arrive in `k`, in the order of nonlinear/_kernels/layout.py:
  * slip(direction, part) 12 numbers each: a11 a12 a21 a22 a31 a32 b1 b2 b3 c1 c2 c3.
  */
 #include <math.h>

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.segment import CONSTANTS, prepare
+from nonlinear._kernels.call import parameters
 
 SOURCE = Path(__file__).with_name("c_reference.c")
 FLAGS = ("-O3", "-march=native", "-std=c11", "-D_GNU_SOURCE", "-fPIC", "-shared")
@@ -36,8 +36,7 @@ class CSimulator:
 
     def run(self, row: np.ndarray, history: np.ndarray, flags: np.ndarray) -> int:
         """Fill history (8, ticks) and flags (ticks,) of the run that a row describes; events."""
-        constants = np.zeros(CONSTANTS)
-        prepare(row, constants)
+        constants = parameters(row)[0][at.SLIP :].copy()
         drive = np.array([row[k] for k in DOUBLES])
         counts = np.array([row[k] for k in INTEGERS], dtype=np.int64)
         packed = np.frombuffer(drive.tobytes() + counts.tobytes(), dtype=np.uint8).copy()

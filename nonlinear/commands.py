@@ -65,7 +65,7 @@ class Command:
         row, table = np.zeros(at.SIGNAL_SIZE), self.table(period_s, ticks)
         write(self, row, 0, 0, 0 if table is None else table.size)
         out = np.empty(ticks)
-        fill(row, 0, np.zeros(1) if table is None else table, period_s, out)
+        fill(row, 0, np.zeros(1) if table is None else table, 0, ticks, 1, period_s, out, 0)
         return out
 
 

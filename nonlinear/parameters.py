@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from math import floor, inf, pi
+from math import ceil, floor, inf
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
+from nonlinear.filters import command_section, section
 
 Floats = npt.NDArray[np.float64]
 
 MAX_EVENTS_PER_TICK = 1000
 TANH_TOLERANCE = 1e-8
+LONGEST_AVERAGE = 100_000  # samples of the moving average that limits the jerk
+SEEDS = 2**31
+ANTI_WINDUP = get_args(AntiWindup)  # in the order of the kernel's numbers
+SPEED_SOURCES = get_args(SpeedSource)
 
 
 def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
@@ -56,6 +62,10 @@ def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = Tr
     _plant(design, row)
     _friction(design, row, friction_on)
     _controllers(design, row)
+    _load(design, row)
+    _command(design, row)
+    _supply(design, row)
+    _instruments(design, row)
     _limits(design, row, limits_on)
     row[at.MAX_EVENTS] = MAX_EVENTS_PER_TICK
     row[at.RECORD_EVERY] = 1
@@ -67,7 +77,7 @@ def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = Tr
 
 
 def _plant(design: Design, row: Floats) -> None:
-    motor = design.motor
+    motor = design.effective_motor
     row[at.RATIO] = design.total_ratio
     row[at.INERTIA] = design.inertia_kgm2
     row[at.BACK_DRIVABLE] = design.load.path == "back-drivable"
@@ -106,42 +116,160 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
         raise InputError(message, where=design.name)
 
 
+def _load(design: Design, row: Floats) -> None:
+    """Slope and gravity of the design act in every run, told or not."""
+    row[at.LOAD_SLOPE] = design.load.moment_slope_Nm_rad
+    if design.load.gravity is not None:
+        row[at.GRAVITY] = design.load.gravity.peak_Nm
+        row[at.GRAVITY_ANGLE] = design.load.gravity.offset_rad
+
+
 def _controllers(design: Design, row: Floats) -> None:
     controller = design.controller
     Ts = controller.period_s
     row[at.PERIOD] = Ts
     row[at.DELAY_TICKS], row[at.DELAY_FRACTION] = split_delay(controller.computing_delay_s, Ts)
-    row[at.EVERY_POSITION] = controller.position_loop.every
-    row[at.POSITION_GAIN] = controller.position_loop.gain
-    row[at.FEEDFORWARD] = controller.position_loop.feedforward
-    row[at.EVERY_VELOCITY] = 1
+    row[at.EVERY_POSITION] = row[at.EVERY_VELOCITY] = 1
     row[at.FILTER_COEFFICIENT] = 1.0
     row[at.DIFFERENCE_SAMPLES] = 1
+    row[at.DERIVATIVE_COEFFICIENT] = 1.0
     velocity, current = controller.velocity, controller.current
     if velocity is not None:
-        T = velocity.every * Ts
         row[at.HAS_VELOCITY], row[at.EVERY_VELOCITY] = 1.0, velocity.every
-        row[at.VELOCITY_GAIN] = velocity.gain
-        if velocity.integral_time_s is not None:
-            row[at.VELOCITY_INTEGRAL] = velocity.gain * T / velocity.integral_time_s
-        _encoder(design, row, T)
+        _regulator(row, at.VELOCITY_GAIN, at.VELOCITY_WINDUP, velocity.gain, velocity, velocity.every * Ts)
+        for place in ("speed", "torque"):
+            _filters(design, row, place, velocity.every * Ts)
+    _encoder(design, row, row[at.EVERY_VELOCITY] * Ts)
     if current is not None:
         if row[at.SOURCE]:
             message = "control.current: an ideal torque source has no current to control"
             raise InputError(message, where=design.name)
-        row[at.HAS_CURRENT], row[at.CURRENT_GAIN] = 1.0, current.gain_V_A
-        if current.integral_time_s is not None:
-            row[at.CURRENT_INTEGRAL] = current.gain_V_A * Ts / current.integral_time_s
+        row[at.HAS_CURRENT] = 1.0
+        _regulator(row, at.CURRENT_GAIN, at.CURRENT_WINDUP, current.gain_V_A, current, Ts)
+        row[at.BACK_EMF_FEEDFORWARD] = current.back_emf_feedforward * row[at.BACK_EMF]
+        row[at.RESISTANCE_FEEDFORWARD] = current.resistance_feedforward * row[at.RESISTANCE]
+    _position(design, row)
+
+
+def _regulator(
+    row: Floats, gain_at: int, windup_at: int, gain: float, loop: VelocityLoop | CurrentLoop, T: float
+) -> None:
+    """Gain, Kp T/Tn and anti-windup of a PI; T/Tt of the back-calculation is T/Tn where Tt is not given."""
+    row[gain_at] = gain
+    row[windup_at] = ANTI_WINDUP.index(loop.anti_windup)
+    if loop.integral_time_s is None:
+        return
+    row[gain_at + 1] = gain * T / loop.integral_time_s
+    row[windup_at + 1] = T / (loop.integral_time_s if loop.tracking_time_s is None else loop.tracking_time_s)
+
+
+def _filters(design: Design, row: Floats, place: FilterPlace, period_s: float) -> None:
+    count_at, chain_at = {
+        "speed": (at.SPEED_FILTERS, at.SPEED_CHAIN),
+        "torque": (at.TORQUE_FILTERS, at.TORQUE_CHAIN),
+    }[place]
+    velocity = design.controller.velocity
+    chosen = () if velocity is None else velocity.filters_on(place)
+    if len(chosen) > at.MAX_SECTIONS:
+        message = f"control.velocity.filter: {len(chosen)} on the {place}: at most {at.MAX_SECTIONS} fit"
+        raise InputError(message, where=design.name)
+    row[count_at] = len(chosen)
+    for k, item in enumerate(chosen):
+        begin = chain_at + k * at.SECTION
+        row[begin : begin + at.SECTION] = section(item, period_s, where=design.name)
+
+
+def _position(design: Design, row: Floats) -> None:
+    loop = design.controller.position
+    if loop is None:
+        return
+    T = loop.every * row[at.PERIOD]
+    row[at.HAS_POSITION], row[at.EVERY_POSITION] = 1.0, loop.every
+    row[at.POSITION_GAIN], row[at.FEEDFORWARD] = loop.gain, loop.feedforward
+    if loop.integral_time_s is not None:
+        row[at.POSITION_INTEGRAL] = loop.gain * T / loop.integral_time_s
+    row[at.DERIVATIVE] = loop.gain * loop.derivative_time_s
+    row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
+    row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
+    row[at.ACCELERATION_FEEDFORWARD] = loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+    if loop.sensor == "output":
+        row[at.OUTPUT_SENSOR] = 1.0
+        quantum = design.output_quantum_rad
+        row[at.POSITION_COUNTS] = 0.0 if quantum is None else 1.0 / quantum
+
+
+def _torque_gain(row: Floats) -> float:
+    """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
+    if row[at.SOURCE]:
+        return float(row[at.SOURCE_GAIN])
+    return float(row[at.TORQUE_CONSTANT] if row[at.HAS_CURRENT] else row[at.TORQUE_CONSTANT] / row[at.RESISTANCE])
 
 
 def _encoder(design: Design, row: Floats, period_s: float) -> None:
     encoder = design.encoder
     row[at.FILTER_COEFFICIENT] = period_s / (encoder.filter_time_s + period_s)
+    row[at.SPEED_SOURCE] = SPEED_SOURCES.index(encoder.speed)
+    if encoder.speed == "ideal":
+        return
     if encoder.speed == "difference":
-        row[at.SPEED_SOURCE], row[at.DIFFERENCE_SAMPLES] = 1.0, encoder.difference_samples
-        if encoder.counts_per_rev is not None:
-            turn = 2.0 * pi if design.axis == "rotary" else 1.0
-            row[at.COUNTS_PER_RAD] = encoder.counts_per_rev / turn
+        row[at.DIFFERENCE_SAMPLES] = encoder.difference_samples
+    elif encoder.bandwidth_rad_s is None:
+        raise InputError("encoder.bandwidth: missing; the tracking loop needs one", where=design.name)
+    else:
+        w0T = encoder.bandwidth_rad_s * period_s
+        row[at.TRACKING_ANGLE], row[at.TRACKING_SPEED] = 2.0 * w0T, w0T * encoder.bandwidth_rad_s
+    quantum = design.angle_quantum_rad
+    row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / quantum
+
+
+def _command(design: Design, row: Floats) -> None:
+    """Profile and filter of the command, at the period of the outermost stage."""
+    command, control = design.command, design.controller
+    outermost = control.outermost
+    period = row[at.PERIOD] * (row[at.EVERY_POSITION] if control.position else row[at.EVERY_VELOCITY])
+    limits = [command.rate_rad_s, command.acceleration_rad_s2, command.jerk_rad_s3]
+    if outermost in ("current", "voltage") and min(limits) < inf:
+        message = f"command: rate, acceleration and jerk need a position or a velocity loop, not {outermost}"
+        raise InputError(message, where=design.name)
+    # a speed command is limited itself where an angle's first derivative is
+    ranges = [inf, *limits] if outermost == "position" else [*limits, inf]
+    row[at.PROFILE_RANGE], row[at.PROFILE_RATE], row[at.PROFILE_ACCELERATION] = ranges[:3]
+    row[at.PROFILED] = min(limits) < inf
+    if ranges[3] < inf:
+        if ranges[2] == inf:
+            raise InputError("command.jerk: needs command.acceleration as well", where=design.name)
+        samples = ceil(2.0 * ranges[2] / (ranges[3] * period) - 1e-9)
+        if samples > LONGEST_AVERAGE:
+            message = f"command.jerk = {ranges[3]:g}: asks for a mean over {samples} samples"
+            raise InputError(f"{message}; at most {LONGEST_AVERAGE} fit", where=design.name)
+        row[at.PROFILE_SAMPLES] = max(samples, 1)
+    if command.filter_time_s > 0.0:
+        row[at.COMMAND_FILTERS] = 1
+        lowpass = command_section(command, period)
+        row[at.COMMAND_CHAIN : at.COMMAND_CHAIN + at.SECTION] = lowpass
+
+
+def _supply(design: Design, row: Floats) -> None:
+    supply = design.supply
+    if supply is None:
+        return
+    row[at.SUPPLY], row[at.SUPPLY_VOLTAGE] = 1.0, design.limits.voltage_V
+    row[at.SUPPLY_RESISTANCE], row[at.REGENERATIVE] = supply.resistance_ohm, supply.regenerative
+    row[at.BRAKE_VOLTAGE] = inf if supply.brake_voltage_V is None else supply.brake_voltage_V
+    if not supply.regenerative and supply.capacitance_F is None:
+        message = "supply.capacitance: missing; a supply that takes no energy back needs one"
+        raise InputError(message, where=design.name)
+    row[at.CAPACITANCE] = supply.capacitance_F or 0.0
+
+
+def _instruments(design: Design, row: Floats) -> None:
+    instruments = design.instruments
+    row[at.CURRENT_RESOLUTION] = instruments.current_resolution_A
+    row[at.CURRENT_NOISE] = instruments.current_noise_A
+    row[at.ANGLE_NOISE] = instruments.angle_noise_rad
+    row[at.OUTPUT_NOISE] = instruments.output_angle_noise_rad
+    row[at.JITTER] = instruments.jitter_s
+    row[at.SEED] = instruments.seed % SEEDS
 
 
 def _limits(design: Design, row: Floats, limits_on: bool) -> None:
@@ -150,3 +278,12 @@ def _limits(design: Design, row: Floats, limits_on: bool) -> None:
     places = (at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT, at.VOLTAGE_LIMIT)
     for place, value in zip(places, values, strict=True):
         row[place] = value if limits_on else inf
+    if not limits_on:
+        row[at.SUPPLY] = 0.0
+        return
+    tau = limits.overload_time_s
+    if tau is not None:
+        if not row[at.HAS_CURRENT]:
+            raise InputError("limits.peak_time: needs a current loop", where=design.name)
+        row[at.OVERLOAD], row[at.OVERLOAD_RATE] = 1.0, row[at.PERIOD] / tau
+        row[at.OVERLOAD_RELEASE], row[at.CONTINUOUS_CURRENT] = limits.release, limits.continuous_current_A

@@ -73,7 +73,8 @@ def check_frequency(design: Design, command: Command) -> None:
 
 def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
     """Write the hinge moment."""
-    row[at.LOAD], row[at.LOAD_SLOPE] = load.constant_Nm, load.slope_Nm_rad
+    row[at.LOAD] = load.constant_Nm
+    row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:
         table = load.series.table(float(row[at.PERIOD]), int(row[at.TICKS]))
         if table is not None:

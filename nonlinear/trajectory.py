@@ -70,6 +70,9 @@ class Energy:
 
     ``input = copper + magnetic + kinetic + friction (dry, viscous, offset) + output work + conversion``;
     ``conversion`` is ``(kE - kM) i w`` integrated, zero for a motor whose constants agree.
+
+    The last four are the supply's own account, where one is modelled, of the bus power ``u i`` sampled at the
+    ticks: ``sum of u i Ts = supply - supply loss - brake - bus capacitor``.
     """
 
     electrical_input_J: float
@@ -81,6 +84,10 @@ class Energy:
     offset_friction_J: float
     output_work_J: float
     conversion_J: float
+    supply_J: float = 0.0
+    supply_loss_J: float = 0.0
+    brake_J: float = 0.0
+    bus_capacitor_J: float = 0.0
 
     @property
     def balance_error_J(self) -> float:
@@ -123,9 +130,11 @@ class Trajectory:
     Attributes
     ----------
     limit_flags : ndarray of uint8
-        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest.
+        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32 limit in
+        front of the torque filters, 64 overload protection, 128 profile of the command.
     limits : mapping
-        `LimitUse` by name: speed, acceleration, current, voltage.
+        `LimitUse` by name: speed, acceleration, current, voltage; torque-command, overload and profile where
+        the design has them.
     events : int
         Landings, breakaways and reversals; ``events_per_tick`` is the most in one tick.
     stick_fraction : float
@@ -178,7 +187,7 @@ class Trajectory:
 
     def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
         """Rows in which a limiter acts."""
-        return (self.limit_flags & (1 << at.LIMITERS.index(name))) != 0
+        return (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
@@ -195,8 +204,8 @@ class Trajectory:
         )
         linear = self.axis == "linear"
         out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
-        for name in at.LIMITERS:
-            out[f"{name}_limit_active"] = self.limit_active(name)
+        for name in self.limits:
+            out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
         out["at_rest"] = (self.limit_flags & at.FLAG_STICK) != 0
         for record in self.probes.values():
             out[f"probe_{record.point}_before"], out[f"probe_{record.point}_after"] = (

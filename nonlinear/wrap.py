@@ -10,6 +10,18 @@ from nonlinear._kernels import layout as at
 from nonlinear.trajectory import Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
 Floats = npt.NDArray[np.float64]
+# in the order of ``layout.LIMITERS``: name, place of the limit, unit
+LIMITERS_OF_A_ROW = (
+    ("speed", at.SPEED_LIMIT, "rad/s"),
+    ("acceleration", at.ACCELERATION_LIMIT, "rad/s2"),
+    ("current", at.CURRENT_LIMIT, "A"),
+    ("voltage", at.VOLTAGE_LIMIT, "V"),
+    ("torque-command", at.CURRENT_LIMIT, "A"),
+    ("overload", at.CONTINUOUS_CURRENT, "A"),
+    ("profile", at.PROFILE_RATE, "rad/s"),
+)
+ALWAYS = 4  # named in every run, even where the drive has no such limit
+PRESENT = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
 
 
 def wrap(
@@ -47,15 +59,15 @@ def wrap(
 
 
 def limit_uses(row: Floats, out: Floats, axis: str = "rotary") -> dict[str, LimitUse]:
-    """How long each limiter acted."""
-    places = (at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT, at.VOLTAGE_LIMIT)
-    units = ("m/s", "m/s2", "A", "V") if axis == "linear" else ("rad/s", "rad/s2", "A", "V")
+    """How long each limiter of the drive acted."""
     uses = {}
-    for k, name in enumerate(at.LIMITERS):
+    for k, (name, place, unit) in enumerate(LIMITERS_OF_A_ROW):
+        if k >= ALWAYS and not row[PRESENT[name]]:
+            continue
         first = out[at.OUT_LIMIT_FIRST + k]
         uses[name] = LimitUse(
-            limit=float(row[places[k]]),
-            unit=units[k],
+            limit=float(row[place]),
+            unit=unit.replace("rad", "m") if axis == "linear" else unit,
             fraction=float(out[at.OUT_LIMIT_TICKS + k] / max(out[at.OUT_TICKS], 1.0)),
             first_time_s=None if first < 0 else float(first * row[at.PERIOD]),
         )
@@ -90,4 +102,8 @@ def energy_of(row: Floats, out: Floats) -> Energy:
         offset_friction_J=float(e[at.ENERGY_OFFSET]),
         output_work_J=float(e[at.ENERGY_LOAD]),
         conversion_J=float(e[at.ENERGY_CONVERSION]),
+        supply_J=float(e[at.ENERGY_SUPPLY]),
+        supply_loss_J=float(e[at.ENERGY_SUPPLY_LOSS]),
+        brake_J=float(e[at.ENERGY_BRAKE]),
+        bus_capacitor_J=float(e[at.ENERGY_CAPACITOR]),
     )

@@ -6,11 +6,25 @@ import numpy as np
 import numpy.typing as npt
 
 from nonlinear._kernels import layout
+from nonlinear._kernels.prepare import prepare, prepare_sizes
 from nonlinear._kernels.run import run
-from nonlinear._kernels.segment import CONSTANTS, prepare
-from nonlinear._kernels.smooth import LEVEL, LEVELS, prepare_tanh
+from nonlinear._kernels.tick import init
 
 Floats = npt.NDArray[np.float64]
+
+
+def parameters(row: Floats) -> tuple[Floats, Floats]:
+    """All parameters of a row with what is derived from them, and the state at t_0."""
+    size = layout.P_SIZE
+    if row[layout.LAW] > 0.0:
+        size += layout.TANH_SIZE + (layout.TANH_FORMS_SIZE if row[layout.WITH_ENERGY] > 0.0 else 0)
+    p = np.zeros(size)
+    p[: layout.SIZE] = row
+    prepare_sizes(p)
+    s = np.zeros(int(p[layout.STATE_SIZE]))
+    prepare(p, s)
+    init(p, s)
+    return p, s
 
 
 def call(
@@ -21,11 +35,7 @@ def call(
     out: Floats,
     shared: Floats,
 ) -> int:
-    """Run one row (see `run`); the tanh law is prepared, and compiled, only where it is used."""
-    constants = np.zeros(CONSTANTS)
-    prepare(row, constants)
-    if row[layout.LAW] == 0.0:
-        return int(run(row, constants, None, tables, history, flags, out, shared))
-    table = np.zeros(2 * LEVELS * LEVEL)
-    prepare_tanh(row, constants, table)
-    return int(run(row, constants, table, tables, history, flags, out, shared))
+    """Run one row (see `run`); ``history`` is (columns, rows) or empty."""
+    p, s = parameters(row)
+    io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
+    return int(run(p, s, io, block, tables, history.reshape(-1), flags, out, shared))

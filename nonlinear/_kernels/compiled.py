@@ -25,26 +25,26 @@ def source_stamp() -> str:
     return digest.hexdigest()
 
 
-njit: Any = numba.njit  # _nrt is not in its published signature
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+njit: Any = numba.njit  # some of the options are not in its published signature
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def kernel(function: Callable[..., Any]) -> Any:
-    """Compile at the first call: without the GIL, arithmetic as written (no fastmath), cached on disk."""
-    return _stamped(njit(**OPTIONS, _nrt=True)(function))
+def entry(function: Callable[..., Any]) -> Any:
+    """Compile a function that Python calls: at its first call, without the GIL, no fastmath, cached on disk.
 
-
-def scalar(function: Callable[..., Any]) -> Any:
-    """The same for a function that makes no arrays.
-
-    It needs no reference counts, whose atomic operations would cost more than its arithmetic.
+    No kernel makes arrays, so none needs reference counts.
     """
     return _stamped(njit(**OPTIONS, _nrt=False)(function))
 
 
+def scalar(function: Callable[..., Any]) -> Any:
+    """The same for a function that only kernels call."""
+    return _stamped(njit(**OPTIONS, _nrt=False, no_cpython_wrapper=True)(function))
+
+
 def inlined(function: Callable[..., Any]) -> Any:
     """The same for a small function of the tick loop: its code is copied into its callers."""
-    return _stamped(njit(**OPTIONS, _nrt=False, forceinline=True)(function))
+    return _stamped(njit(**OPTIONS, _nrt=False, forceinline=True, no_cpython_wrapper=True)(function))
 
 
 def _stamped(dispatcher: Any) -> Any:

@@ -1,59 +1,141 @@
-"""The controllers' arithmetic, one tick at a time."""
+"""The controller: measured current, speed and angle in, voltage out.
+
+It is a function of its own: with measurements written into ``io`` it runs without the motor's model.
+"""
 
 from __future__ import annotations
 
-import math
-
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
-
-
-@inlined
-def clamp(value, limit):  # type: ignore[no-untyped-def]
-    """Value held within +-limit."""
-    return min(max(value, -limit), limit)
-
-
-@inlined
-def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
-    """PI with conditional integration: output, new integral, and whether the limit acts.
-
-    ``step`` is Kp T/Tn.  The new integral is kept if the output is not clamped or v and e have opposite
-    signs; otherwise the old one is, and the output is formed with it.
-    """
-    updated = integral + step * e
-    v = gain * e + updated
-    out = clamp(v, limit)
-    if out == v:
-        return out, updated, False
-    if (v > 0.0 and e < 0.0) or (v < 0.0 and e > 0.0):
-        return out, updated, True
-    return clamp(gain * e + integral, limit), integral, True
-
-
-@inlined
-def measured_angle(p, th):  # type: ignore[no-untyped-def]
-    """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
-    scale = p[layout.COUNTS_PER_RAD]
-    return math.floor(th * scale) / scale if scale > 0.0 else th
-
-
-@inlined
-def measured_speed(p, th, w, angles, place, filtered, period):  # type: ignore[no-untyped-def]
-    """Speed as the velocity controller sees it (also the filter's state); ``angles`` is a ring of m."""
-    x = w
-    if p[layout.SPEED_SOURCE] > 0.0:
-        angle = measured_angle(p, th)
-        x = (angle - angles[place]) / (p[layout.DIFFERENCE_SAMPLES] * period)
-        angles[place] = angle
-    return filtered + p[layout.FILTER_COEFFICIENT] * (x - filtered)
+from nonlinear._kernels.compiled import entry, inlined, scalar
+from nonlinear._kernels.estimate import measured_speed
+from nonlinear._kernels.filters import chain
+from nonlinear._kernels.position import limited, outer_rare, probed_output, put_current, put_outer, put_voltage
+from nonlinear._kernels.probes import PROBE_Y
+from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
 
 
 @scalar
-def note_limits(flags, new, k, in_window, out):  # type: ignore[no-untyped-def]
-    """Note the tick of each limiter that acts for the first time, and count the ticks in the last window."""
-    for j in range(4):
-        if new & (1 << j):
-            out[layout.OUT_LIMIT_FIRST + j] = k
-        if in_window and flags & (1 << j):
-            out[layout.OUT_WINDOW_LIMITS + j] += 1.0
+def overload(p, s, i):  # type: ignore[no-untyped-def]
+    """The overload (I2t) state, and the current limit of this tick."""
+    x, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
+    x += p[layout.OVERLOAD_RATE] * (share * share - x)
+    s[layout.S_OVERLOAD] = x
+    if x >= 1.0:
+        s[layout.S_OVERLOADED] = 1.0
+    elif x < p[layout.OVERLOAD_RELEASE]:
+        s[layout.S_OVERLOADED] = 0.0
+    lower = min(p[layout.CURRENT_LIMIT], p[layout.CONTINUOUS_CURRENT])
+    s[layout.S_CURRENT_LIMIT] = lower if s[layout.S_OVERLOADED] > 0.0 else p[layout.CURRENT_LIMIT]
+
+
+@inlined
+def outer(p, s, io, th):  # type: ignore[no-untyped-def]
+    """Update the outermost stage."""
+    if p[layout.RARE_COMMAND] > 0.0:
+        outer_rare(p, s, io, th)
+        return
+    N, y = p[layout.RATIO], th
+    if p[PROBE_Y] > 0.0:
+        y = N * probed_output(p, s, io, th / N)
+    out, flags = limited(p, s, p[layout.POSITION_GAIN] * (N * io[layout.IN_COMMAND] - y))
+    put_outer(p, s, io, out, flags)
+
+
+@scalar
+def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
+    """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
+    out, integral, hit = velocity_regulator(p, s, e, limit)
+    s[layout.S_VELOCITY_INTEGRATOR] = integral
+    stage = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
+    count = int(p[layout.TORQUE_FILTERS])
+    if count <= 0:
+        s[layout.S_FLAGS_VELOCITY] = hit * stage
+        return out
+    s[layout.S_FLAGS_VELOCITY] = hit * float(layout.FLAG_TORQUE_COMMAND)
+    filtered = chain(p, layout.TORQUE_CHAIN, count, s, layout.S_TORQUE_CHAIN, out)
+    out = clamp(filtered, limit)
+    if out != filtered:
+        s[layout.S_FLAGS_VELOCITY] += stage
+    return out
+
+
+@inlined
+def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
+    """Update the velocity stage."""
+    measured = measured_speed(p, s, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+    s[layout.S_MEASURED_SPEED] = measured
+    e = s[layout.S_SPEED_REFERENCE] - measured
+    cascaded = p[layout.HAS_CURRENT] > 0.0
+    limit = s[layout.S_CURRENT_LIMIT] if cascaded else s[layout.S_VOLTAGE_LIMIT]
+    if p[layout.RARE_VELOCITY] > 0.0:
+        out = torque_path(p, s, e, limit)
+    else:
+        step = p[layout.VELOCITY_INTEGRAL]
+        out, integral, hit = pi(e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], step, limit)
+        s[layout.S_VELOCITY_INTEGRATOR] = integral
+        s[layout.S_FLAGS_VELOCITY] = hit * float(layout.FLAG_CURRENT if cascaded else layout.FLAG_VOLTAGE)
+    if cascaded:
+        put_current(p, s, io, out)
+    else:
+        put_voltage(p, s, io, out)
+
+
+@scalar
+def current_rare(p, s, i, w, th):  # type: ignore[no-untyped-def]
+    """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
+    wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
+    if p[layout.HAS_VELOCITY] <= 0.0 and p[layout.BACK_EMF_FEEDFORWARD] != 0.0:
+        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, w, th)
+    extra = p[layout.BACK_EMF_FEEDFORWARD] * s[layout.S_MEASURED_SPEED]
+    extra += p[layout.RESISTANCE_FEEDFORWARD] * wanted
+    out, integral, hit = regulator(
+        wanted - i, s[layout.S_CURRENT_INTEGRATOR], p[layout.CURRENT_GAIN], p[layout.CURRENT_INTEGRAL],
+        extra, s[layout.S_VOLTAGE_LIMIT], p[layout.CURRENT_WINDUP], p[layout.CURRENT_TRACKING],
+    )  # fmt: skip
+    s[layout.S_CURRENT_INTEGRATOR] = integral
+    s[layout.S_FLAGS_CURRENT] = hit * float(layout.FLAG_VOLTAGE)
+    if s[layout.S_OVERLOADED] > 0.0:
+        s[layout.S_FLAGS_CURRENT] += float(layout.FLAG_OVERLOAD)
+    return out
+
+
+@inlined
+def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
+    """Update the current stage: every tick."""
+    if p[layout.RARE_CURRENT] > 0.0:
+        out = current_rare(p, s, i, w, th)
+    else:
+        e, step = s[layout.S_CURRENT_REFERENCE] - i, p[layout.CURRENT_INTEGRAL]
+        before = s[layout.S_CURRENT_INTEGRATOR]
+        out, integral, hit = pi(e, before, p[layout.CURRENT_GAIN], step, s[layout.S_VOLTAGE_LIMIT])
+        s[layout.S_CURRENT_INTEGRATOR] = integral
+        s[layout.S_FLAGS_CURRENT] = hit * float(layout.FLAG_VOLTAGE)
+    put_voltage(p, s, io, out)
+
+
+@inlined
+def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
+    """One tick of the controller; leaves the voltage in the state."""
+    if p[layout.OVERLOAD] > 0.0:
+        overload(p, s, i)
+    if s[layout.S_UNTIL_OUTER] <= 0.0:
+        s[layout.S_UNTIL_OUTER] = p[layout.OUTER_EVERY]
+        outer(p, s, io, th)
+    s[layout.S_UNTIL_OUTER] -= 1.0
+    if p[layout.HAS_VELOCITY] > 0.0:
+        if s[layout.S_UNTIL_VELOCITY] <= 0.0:
+            s[layout.S_UNTIL_VELOCITY] = p[layout.EVERY_VELOCITY]
+            velocity(p, s, io, w, th)
+        s[layout.S_UNTIL_VELOCITY] -= 1.0
+    if p[layout.HAS_CURRENT] > 0.0:
+        current(p, s, io, i, w, th)
+
+
+@entry
+def control_tick(p, s, io):  # type: ignore[no-untyped-def]
+    """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
+    if p[layout.SUPPLY] > 0.0:
+        s[layout.S_VOLTAGE_LIMIT] = io[layout.IN_BUS]
+    control(p, s, io, io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE])
+    s[layout.S_TICK] += 1.0
+    return s[layout.S_VOLTAGE]

@@ -12,46 +12,123 @@ import numpy as np
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import scalar
-from nonlinear._kernels.modal import M11, M12, M21, M22, slip_at
+from nonlinear._kernels.modal import slip_at
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
-E = layout.OUT_ENERGY
+LEDGER = layout.S_ENERGY
 
 
 @scalar
-def energy_slip(p, modal, at, reverse, t, s, i, w, u, T, Tb, out):  # type: ignore[no-untyped-def]
-    """Add the energies of slipping for t in direction s from (i, w)."""
-    rate = abs(modal[at + M11]) + abs(modal[at + M22]) + math.sqrt(abs(modal[at + M12] * modal[at + M21]))
-    pieces = int(min(1.0 + rate * t, 1e4))
+def pieces_of(p, at, t):  # type: ignore[no-untyped-def]
+    """Into how many pieces a time is cut so that each is short against every eigenvalue."""
+    coupling = math.sqrt(abs(p[at + layout.M12] * p[at + layout.M21]))
+    rate = abs(p[at + layout.M11]) + abs(p[at + layout.M22]) + coupling
+    return int(min(1.0 + rate * t, 1e4))
+
+
+@scalar
+def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):  # type: ignore[no-untyped-def]
+    """Add to the ledger what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
+    Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
+    if p[layout.SOURCE] > 0.0:
+        s[LEDGER + layout.ENERGY_INPUT] += p[layout.SOURCE_GAIN] * u * angle
+    else:
+        s[LEDGER + layout.ENERGY_INPUT] += u * sum_i
+        s[LEDGER + layout.ENERGY_COPPER] += p[layout.RESISTANCE] * sum_ii
+        s[LEDGER + layout.ENERGY_CONVERSION] += (p[layout.BACK_EMF] - p[layout.TORQUE_CONSTANT]) * sum_iw
+    s[LEDGER + layout.ENERGY_DRY] += (Tb - T) * angle
+    s[LEDGER + layout.ENERGY_VISCOUS] += Cv * sum_ww
+    s[LEDGER + layout.ENERGY_OFFSET] += p[layout.OFFSET] * angle
+    s[LEDGER + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
+
+
+@scalar
+def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
+    """Add the energies of slipping for t from (i, w)."""
+    pieces = pieces_of(p, at, t)
     h = t / pieces
     sum_i, sum_ii, sum_iw, sum_ww = 0.0, 0.0, 0.0, 0.0
     start_i, start_w, angle = i, w, 0.0
     for _ in range(pieces):
-        for j in range(NODES.shape[0]):
-            i_t, w_t, _ = slip_at(p, modal, at, reverse, h * NODES[j], start_i, start_w, 0.0, u, T)
+        for j in range(10):
+            i_t, w_t, _th = slip_at(p, s, at, reverse, h * NODES[j], start_i, start_w, 0.0, u, T)
             weight = h * WEIGHTS[j]
             sum_i += weight * i_t
             sum_ii += weight * i_t * i_t
             sum_iw += weight * i_t * w_t
             sum_ww += weight * w_t * w_t
-        start_i, start_w, turned = slip_at(p, modal, at, reverse, h, start_i, start_w, 0.0, u, T)
+        start_i, start_w, turned = slip_at(p, s, at, reverse, h, start_i, start_w, 0.0, u, T)
         angle += turned
-    Cv = p[layout.VISCOUS_REVERSE] if reverse else p[layout.VISCOUS]
-    if p[layout.SOURCE] > 0.0:
-        out[E + layout.ENERGY_INPUT] += p[layout.SOURCE_GAIN] * u * angle
-    else:
-        out[E + layout.ENERGY_INPUT] += u * sum_i
-        out[E + layout.ENERGY_COPPER] += p[layout.RESISTANCE] * sum_ii
-        out[E + layout.ENERGY_CONVERSION] += (p[layout.BACK_EMF] - p[layout.TORQUE_CONSTANT]) * sum_iw
-    out[E + layout.ENERGY_DRY] += (Tb - T) * angle
-    out[E + layout.ENERGY_VISCOUS] += Cv * sum_ww
-    out[E + layout.ENERGY_OFFSET] += p[layout.OFFSET] * angle
-    out[E + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
+    add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
 @scalar
-def energy_stick(p, t, i, u, out):  # type: ignore[no-untyped-def]
+def prepare_forms(p, s):  # type: ignore[no-untyped-def]
+    """Write the integrals over each whole segment as forms of (i, w, u, T), by the same quadrature."""
+    for which in range(4):
+        side = 1 if which > 1 else 0
+        part = which - 2 * side
+        at, form = layout.MODES + side * layout.MODAL, layout.FORMS + which * layout.FORM
+        for j in range(layout.FORM):
+            p[form + j] = 0.0
+        t = p[layout.LENGTH + part]
+        pieces = pieces_of(p, at, t)
+        h = t / pieces
+        for piece in range(pieces):
+            for j in range(10):
+                add_node(p, s, at, side, (piece + NODES[j]) * h, h * WEIGHTS[j], form)
+
+
+@scalar
+def add_node(p, s, at, side, t, weight, form):  # type: ignore[no-untyped-def]
+    """Add one node of the quadrature to the forms: responses of i and w at t to each of (i, w, u, T)."""
+    work = int(p[layout.AT_WORK]) + layout.WORK_MORE
+    for n in range(4):
+        i = 1.0 if n == 0 else 0.0
+        w = 1.0 if n == 1 else 0.0
+        u = 1.0 if n == 2 else 0.0
+        T = 1.0 if n == 3 else 0.0
+        i_t, w_t, _th = slip_at(p, s, at, side, t, i, w, 0.0, u, T)
+        s[work + 2 * n], s[work + 2 * n + 1] = i_t, w_t
+    place = form + 4
+    for n in range(4):
+        i_n, w_n = s[work + 2 * n], s[work + 2 * n + 1]
+        p[form + n] += weight * i_n
+        for m in range(n, 4):
+            i_m, w_m = s[work + 2 * m], s[work + 2 * m + 1]
+            twice = weight if m == n else 2.0 * weight
+            p[place] += twice * i_n * i_m
+            p[place + 10] += 0.5 * twice * (i_n * w_m + w_n * i_m)
+            p[place + 20] += twice * w_n * w_m
+            place += 1
+
+
+@scalar
+def quadratic(p, at, a, b, c, d):  # type: ignore[no-untyped-def]
+    """A quadratic form of four numbers from its ten coefficients."""
+    return (
+        a * (p[at] * a + p[at + 1] * b + p[at + 2] * c + p[at + 3] * d)
+        + b * (p[at + 4] * b + p[at + 5] * c + p[at + 6] * d)
+        + c * (p[at + 7] * c + p[at + 8] * d)
+        + d * d * p[at + 9]
+    )
+
+
+@scalar
+def energy_whole(p, s, which, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
+    """Add the energies of slipping over a whole segment; ``which`` is 2 for the reverse direction + part."""
+    form, at = layout.FORMS + which * layout.FORM, layout.SLIP + which * layout.TRANSITION
+    angle = p[at + layout.A31] * i + p[at + layout.A32] * w + p[at + layout.B3] * u + p[at + layout.C3] * T
+    sum_i = p[form] * i + p[form + 1] * w + p[form + 2] * u + p[form + 3] * T
+    sum_ii, sum_iw = quadratic(p, form + 4, i, w, u, T), quadratic(p, form + 14, i, w, u, T)
+    sum_ww = quadratic(p, form + 24, i, w, u, T)
+    reverse = 1 if which > 1 else 0
+    add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
+
+
+@scalar
+def energy_stick(p, s, t, i, u):  # type: ignore[no-untyped-def]
     """Add the energies of a locked rotor over t: i = i1 + (i0 - i1) exp(-R t/L)."""
     if p[layout.SOURCE] > 0.0 or t <= 0.0:
         return
@@ -61,33 +138,5 @@ def energy_stick(p, t, i, u, out):  # type: ignore[no-untyped-def]
     d = i - final
     one = -math.expm1(-rate * t) / rate
     two = -math.expm1(-2.0 * rate * t) / (2.0 * rate)
-    out[E + layout.ENERGY_INPUT] += u * (final * t + d * one)
-    out[E + layout.ENERGY_COPPER] += R * (final * final * t + 2.0 * final * d * one + d * d * two)
-
-
-@scalar
-def energy_tanh(p, h, i0, w0, i1, w1, u, Tb, f0, f1, angle, out):  # type: ignore[no-untyped-def]
-    """Add the energies of a short step by Simpson's rule with a cubic middle point (fourth order)."""
-    kM, J, kE = p[layout.TORQUE_CONSTANT], p[layout.INERTIA], p[layout.BACK_EMF]
-    R, Kg, Cv = p[layout.RESISTANCE], p[layout.SOURCE_GAIN], p[layout.VISCOUS]
-    a0 = (kM * i0 + Kg * u + Tb + f0 - Cv * w0) / J
-    a1 = (kM * i1 + Kg * u + Tb + f1 - Cv * w1) / J
-    w_m = 0.5 * (w0 + w1) + 0.125 * h * (a0 - a1)
-    x0, x1 = w0 / p[layout.SMOOTHING], w1 / p[layout.SMOOTHING]
-    x_m = w_m / p[layout.SMOOTHING]
-    top = f1 / math.tanh(x1) if x1 != 0.0 else (f0 / math.tanh(x0) if x0 != 0.0 else 0.0)
-    f_m = top * math.tanh(x_m)
-    sixth = h / 6.0
-    out[E + layout.ENERGY_DRY] -= sixth * (f0 * w0 + 4.0 * f_m * w_m + f1 * w1)
-    out[E + layout.ENERGY_VISCOUS] += Cv * sixth * (w0 * w0 + 4.0 * w_m * w_m + w1 * w1)
-    out[E + layout.ENERGY_OFFSET] += p[layout.OFFSET] * angle
-    out[E + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
-    if p[layout.SOURCE] > 0.0:
-        out[E + layout.ENERGY_INPUT] += Kg * u * angle
-        return
-    L = p[layout.INDUCTANCE]
-    d0, d1 = (u - R * i0 - kE * w0) / L, (u - R * i1 - kE * w1) / L
-    i_m = 0.5 * (i0 + i1) + 0.125 * h * (d0 - d1)
-    out[E + layout.ENERGY_INPUT] += u * sixth * (i0 + 4.0 * i_m + i1)
-    out[E + layout.ENERGY_COPPER] += R * sixth * (i0 * i0 + 4.0 * i_m * i_m + i1 * i1)
-    out[E + layout.ENERGY_CONVERSION] += (kE - kM) * sixth * (i0 * w0 + 4.0 * i_m * w_m + i1 * w1)
+    s[LEDGER + layout.ENERGY_INPUT] += u * (final * t + d * one)
+    s[LEDGER + layout.ENERGY_COPPER] += R * (final * final * t + 2.0 * final * d * one + d * d * two)

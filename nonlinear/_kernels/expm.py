@@ -1,90 +1,97 @@
-"""Small matrix exponentials, and the transition of the slipping plant over a given time."""
+"""Small matrix exponentials, and the transition of the slipping plant over a given time.
+
+Matrices lie in a row of work space from a place ``at`` on, row by row: four of up to 7 by 7, `MATRIX` apart.
+"""
 
 from __future__ import annotations
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import scalar
 
-# coefficients of one transition, x+ = A x + b u + c T with x = (i, w, th)
-A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
-TRANSITION = 12
+MATRIX = 49
 TERMS = 19  # Taylor terms at norm 1/2: 0.5**19/19! = 1.6e-23
 
 
 @scalar
-def matmul(a, b, out, n):  # type: ignore[no-untyped-def]
-    """Product of two small square matrices."""
+def matmul(work, a, b, out, n):  # type: ignore[no-untyped-def]
+    """Product of the n by n matrices at ``a`` and ``b``, written at ``out``."""
     for r in range(n):
         for c in range(n):
             total = 0.0
             for j in range(n):
-                total += a[r, j] * b[j, c]
-            out[r, c] = total
+                total += work[a + r * n + j] * work[b + j * n + c]
+            work[out + r * n + c] = total
 
 
 @scalar
-def exponential(a, n, result, term, work):  # type: ignore[no-untyped-def]
-    """exp of the leading n by n part of ``a`` (which is scaled): Taylor series and squaring."""
+def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
+    """How often a matrix is halved until its norm is at most 1/2."""
     norm = 0.0
     for r in range(n):
         total = 0.0
         for c in range(n):
-            total += abs(a[r, c])
+            total += abs(work[at + r * n + c])
         norm = max(norm, total)
     halvings, scale = 0, 1.0
     while norm * scale > 0.5 and halvings < 1000:
         scale *= 0.5
         halvings += 1
-    for r in range(n):
-        for c in range(n):
-            a[r, c] *= scale
-            result[r, c] = term[r, c] = 1.0 if r == c else 0.0
-    for j in range(1, TERMS):
-        matmul(term, a, work, n)
-        for r in range(n):
-            for c in range(n):
-                term[r, c] = work[r, c] / j
-                result[r, c] += term[r, c]
-    for _ in range(halvings):
-        matmul(result, result, work, n)
-        for r in range(n):
-            for c in range(n):
-                result[r, c] = work[r, c]
+    return halvings, scale
 
 
 @scalar
-def plant(p, reverse, dt, a):  # type: ignore[no-untyped-def]
-    """Fill ``a`` with dt times the slipping plant, states (i, w, th, u, T, ...) with held inputs."""
-    for r in range(a.shape[0]):
-        for c in range(a.shape[0]):
-            a[r, c] = 0.0
+def exponential(work, at, n):  # type: ignore[no-untyped-def]
+    """exp of the n by n matrix at ``at`` (which is scaled), by Taylor series and squaring; at ``at + MATRIX``."""
+    result, term, product = at + MATRIX, at + 2 * MATRIX, at + 3 * MATRIX
+    halvings, scale = halvings_of(work, at, n)
+    size = n * n
+    for j in range(size):
+        work[at + j] *= scale
+        work[result + j] = 0.0
+        work[term + j] = 0.0
+    for r in range(n):
+        work[result + r * n + r] = 1.0
+        work[term + r * n + r] = 1.0
+    for j in range(1, TERMS):
+        matmul(work, term, at, product, n)
+        for m in range(size):
+            work[term + m] = work[product + m] / j
+            work[result + m] += work[term + m]
+    for _ in range(halvings):
+        matmul(work, result, result, product, n)
+        for m in range(size):
+            work[result + m] = work[product + m]
+
+
+@scalar
+def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
+    """Write dt times the slipping plant at ``at``, n by n: states (i, w, th, u, T, ...), inputs held."""
+    for j in range(n * n):
+        work[at + j] = 0.0
     J = p[layout.INERTIA]
-    Cv = p[layout.VISCOUS_REVERSE] if reverse else p[layout.VISCOUS]
+    Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
     if p[layout.SOURCE] > 0.0:
-        a[1, 3] = dt * p[layout.SOURCE_GAIN] / J
+        work[at + n + 3] = dt * p[layout.SOURCE_GAIN] / J
     else:
         L = p[layout.INDUCTANCE]
-        a[0, 0] = -dt * p[layout.RESISTANCE] / L
-        a[0, 1] = -dt * p[layout.BACK_EMF] / L
-        a[0, 3] = dt / L
-        a[1, 0] = dt * p[layout.TORQUE_CONSTANT] / J
-    a[1, 1] = -dt * Cv / J
-    a[1, 4] = dt / J
-    a[2, 1] = dt
+        work[at] = -dt * p[layout.RESISTANCE] / L
+        work[at + 1] = -dt * p[layout.BACK_EMF] / L
+        work[at + 3] = dt / L
+        work[at + n] = dt * p[layout.TORQUE_CONSTANT] / J
+    work[at + n + 1] = -dt * Cv / J
+    work[at + n + 4] = dt / J
+    work[at + 2 * n + 1] = dt
 
 
 @scalar
-def transition(p, reverse, dt, space, out, at):  # type: ignore[no-untyped-def]
-    """Write the twelve coefficients of the slipping plant over dt at ``out[at]``.
-
-    ``space`` has shape (4, m, m), m >= 5: room for the calculation.
-    """
-    plant(p, reverse, dt, space[0])
-    e = space[1]
-    exponential(space[0], 5, e, space[2], space[3])
-    out[at + A11], out[at + A12] = e[0, 0], e[0, 1]
-    out[at + A21], out[at + A22] = e[1, 0], e[1, 1]
-    out[at + A31], out[at + A32] = e[2, 0], e[2, 1]
-    for row in range(3):
-        out[at + B1 + row] = e[row, 3]
-        out[at + C1 + row] = e[row, 4]
+def transition(p, reverse, dt, work, at, out):  # type: ignore[no-untyped-def]
+    """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
+    plant(p, reverse, dt, work, at, int(5))
+    exponential(work, at, int(5))
+    e = at + MATRIX
+    p[out + layout.A11], p[out + layout.A12] = work[e], work[e + 1]
+    p[out + layout.A21], p[out + layout.A22] = work[e + 5], work[e + 6]
+    p[out + layout.A31], p[out + layout.A32] = work[e + 10], work[e + 11]
+    for r in range(3):
+        p[out + layout.B1 + r] = work[e + 5 * r + 3]
+        p[out + layout.C1 + r] = work[e + 5 * r + 4]

@@ -1,7 +1,12 @@
-"""Where each number lives: one flat row of floats goes into a run, one flat row comes out.
+"""Where each number lives: flat rows of floats for parameters, state, inputs and outputs, and results.
 
 A row of floats (and not an object) is what lets thousands of different runs be set up by column
-arithmetic: ``rows[:, layout.RESISTANCE] = samples``.  Names are full words, units are SI, motor side.
+arithmetic, what a snapshot of the whole drive is, and what C code takes unchanged.  Names are full words,
+units are SI, motor side.
+
+``p``, the parameters: `SIZE` numbers that describe a run (below), then what `prepare` derives from them.
+``s``, the state of the drive: names that begin with ``S_``; its length is ``p[STATE_SIZE]``.
+``io``, inputs and outputs of one tick: ``IN_`` and ``IO_``.  ``out``, the results of a run: ``OUT_``.
 """
 
 from __future__ import annotations
@@ -20,6 +25,7 @@ from __future__ import annotations
     TORQUE_CONSTANT,  # kM
     INERTIA,  # J
     SOURCE,  # 1: no electrical dynamics
+    ELASTIC_DRIVE,  # 1: coupling or friction map: the plant of the elastic block
     SOURCE_GAIN,  # N m/V
     RATIO,  # N
     LAW,  # 0 coulomb, 1 tanh
@@ -46,9 +52,9 @@ from __future__ import annotations
     ACCELERATION_LIMIT,
     CURRENT_LIMIT,
     VOLTAGE_LIMIT,
-    SPEED_SOURCE,  # 0 ideal, 1 difference
+    SPEED_SOURCE,  # 0 ideal, 1 difference, 2 tracking loop
     DIFFERENCE_SAMPLES,  # m
-    COUNTS_PER_RAD,  # 0: not quantised
+    COUNTS_PER_RAD,  # of the angle that the speed is made of; 0: not quantised
     FILTER_COEFFICIENT,  # T/(TF + T); 1: no filter
     CURRENT_START,
     SPEED_START,
@@ -73,8 +79,50 @@ from __future__ import annotations
     HARMONICS,
     STEP_TARGET,  # output angle, rad; 0: no step figures
     STEP_BAND,
+    HAS_POSITION,
+    POSITION_INTEGRAL,  # Kv Tp/Ti
+    DERIVATIVE,  # Kv Td
+    DERIVATIVE_COEFFICIENT,  # Tp/(TD + Tp)
+    OUTPUT_SENSOR,  # 1: position from the output's sensor
+    POSITION_COUNTS,  # counts per rad of the angle that the position loop reads; 0: not quantised
+    ACCELERATION_FEEDFORWARD,  # k_aff J/(kM Tp^2), of the reference at the motor
+    FRICTION_FEEDFORWARD,  # i_fr
+    PROFILED,  # 1: a profile limits the command
+    PROFILE_RANGE,  # of the command itself; inf: none
+    PROFILE_RATE,  # of its first and second derivative
+    PROFILE_ACCELERATION,
+    PROFILE_SAMPLES,  # samples of the moving average that limits the jerk; 0, 1: none
+    COMMAND_FILTERS,  # number of sections, 0 or 1
+    SPEED_FILTERS,
+    TORQUE_FILTERS,
+    TRACKING_ANGLE,  # 2 w0 T of the tracking loop
+    TRACKING_SPEED,  # w0^2 T
+    VELOCITY_WINDUP,  # 0 conditional, 1 clamped, 2 back-calculation
+    VELOCITY_TRACKING,  # T/Tt
+    CURRENT_WINDUP,
+    CURRENT_TRACKING,
+    BACK_EMF_FEEDFORWARD,  # share times kE
+    RESISTANCE_FEEDFORWARD,  # share times R
+    SUPPLY,  # 1: the supply is modelled
+    SUPPLY_VOLTAGE,
+    SUPPLY_RESISTANCE,
+    REGENERATIVE,
+    CAPACITANCE,
+    BRAKE_VOLTAGE,
+    OVERLOAD,  # 1: the overload protection acts
+    OVERLOAD_RATE,  # Ts/tau
+    OVERLOAD_RELEASE,
+    CONTINUOUS_CURRENT,
+    CURRENT_RESOLUTION,  # A; 0: none
+    CURRENT_NOISE,  # rms
+    ANGLE_NOISE,
+    OUTPUT_NOISE,
+    JITTER,  # s, rms
+    SEED,
+    GRAVITY,  # m g l, N m
+    GRAVITY_ANGLE,  # offset
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(66)
+) = range(109)
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
 SIGNAL_SIZE = 8
@@ -95,7 +143,181 @@ PROBE_SIZE = PROBE_SIGNAL + SIGNAL_SIZE
 POINT_VOLTAGE, POINT_CURRENT, POINT_SPEED, POINT_OUTPUT = range(4)
 POINTS = ("u", "i_ref", "w_ref", "output")
 
-SIZE = PROBES + 4 * PROBE_SIZE
+# --- sections of second order: b0, b1, b2, a1, a2 (direct form II transposed, a0 = 1) -----------------
+SECTION = 5
+MAX_SECTIONS = 8  # in one chain
+COMMAND_CHAIN = PROBES + 4 * PROBE_SIZE
+SPEED_CHAIN = COMMAND_CHAIN + SECTION
+TORQUE_CHAIN = SPEED_CHAIN + MAX_SECTIONS * SECTION
+
+SIZE = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # what describes a run; what follows is derived from it
+
+# --- derived: one transition x+ = A x + b u + c T with x = (i, w, th), and one direction of slip ----------
+A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
+TRANSITION = 12
+KIND, CLOSE, MEAN, ROOT, M11, M12, M21, M22 = range(8)
+MODAL = 8
+
+SLIP = SIZE  # four transitions: direction (forward, reverse), segment
+MODES = SLIP + 4 * TRANSITION  # two directions
+DECAY = MODES + 2 * MODAL  # of the locked current, two segments
+LENGTH = DECAY + 2  # of the two segments, s
+(
+    RELAX,  # R/L
+    LOCKED_GAIN,  # 1/R; 0 for a torque source
+    SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
+    LOOK,  # 1: no short way over a segment: energies, tanh law, elastic, or w' may turn twice within
+    SPLIT,  # 1: the computing delay has a fraction of a tick
+    RARE_LOAD,  # 1: the load changes from tick to tick
+    RARE_SENSE,  # 1: instruments or the supply are modelled
+    RARE_COMMAND,  # 1: the outermost stage is more than the P loop of position
+    RARE_SPEED,  # 1: the measured speed is not w itself
+    RARE_VELOCITY,  # 1: the velocity controller is more than a PI with conditional integration
+    RARE_CURRENT,
+    PROBING,  # 1: there is a probe
+    NOTING,  # 1: more than the usual outputs are to be noted
+    OUTER_EVERY,  # ticks between updates of the outermost stage
+    SPEED_STEP,  # change of the speed command allowed in one update
+    POSITION_PERIOD,
+    VELOCITY_PERIOD,
+    DELAY_LINE,  # q + 2 values
+    AT_ANGLES,  # place in the state of the last m angles
+    AT_AVERAGE,  # of the profile's moving average
+    AT_PROBES,  # of the probes' rings
+    PROBE_RING,  # length of one ring
+    AT_WORK,  # of the work space
+    STATE_SIZE,
+) = range(LENGTH + 2, LENGTH + 26)
+
+# integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
+FORM = 34
+FORMS = LENGTH + 26  # four: direction, segment
+P_SIZE = FORMS + 4 * FORM
+
+# --- behind that, either the block of an elastic drive train, as long as it needs ---------------------
+ELASTIC = P_SIZE
+# --- or the tanh law's coefficients: two segments, LEVELS step lengths, LEVEL numbers each -------------
+TANH = P_SIZE
+LEVELS = 16
+# one level: transition over h/2 (12), over h (12), phi1 at h/2 (3), weights of N(u), N(a)+N(b), N(c) (9)
+LEVEL = 2 * TRANSITION + 12
+TANH_SIZE = 2 * LEVELS * LEVEL
+# and with energies: integrals over one step as forms of (i, w, u, T, n0, nm, nc), n0, nm, nc the friction
+# torque at its beginning, middle and end: i (7), i^2, i w and w^2 (28 each), n w (28)
+TANH_FORM = 119
+TANH_FORMS = TANH + TANH_SIZE
+TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
+
+# --- the state of the drive -------------------------------------------------------------------------
+(
+    S_TICK,
+    S_STATUS,
+    S_CURRENT,
+    S_SPEED,
+    S_ANGLE,
+    S_DIRECTION,  # 1, -1 slipping, 0 at rest
+    S_OUTPUT,  # output angle where the drive train is elastic
+    S_OUTPUT_SPEED,
+    S_HELD,  # voltage that acted last
+    S_LOAD,  # hinge moment of this tick
+    S_DRY,  # dry friction of this tick, forward
+    S_DRY_REVERSE,
+    S_TORQUE,  # torque beside motor and dry friction
+    S_UNTIL_OUTER,  # ticks until the outermost stage is updated
+    S_UNTIL_VELOCITY,
+    S_CURRENT_INTEGRATOR,
+    S_VELOCITY_INTEGRATOR,
+    S_POSITION_INTEGRATOR,
+    S_SPEED_COMMAND,  # after both limits
+    S_SPEED_REFERENCE,  # w_ref: the same, behind its probe
+    S_CURRENT_BEFORE,
+    S_CURRENT_REFERENCE,
+    S_VOLTAGE_BEFORE,
+    S_VOLTAGE,
+    S_OUTPUT_BEFORE,
+    S_OUTPUT_AFTER,
+    S_MEASURED_SPEED,
+    S_FILTERED_SPEED,  # before the speed filters
+    S_TRACKED_ANGLE,
+    S_TRACKED_SPEED,
+    S_FLAGS_OUTER,  # limiters that acted at the last update of each stage
+    S_FLAGS_PROFILE,
+    S_FLAGS_VELOCITY,
+    S_FLAGS_CURRENT,
+    S_REFERENCE,  # shaped command of the last update, motor side, and the one before
+    S_REFERENCE_BEFORE,
+    S_ERROR,
+    S_ERROR_RATE,
+    S_TORQUE_FEEDFORWARD,  # i_ff, held
+    S_PROFILE,  # position of the profile, its speed, and the command of the last update
+    S_PROFILE_SPEED,
+    S_PROFILE_COMMAND,
+    S_AVERAGE_PLACE,
+    S_AVERAGE_SUM,
+    S_CURRENT_LIMIT,  # of this tick
+    S_VOLTAGE_LIMIT,
+    S_OVERLOAD,
+    S_OVERLOADED,
+    S_EVENTS,  # in all
+    S_MAX_EVENTS,  # most in one tick
+) = range(50)
+S_NOISE = S_MAX_EVENTS + 1  # four random streams of two numbers: current, angle, output angle, jitter
+NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)
+S_ENERGY = S_NOISE + 8
+(
+    ENERGY_INPUT,  # integral of u i
+    ENERGY_COPPER,  # integral of R i^2
+    ENERGY_DRY,  # dry friction
+    ENERGY_VISCOUS,
+    ENERGY_OFFSET,  # constant offset torque
+    ENERGY_LOAD,  # work done on the load (back-drivable) and against the extra torque
+    ENERGY_CONVERSION,  # (kE - kM) i w
+    ENERGY_SUPPLY,  # drawn from the source behind the supply's resistance
+    ENERGY_SUPPLY_LOSS,  # in that resistance
+    ENERGY_BRAKE,  # in the brake
+    ENERGY_CAPACITOR,  # taken up by the bus
+) = range(11)
+ENERGY_SIZE = 11
+S_COMMAND_CHAIN = S_ENERGY + ENERGY_SIZE
+S_SPEED_CHAIN = S_COMMAND_CHAIN + 2
+S_TORQUE_CHAIN = S_SPEED_CHAIN + 2 * MAX_SECTIONS
+S_PROBE_PLACES = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
+ELASTIC_STATE = S_PROBE_PLACES + 4
+ELASTIC_STATE_SIZE = 1
+S_QUEUE = ELASTIC_STATE + ELASTIC_STATE_SIZE  # the delay line, oldest first; then angles, average, rings
+WORK_SIZE = 4 * 49 + 24  # four matrices of 7 by 7, and what is made of them
+WORK_MORE = 4 * 49
+
+# --- inputs of a block of ticks, worked out ahead: commands, loads, torques, injected signals ------------
+BLOCK = 256
+BLOCK_LOAD, BLOCK_TORQUE, BLOCK_PROBES = BLOCK, 2 * BLOCK, 3 * BLOCK
+BLOCK_SIZE = 7 * BLOCK
+
+# --- inputs and outputs of one tick -------------------------------------------------------------------
+(
+    IN_COMMAND,  # of the outermost stage; output shaft
+    IN_LOAD,  # hinge moment beside constant, slope and gravity
+    IN_TORQUE,  # extra torque at the motor shaft
+    IN_CURRENT,  # measured: what the controller sees
+    IN_SPEED,
+    IN_ANGLE,
+    IN_OUTPUT,  # output angle, or motor angle over N
+    IN_BUS,  # voltage that the controller has
+    IN_PROBE,  # four injected signals
+) = range(9)
+(
+    IO_REFERENCE,  # from here on in the order of SIGNALS: what was at t_k
+    IO_OUTPUT,
+    IO_SPEED,
+    IO_CURRENT,
+    IO_VOLTAGE,
+    IO_CURRENT_COMMAND,
+    IO_SPEED_COMMAND,
+    IO_PROBES,  # before and after each probe
+) = range(IN_PROBE + 4, IN_PROBE + 12)
+IO_ANGLE = IO_PROBES + 8
+IO_FLAGS = IO_ANGLE + 1
+IO_SIZE = IO_FLAGS + 1
 
 # --- signals that are recorded and reduced, in this order ------------------------------------------
 SIGNALS = (
@@ -121,10 +343,13 @@ ALL_SIGNALS = 15
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 
-# --- limiters --------------------------------------------------------------------------------------
-LIMITERS = ("speed", "acceleration", "current", "voltage")
+# --- limiters: name, and its bit in the flags ---------------------------------------------------------
+LIMITERS = ("speed", "acceleration", "current", "voltage", "torque-command", "overload", "profile")
 FLAG_SPEED, FLAG_ACCELERATION, FLAG_CURRENT, FLAG_VOLTAGE = 1, 2, 4, 8
 FLAG_STICK = 16
+FLAG_TORQUE_COMMAND, FLAG_OVERLOAD, FLAG_PROFILE = 32, 64, 128
+LIMITER_BITS = (1, 2, 4, 8, 32, 64, 128)
+LIMITER_COUNT = 7
 
 # --- results of one run ----------------------------------------------------------------------------
 (
@@ -140,20 +365,10 @@ FLAG_STICK = 16
     OUT_SPEED_COMMAND,
     OUT_CURRENT_COMMAND,
     OUT_VOLTAGE,
-    OUT_LIMIT_TICKS,  # 4: ticks active
+    OUT_LIMIT_TICKS,  # of each limiter: ticks active
 ) = range(13)
-OUT_LIMIT_FIRST = OUT_LIMIT_TICKS + 4  # 4: first tick, -1 if never
-OUT_ENERGY = OUT_LIMIT_FIRST + 4
-(
-    ENERGY_INPUT,  # integral of u i
-    ENERGY_COPPER,  # integral of R i^2
-    ENERGY_DRY,  # dry friction
-    ENERGY_VISCOUS,
-    ENERGY_OFFSET,  # constant offset torque
-    ENERGY_LOAD,  # work done on the load (back-drivable) and against the extra torque
-    ENERGY_CONVERSION,  # (kE - kM) i w
-) = range(7)
-ENERGY_SIZE = 7
+OUT_LIMIT_FIRST = OUT_LIMIT_TICKS + LIMITER_COUNT  # first tick, -1 if never
+OUT_ENERGY = OUT_LIMIT_FIRST + LIMITER_COUNT
 OUT_STEP = OUT_ENERGY + ENERGY_SIZE
 STEP_T10, STEP_T90, STEP_PEAK, STEP_SETTLED, STEP_LAST = range(5)
 STEP_SIZE = 5
@@ -166,8 +381,10 @@ WINDOW_SIGNAL = WINDOW_BASE + 2 * MAX_HARMONICS
 WINDOWS = 2  # 0: the last window, 1: the one before
 # what happened in the last window: ticks each limiter was active, ticks that began at rest
 OUT_WINDOW_LIMITS = OUT_WINDOWS + WINDOWS * ALL_SIGNALS * WINDOW_SIGNAL
-OUT_WINDOW_STICK = OUT_WINDOW_LIMITS + 4
-OUT_SIZE = OUT_WINDOW_STICK + 1
+OUT_WINDOW_STICK = OUT_WINDOW_LIMITS + LIMITER_COUNT
+OUT_PHASOR = OUT_WINDOW_STICK + 1  # of the window's fundamental: now, and its turn in a tick
+OUT_STEP_BEFORE = OUT_PHASOR + 4  # normalised output of the tick before
+OUT_SIZE = OUT_STEP_BEFORE + 1
 
 # --- status ----------------------------------------------------------------------------------------
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)

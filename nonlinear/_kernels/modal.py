@@ -10,34 +10,31 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel, scalar
-from nonlinear._kernels.expm import exponential, plant
+from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.expm import MATRIX, exponential, plant
 
 REAL, COMPLEX, SINGLE = range(3)
-# numbers that describe one direction of slip
-KIND, CLOSE, MEAN, ROOT, M11, M12, M21, M22, MODAL = range(9)
 NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
 
 
 @scalar
-def describe(p, reverse, out, at):  # type: ignore[no-untyped-def]
-    """Write kind, mean and half difference of the eigenvalues and A at ``out[at]``."""
+def describe(p, reverse, at):  # type: ignore[no-untyped-def]
+    """Write kind, mean and half difference of the eigenvalues and A at ``p[at]``."""
     J, L = p[layout.INERTIA], p[layout.INDUCTANCE]
     source = p[layout.SOURCE] > 0.0
-    a11, a12 = (0.0, 0.0) if source else (-p[layout.RESISTANCE] / L, -p[layout.BACK_EMF] / L)
+    a11 = 0.0 if source else -p[layout.RESISTANCE] / L
+    a12 = 0.0 if source else -p[layout.BACK_EMF] / L
     a21 = 0.0 if source else p[layout.TORQUE_CONSTANT] / J
-    a22 = -(p[layout.VISCOUS_REVERSE] if reverse else p[layout.VISCOUS]) / J
+    a22 = -(p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]) / J
     mean, half = 0.5 * (a11 + a22), 0.5 * (a11 - a22)
     d = half * half + a12 * a21
     root = math.sqrt(abs(d))
-    out[at + KIND] = SINGLE if source else (COMPLEX if d < 0.0 else REAL)
-    out[at + CLOSE] = 1.0 if root < NEARLY_DOUBLE * abs(mean) else 0.0
-    out[at + MEAN], out[at + ROOT] = mean, root
-    out[at + M11], out[at + M12] = a11, a12
-    out[at + M21], out[at + M22] = a21, a22
+    p[at + layout.KIND] = float(SINGLE) if source else (float(COMPLEX) if d < 0.0 else float(REAL))
+    p[at + layout.CLOSE] = 1.0 if root < NEARLY_DOUBLE * abs(mean) else 0.0
+    p[at + layout.MEAN], p[at + layout.ROOT] = mean, root
+    p[at + layout.M11], p[at + layout.M12] = a11, a12
+    p[at + layout.M21], p[at + layout.M22] = a21, a22
 
 
 @scalar
@@ -85,60 +82,60 @@ def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
     return t * er, t * ei / s, t * t * fr, t * t * fi / s
 
 
-@kernel
-def slip_close(p, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+@scalar
+def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """The same for nearly double eigenvalues."""
-    space = np.empty((4, 5, 5))
-    e = space[1]
-    plant(p, reverse, t, space[0])
-    exponential(space[0], 5, e, space[2], space[3])
+    at = int(p[layout.AT_WORK])
+    plant(p, reverse, t, s, at, int(5))
+    exponential(s, at, int(5))
+    e = at + MATRIX
     return (
-        e[0, 0] * i + e[0, 1] * w + e[0, 3] * u + e[0, 4] * T,
-        e[1, 0] * i + e[1, 1] * w + e[1, 3] * u + e[1, 4] * T,
-        th + e[2, 0] * i + e[2, 1] * w + e[2, 3] * u + e[2, 4] * T,
+        s[e] * i + s[e + 1] * w + s[e + 3] * u + s[e + 4] * T,
+        s[e + 5] * i + s[e + 6] * w + s[e + 8] * u + s[e + 9] * T,
+        th + s[e + 10] * i + s[e + 11] * w + s[e + 13] * u + s[e + 14] * T,
     )
 
 
 @scalar
-def slip_at(p, modal, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+def slip_at(p, s, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
-    kind = int(modal[at + KIND])
+    kind = int(p[at + layout.KIND])
     if kind == SINGLE:
-        rate = modal[at + M22]
+        rate = p[at + layout.M22]
         dw = rate * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
         first, second = phi12(rate * t)
         return 0.0, w + t * first * dw, th + t * (w + t * second * dw)
-    if modal[at + CLOSE] > 0.0:
-        return slip_close(p, reverse, t, i, w, th, u, T)
-    di, dw = derivative(p, modal, at, i, w, u, T)
-    m = modal[at + MEAN]
-    a, b, a2, b2 = integrals(kind, m, modal[at + ROOT], t)
-    qi = (modal[at + M11] - m) * di + modal[at + M12] * dw
-    qw = modal[at + M21] * di + (modal[at + M22] - m) * dw
+    if p[at + layout.CLOSE] > 0.0:
+        return slip_close(p, s, reverse, t, i, w, th, u, T)
+    di, dw = derivative(p, at, i, w, u, T)
+    m = p[at + layout.MEAN]
+    a, b, a2, b2 = integrals(kind, m, p[at + layout.ROOT], t)
+    qi = (p[at + layout.M11] - m) * di + p[at + layout.M12] * dw
+    qw = p[at + layout.M21] * di + (p[at + layout.M22] - m) * dw
     return i + a * di + b * qi, w + a * dw + b * qw, th + w * t + a2 * dw + b2 * qw
 
 
 @scalar
-def derivative(p, modal, at, i, w, u, T):  # type: ignore[no-untyped-def]
+def derivative(p, at, i, w, u, T):  # type: ignore[no-untyped-def]
     """(i', w') while slipping."""
-    if int(modal[at + KIND]) == SINGLE:
-        return 0.0, modal[at + M22] * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
-    di = modal[at + M11] * i + modal[at + M12] * w + u / p[layout.INDUCTANCE]
-    dw = modal[at + M21] * i + modal[at + M22] * w + T / p[layout.INERTIA]
+    if int(p[at + layout.KIND]) == SINGLE:
+        return 0.0, p[at + layout.M22] * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
+    di = p[at + layout.M11] * i + p[at + layout.M12] * w + u / p[layout.INDUCTANCE]
+    dw = p[at + layout.M21] * i + p[at + layout.M22] * w + T / p[layout.INERTIA]
     return di, dw
 
 
 @scalar
-def first_extremum(p, modal, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
+def first_extremum(p, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
     """First time later than ``after`` at which w' = 0; inf if there is none."""
-    kind = int(modal[at + KIND])
+    kind = int(p[at + layout.KIND])
     if kind == SINGLE:
-        return np.inf
-    di, dw = derivative(p, modal, at, i, w, u, T)
-    m, s = modal[at + MEAN], modal[at + ROOT]
-    q = modal[at + M21] * di + (modal[at + M22] - m) * dw
+        return math.inf
+    di, dw = derivative(p, at, i, w, u, T)
+    m, s = p[at + layout.MEAN], p[at + layout.ROOT]
+    q = p[at + layout.M21] * di + (p[at + layout.M22] - m) * dw
     if q == 0.0 and (dw == 0.0 or kind == REAL):
-        return np.inf
+        return math.inf
     if kind == COMPLEX:  # dw cos(s t) + q sin(s t)/s = 0
         step = math.pi / s
         t = math.atan2(-s * dw, q) / s
@@ -146,5 +143,5 @@ def first_extremum(p, modal, at, i, w, u, T, after):  # type: ignore[no-untyped-
     ratio = -dw / q  # tanh(s t)/s
     t = ratio
     if s > 0.0:
-        t = math.atanh(s * ratio) / s if abs(s * ratio) < 1.0 else np.inf
-    return t if t > after else np.inf
+        t = math.atanh(s * ratio) / s if abs(s * ratio) < 1.0 else math.inf
+    return t if t > after else math.inf

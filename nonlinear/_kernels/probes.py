@@ -3,38 +3,43 @@
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, kernel
-from nonlinear._kernels.signals import signal
+from nonlinear._kernels.compiled import scalar
+
+PROBE_U = layout.PROBES + layout.POINT_VOLTAGE * layout.PROBE_SIZE
+PROBE_I = layout.PROBES + layout.POINT_CURRENT * layout.PROBE_SIZE
+PROBE_W = layout.PROBES + layout.POINT_SPEED * layout.PROBE_SIZE
+PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 
 
-@inlined
-def probe(row, point, tables, k, period, value, memory, position):  # type: ignore[no-untyped-def]
+@scalar
+def probe(p, s, io, point, value):  # type: ignore[no-untyped-def]
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 
-    ``memory[point]`` is a ring of past values, ``position[point]`` its next place.
+    The past values lie in a ring of the state, one for each point.
     """
     at = layout.PROBES + point * layout.PROBE_SIZE
-    taps = int(row[at + layout.PROBE_TAPS])
+    taps = int(p[at + layout.PROBE_TAPS])
     passed = value
     if taps > 0:
-        size = memory.shape[1]
-        place = position[point]
-        memory[point, place] = value
-        position[point] = place + 1 if place + 1 < size else 0
-        read = place - int(row[at + layout.PROBE_DELAY])
+        size = int(p[layout.PROBE_RING])
+        ring = int(p[layout.AT_PROBES]) + point * size
+        place = int(s[layout.S_PROBE_PLACES + point])
+        s[ring + place] = value
+        s[layout.S_PROBE_PLACES + point] = float(place + 1 if place + 1 < size else 0)
+        read = place - int(p[at + layout.PROBE_DELAY])
         if read < 0:
             read += size
         passed = 0.0
         for j in range(taps):
-            passed += row[at + layout.PROBE_TAP + j] * memory[point, read]
+            passed += p[at + layout.PROBE_TAP + j] * s[ring + read]
             read = read - 1 if read > 0 else size - 1
-    return row[at + layout.PROBE_GAIN] * passed + signal(row, at + layout.PROBE_SIGNAL, tables, k, period)
+    return p[at + layout.PROBE_GAIN] * passed + io[layout.IN_PROBE + point]
 
 
-@kernel
-def memory_size(row):  # type: ignore[no-untyped-def]
-    """Length of the ring that the longest delay needs."""
-    longest = 0
-    for point in range(4):
-        longest = max(longest, int(row[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_DELAY]))
-    return longest + layout.MAX_TAPS + 1
+@scalar
+def fill_ring(p, s, point, value):  # type: ignore[no-untyped-def]
+    """Take every past value at a point as ``value``."""
+    size = int(p[layout.PROBE_RING])
+    ring = int(p[layout.AT_PROBES]) + point * size
+    for j in range(size):
+        s[ring + j] = value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar
 
 TWO_PI = 2.0 * math.pi
 NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
@@ -60,8 +60,52 @@ def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
 
+@entry
+def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignore[no-untyped-def]
+    """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
+    times = int((count + stride - 1) / stride)
+    if int(row[at]) == SINE:
+        amplitude, turn, phase = row[at + 1], TWO_PI * row[at + 3], row[at + 4]
+        for n in range(times):
+            t = (first + n * stride) * period - row[at + 2]
+            out[to + n * stride] = 0.0 if t < -1e-9 * period else amplitude * math.sin(turn * t + phase)
+        return
+    for n in range(times):
+        out[to + n * stride] = signal(row, at, tables, first + n * stride, period)
+
+
 @scalar
-def fill(row, at, tables, period, out):  # type: ignore[no-untyped-def]
-    """Sample a signal at every tick."""
-    for k in range(out.shape[0]):
-        out[k] = signal(row, at, tables, k, period)
+def add_table(tables, start, length, first, count, out, to):  # type: ignore[no-untyped-def]
+    """Write a table of one value a tick, its last value held, into ``out[to]`` and behind."""
+    for n in range(count):
+        out[to + n] = tables[start + min(first + n, length - 1)]
+
+
+@scalar
+def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyped-def]
+    """Work out all inputs of ``count`` ticks from tick ``first`` on; commands only every ``stride`` ticks."""
+    period = p[layout.PERIOD]
+    start = stride * int((first + stride - 1) / stride) - first
+    fill(p, layout.COMMAND, tables, first + start, count - start, stride, period, block, start)
+    if p[layout.BIAS] > 0.0:
+        for j in range(count):
+            block[j] += signal(p, layout.BIAS, tables, first + j, period)
+    for point in range(4):
+        at = layout.PROBES + point * layout.PROBE_SIZE
+        if p[at] > 0.0:
+            to = layout.BLOCK_PROBES + point * layout.BLOCK
+            fill(p, at + layout.PROBE_SIGNAL, tables, first, count, int(1), period, block, to)
+    length = int(p[layout.LOAD_TABLE_LENGTH])
+    if length > 0:
+        add_table(tables, int(p[layout.LOAD_TABLE]), length, first, count, block, layout.BLOCK_LOAD)
+    length = int(p[layout.TORQUE_TABLE_LENGTH])
+    if length > 0:
+        add_table(tables, int(p[layout.TORQUE_TABLE]), length, first, count, block, layout.BLOCK_TORQUE)
+
+
+@scalar
+def feed(block, j, io):  # type: ignore[no-untyped-def]
+    """Hand the inputs beside the command of the j-th tick of a block to the drive."""
+    io[layout.IN_LOAD], io[layout.IN_TORQUE] = block[layout.BLOCK_LOAD + j], block[layout.BLOCK_TORQUE + j]
+    for point in range(4):
+        io[layout.IN_PROBE + point] = block[layout.BLOCK_PROBES + point * layout.BLOCK + j]

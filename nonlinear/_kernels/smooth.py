@@ -6,67 +6,147 @@ rate h <= STEP_FACTOR tolerance^(1/4), where ``rate`` is the relaxation rate Tc/
 rate |w'|/w_s at which the tanh is run through, so that the tolerance bounds the error of the speed
 that a tick adds, in smoothing speeds; steps are a segment divided by a power of two.  Beyond
 SATURATED smoothing speeds tanh is 1 to the last bit but one and a whole segment is exact.
+
+Such a step is exactly the motion of the linear plant under a friction torque that is quadratic in time, through
+N(u) at its beginning, (N(a) + N(b))/2 in its middle and N(c) at its end.  The energies are those of that motion,
+so they balance to rounding whatever the step.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import kernel, scalar
-from nonlinear._kernels.energy import energy_tanh
-from nonlinear._kernels.expm import TRANSITION, exponential, plant, transition
-from nonlinear._kernels.segment import LENGTH, slip_step
+from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
+from nonlinear._kernels.expm import MATRIX, exponential, plant, transition
+from nonlinear._kernels.segment import slip_step
 
-LEVELS = 16
 SATURATED = 19.0
 STEP_FACTOR = 4.0  # leaves about a factor of twenty to the error seen
-# one level: transition over h/2 (12), over h (12), phi1 at h/2 (3), weights of N(u), N(a)+N(b), N(c) (9)
-HALF, FULL = 0, TRANSITION
-STAGE = 2 * TRANSITION
-W1, W2, W3 = STAGE + 3, STAGE + 6, STAGE + 9
-LEVEL = STAGE + 12
+HALF, FULL = 0, layout.TRANSITION
+STAGE = 2 * layout.TRANSITION
+WEIGHT_1, WEIGHT_2, WEIGHT_3 = STAGE + 3, STAGE + 6, STAGE + 9
+FORM_II, FORM_IW, FORM_WW, FORM_NW = 7, 35, 63, 91  # after the seven of i
 
 
 @scalar
-def phi_columns(p, h, space):  # type: ignore[no-untyped-def]
-    """exp of the plant over h; columns 4, 5, 6 are h phi1, h phi2, h phi3 applied to a unit torque."""
-    a, e = space[0], space[1]
-    plant(p, False, h, a)
-    # the torque input is fed by a chain of integrators over the step: column 5 drives 4, column 6 drives 5
-    a[4, 5] = 1.0
-    a[5, 6] = 1.0
-    exponential(a, 7, e, space[2], space[3])
+def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
+    """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque.
+
+    Column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2.
+    """
+    plant(p, int(0), t, work, at, int(7))
+    work[at + 4 * 7 + 5] = t / h
+    work[at + 5 * 7 + 6] = t / h
+    exponential(work, at, int(7))
 
 
-@kernel
-def prepare_tanh(p, constants, table):  # type: ignore[no-untyped-def]
+@scalar
+def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
     """Fill the coefficients of every level for both segments."""
-    space = np.empty((4, 7, 7))
     for part in range(2):
-        for level in range(LEVELS):
-            h = constants[LENGTH + part] / 2.0**level
+        h = p[layout.LENGTH + part]
+        for level in range(layout.LEVELS):
             if h > 0.0:
-                prepare_level(p, h, space, table, (part * LEVELS + level) * LEVEL)
+                which = part * layout.LEVELS + level
+                prepare_level(p, h, s, layout.TANH + which * layout.LEVEL)
+                if p[layout.WITH_ENERGY] > 0.0:
+                    prepare_level_forms(p, h, s, layout.TANH_FORMS + which * layout.TANH_FORM)
+            h *= 0.5
 
 
 @scalar
-def prepare_level(p, h, space, table, o):  # type: ignore[no-untyped-def]
-    """Fill the coefficients of one step length at ``table[o]``."""
-    transition(p, False, 0.5 * h, space, table, o + HALF)
-    transition(p, False, h, space, table, o + FULL)
-    phi_columns(p, 0.5 * h, space)
-    e = space[1]
+def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
+    """Fill the coefficients of one step length at ``p[o]``."""
+    at = int(p[layout.AT_WORK])
+    transition(p, int(0), 0.5 * h, s, at, o + HALF)
+    transition(p, int(0), h, s, at, o + FULL)
+    e = at + MATRIX
+    phi_columns(p, 0.5 * h, 0.5 * h, s, at)
     for r in range(3):
-        table[o + STAGE + r] = e[r, 4]
-    phi_columns(p, h, space)
+        p[o + STAGE + r] = s[e + 7 * r + 4]
+    phi_columns(p, h, h, s, at)
     for r in range(3):
-        first, second, third = e[r, 4], e[r, 5], e[r, 6]
-        table[o + W1 + r] = first - 3.0 * second + 4.0 * third
-        table[o + W2 + r] = 2.0 * second - 4.0 * third
-        table[o + W3 + r] = 4.0 * third - second
+        first, second, third = s[e + 7 * r + 4], s[e + 7 * r + 5], s[e + 7 * r + 6]
+        p[o + WEIGHT_1 + r] = first - 3.0 * second + 4.0 * third
+        p[o + WEIGHT_2 + r] = 2.0 * second - 4.0 * third
+        p[o + WEIGHT_3 + r] = 4.0 * third - second
+
+
+@scalar
+def prepare_level_forms(p, h, s, form):  # type: ignore[no-untyped-def]
+    """Write the integrals over one step as forms of (i, w, u, T, n0, nm, nc)."""
+    for j in range(layout.TANH_FORM):
+        p[form + j] = 0.0
+    pieces = pieces_of(p, layout.MODES, h)
+    length = h / pieces
+    for piece in range(pieces):
+        for j in range(10):
+            add_tanh_node(p, s, (piece + NODES[j]) * length, h, length * WEIGHTS[j], form)
+
+
+@scalar
+def add_tanh_node(p, s, t, h, weight, form):  # type: ignore[no-untyped-def]
+    """Add one node of the quadrature to the forms of a step."""
+    at = int(p[layout.AT_WORK])
+    phi_columns(p, t, h, s, at)
+    # i, w and n at t by each of the seven numbers: three rows of seven
+    e, rows = at + MATRIX, at + layout.WORK_MORE
+    for r in range(2):
+        row = e + 7 * r
+        first, second, third = s[row + 4], s[row + 5], s[row + 6]
+        s[rows + 7 * r], s[rows + 7 * r + 1] = s[row], s[row + 1]
+        s[rows + 7 * r + 2], s[rows + 7 * r + 3] = s[row + 3], first
+        s[rows + 7 * r + 4] = first - 3.0 * second + 4.0 * third
+        s[rows + 7 * r + 5] = 4.0 * second - 8.0 * third
+        s[rows + 7 * r + 6] = 4.0 * third - second
+    x = t / h
+    for j in range(4):
+        s[rows + 14 + j] = 0.0
+    s[rows + 18] = 1.0 - 3.0 * x + 2.0 * x * x
+    s[rows + 19] = 4.0 * x - 4.0 * x * x
+    s[rows + 20] = 2.0 * x * x - x
+    place = form + 7
+    for a in range(7):
+        i_a, w_a, n_a = s[rows + a], s[rows + 7 + a], s[rows + 14 + a]
+        p[form + a] += weight * i_a
+        for b in range(a, 7):
+            i_b, w_b, n_b = s[rows + b], s[rows + 7 + b], s[rows + 14 + b]
+            half = 0.5 * weight if a == b else weight
+            p[place] += half * (i_a * i_b + i_a * i_b)
+            p[place + 28] += half * (i_a * w_b + w_a * i_b)
+            p[place + 56] += half * (w_a * w_b + w_a * w_b)
+            p[place + 84] += half * (n_a * w_b + w_a * n_b)
+            place += 1
+
+
+@scalar
+def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
+    """A quadratic form of seven numbers from its 28 coefficients."""
+    return (
+        a * (p[at] * a + p[at + 1] * b + p[at + 2] * c + p[at + 3] * d
+             + p[at + 4] * e + p[at + 5] * f + p[at + 6] * g)
+        + b * (p[at + 7] * b + p[at + 8] * c + p[at + 9] * d + p[at + 10] * e + p[at + 11] * f + p[at + 12] * g)
+        + c * (p[at + 13] * c + p[at + 14] * d + p[at + 15] * e + p[at + 16] * f + p[at + 17] * g)
+        + d * (p[at + 18] * d + p[at + 19] * e + p[at + 20] * f + p[at + 21] * g)
+        + e * (p[at + 22] * e + p[at + 23] * f + p[at + 24] * g)
+        + f * (p[at + 25] * f + p[at + 26] * g)
+        + g * g * p[at + 27]
+    )  # fmt: skip
+
+
+@scalar
+def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-untyped-def]
+    """Add the energies of one step under the friction torque (n0, nm, nc); ``angle`` is what it turned."""
+    sum_i = p[form] * i + p[form + 1] * w + p[form + 2] * u + p[form + 3] * Tb
+    sum_i += p[form + 4] * n0 + p[form + 5] * nm + p[form + 6] * nc
+    sum_ii = form_of_seven(p, form + FORM_II, i, w, u, Tb, n0, nm, nc)
+    sum_iw = form_of_seven(p, form + FORM_IW, i, w, u, Tb, n0, nm, nc)
+    sum_ww = form_of_seven(p, form + FORM_WW, i, w, u, Tb, n0, nm, nc)
+    sum_nw = form_of_seven(p, form + FORM_NW, i, w, u, Tb, n0, nm, nc)
+    add_slip(p, s, int(0), u, Tb, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
+    s[layout.S_ENERGY + layout.ENERGY_DRY] -= sum_nw
 
 
 @scalar
@@ -95,64 +175,84 @@ def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
         rate += jump * share / (J * ws)
     wanted = rate * h / (STEP_FACTOR * math.sqrt(math.sqrt(p[layout.TANH_TOLERANCE])))
     level = 0
-    while wanted > 1.0 and level < LEVELS - 1:
+    while wanted > 1.0 and level < layout.LEVELS - 1:
         wanted *= 0.5
         level += 1
     return level
 
 
 @scalar
-def etd_step(p, table, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
-    """One ETD4RK step."""
+def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
+    """One ETD4RK step: state after it, and the friction torque at its beginning, middle and end."""
     n0 = tanh_torque(p, w, Tcp, Tcm)
-    ih, wh, thh = slip_step(table, o + HALF, i, w, th, u, Tb)
-    ia, wa, tha = ih + table[o + STAGE] * n0, wh + table[o + STAGE + 1] * n0, thh + table[o + STAGE + 2] * n0
+    ih, wh, thh = slip_step(p, o + HALF, i, w, th, u, Tb)
+    ia, wa, tha = ih + p[o + STAGE] * n0, wh + p[o + STAGE + 1] * n0, thh + p[o + STAGE + 2] * n0
     na = tanh_torque(p, wa, Tcp, Tcm)
-    nb = tanh_torque(p, wh + table[o + STAGE + 1] * na, Tcp, Tcm)
-    _, wc, _ = slip_step(table, o + HALF, ia, wa, tha, u, Tb)
-    nc = tanh_torque(p, wc + table[o + STAGE + 1] * (2.0 * nb - n0), Tcp, Tcm)
-    i, w, th = slip_step(table, o + FULL, i, w, th, u, Tb)
+    nb = tanh_torque(p, wh + p[o + STAGE + 1] * na, Tcp, Tcm)
+    _i, wc, _th = slip_step(p, o + HALF, ia, wa, tha, u, Tb)
+    nc = tanh_torque(p, wc + p[o + STAGE + 1] * (2.0 * nb - n0), Tcp, Tcm)
+    i1, w1, th1 = slip_step(p, o + FULL, i, w, th, u, Tb)
     nab = na + nb
     return (
-        i + table[o + W1] * n0 + table[o + W2] * nab + table[o + W3] * nc,
-        w + table[o + W1 + 1] * n0 + table[o + W2 + 1] * nab + table[o + W3 + 1] * nc,
-        th + table[o + W1 + 2] * n0 + table[o + W2 + 2] * nab + table[o + W3 + 2] * nc,
+        i1 + p[o + WEIGHT_1] * n0 + p[o + WEIGHT_2] * nab + p[o + WEIGHT_3] * nc,
+        w1 + p[o + WEIGHT_1 + 1] * n0 + p[o + WEIGHT_2 + 1] * nab + p[o + WEIGHT_3 + 1] * nc,
+        th1 + p[o + WEIGHT_1 + 2] * n0 + p[o + WEIGHT_2 + 2] * nab + p[o + WEIGHT_3 + 2] * nc,
+        n0,
+        0.5 * nab,
+        nc,
     )
 
 
 @scalar
-def tanh_segment(p, c, table, part, u, Tb, Tcp, Tcm, i, w, th, result):  # type: ignore[no-untyped-def]
-    """Advance over one segment under the smoothed law; returns (i, w, th)."""
-    whole = c[LENGTH + part]
-    done, steps = 0, 1 << (LEVELS - 1)  # in units of the shortest step
-    energy = p[layout.WITH_ENERGY] > 0.0
-    ws, wanted = p[layout.SMOOTHING], p[layout.TANH_TOLERANCE] * p[layout.SMOOTHING]
-    far = SATURATED * ws
-    bend = abs(Tcp - Tcm) / ws + abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS])
-    kink = bend / p[layout.INERTIA] * whole / steps / wanted if p[layout.TANH_LEVEL] < 0.0 else 0.0
+def saturated(p, s, part, u):  # type: ignore[no-untyped-def]
+    """Cross a whole segment in one exact step where tanh is 1 all the way; returns 1 where that was so."""
+    i, w, far = s[layout.S_CURRENT], s[layout.S_SPEED], SATURATED * p[layout.SMOOTHING]
+    if abs(w) <= far or p[layout.TANH_LEVEL] >= 0.0:
+        return 0
+    sign = 1.0 if w > 0.0 else -1.0
+    which = (0 if w > 0.0 else 2) + part
+    Tb = s[layout.S_TORQUE]
+    T = Tb - sign * (s[layout.S_DRY] if w > 0.0 else s[layout.S_DRY_REVERSE])
+    o = layout.SLIP + which * layout.TRANSITION
+    i1, w1, th1 = slip_step(p, o, i, w, s[layout.S_ANGLE], u, T)
+    if sign * w1 <= far or abs(w1 - w) >= 0.5 * (abs(w) + far):
+        return 0
+    if p[layout.WITH_ENERGY] > 0.0:
+        energy_whole(p, s, which, i, w, u, T, Tb)
+    s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i1, w1, th1
+    return 1
+
+
+@scalar
+def tanh_segment(p, s, part, u):  # type: ignore[no-untyped-def]
+    """Advance the state row over one segment under the smoothed law."""
+    if saturated(p, s, part, u) > 0:
+        return
+    i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
+    Tb, Tcp, Tcm = s[layout.S_TORQUE], s[layout.S_DRY], s[layout.S_DRY_REVERSE]
+    whole = p[layout.LENGTH + part]
+    done, steps = 0, 1 << (layout.LEVELS - 1)  # in units of the shortest step
+    first = part * layout.LEVELS
+    bend = abs(Tcp - Tcm) / p[layout.SMOOTHING] + abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS])
+    allowed = p[layout.TANH_TOLERANCE] * p[layout.SMOOTHING]
+    kink = bend / p[layout.INERTIA] * whole / steps / allowed if p[layout.TANH_LEVEL] < 0.0 else 0.0
     while done < steps:
-        s = 1.0 if w > 0.0 else -1.0
-        if done == 0 and abs(w) > far and p[layout.TANH_LEVEL] < 0.0 and not energy:
-            side = 0 if w > 0.0 else 1
-            T = Tb - s * (Tcm if side else Tcp)
-            i1, w1, th1 = slip_step(c, (2 * side + part) * TRANSITION, i, w, th, u, T)
-            if s * w1 > far and abs(w1 - w) < 0.5 * (abs(w) + far):
-                return i1, w1, th1
         level = level_for(p, i, w, u, Tb, Tcp, Tcm, whole)
         unit = steps >> level
-        while done % unit != 0:
+        while (done & (unit - 1)) != 0:
             unit >>= 1
             level += 1
-        i0, w0 = i, w
-        i, w, th1 = etd_step(p, table, (part * LEVELS + level) * LEVEL, i0, w0, th, u, Tb, Tcp, Tcm)
+        o = layout.TANH + (first + level) * layout.LEVEL
+        i1, w1, th1, n0, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm)
         # unequal friction has a bend at w = 0: a step across it is halved until the bend does not matter
-        while kink * abs(w - w0) * unit > 1.0 and w * w0 < 0.0 and unit > 1:
+        while kink * abs(w1 - w) * unit > 1.0 and w1 * w < 0.0 and unit > 1:
             unit >>= 1
             level += 1
-            i, w, th1 = etd_step(p, table, (part * LEVELS + level) * LEVEL, i0, w0, th, u, Tb, Tcp, Tcm)
-        if energy:
-            f0, f1 = tanh_torque(p, w0, Tcp, Tcm), tanh_torque(p, w, Tcp, Tcm)
-            energy_tanh(p, whole / 2.0**level, i0, w0, i, w, u, Tb, f0, f1, th1 - th, result)
-        th = th1
+            o = layout.TANH + (first + level) * layout.LEVEL
+            i1, w1, th1, n0, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm)
+        if p[layout.WITH_ENERGY] > 0.0:
+            form = layout.TANH_FORMS + (first + level) * layout.TANH_FORM
+            energy_step(p, s, form, th1 - th, i, w, u, Tb, n0, nm, nc)
+        i, w, th = i1, w1, th1
         done += unit
-    return i, w, th
+    s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i, w, th

@@ -1,0 +1,54 @@
+"""The speed that the velocity controller sees."""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.filters import chain
+
+IDEAL, DIFFERENCE, TRACKING = range(3)
+
+
+@inlined
+def counted(value, scale):  # type: ignore[no-untyped-def]
+    """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
+    return float(math.floor(value * scale)) / scale if scale > 0.0 else value
+
+
+@scalar
+def difference(p, s, angle):  # type: ignore[no-untyped-def]
+    """Difference over the last m samples; the angles lie in the state, oldest first."""
+    m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
+    speed = (angle - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
+    for j in range(m - 1):
+        s[at + j] = s[at + j + 1]
+    s[at + m - 1] = angle
+    return speed
+
+
+@scalar
+def tracking(p, s, angle):  # type: ignore[no-untyped-def]
+    """Tracking loop: p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r."""
+    speed = s[layout.S_TRACKED_SPEED]
+    foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * speed
+    r = angle - foreseen
+    s[layout.S_TRACKED_ANGLE] = foreseen + p[layout.TRACKING_ANGLE] * r
+    speed += p[layout.TRACKING_SPEED] * r
+    s[layout.S_TRACKED_SPEED] = speed
+    return speed
+
+
+@scalar
+def measured_speed(p, s, w, th):  # type: ignore[no-untyped-def]
+    """Speed by the encoder's method, then its first-order filter, then the speed filters."""
+    x, source = w, int(p[layout.SPEED_SOURCE])
+    if source == DIFFERENCE:
+        x = difference(p, s, counted(th, p[layout.COUNTS_PER_RAD]))
+    elif source == TRACKING:
+        x = tracking(p, s, counted(th, p[layout.COUNTS_PER_RAD]))
+    filtered = s[layout.S_FILTERED_SPEED]
+    filtered += p[layout.FILTER_COEFFICIENT] * (x - filtered)
+    s[layout.S_FILTERED_SPEED] = filtered
+    return chain(p, layout.SPEED_CHAIN, int(p[layout.SPEED_FILTERS]), s, layout.S_SPEED_CHAIN, filtered)

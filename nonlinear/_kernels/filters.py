@@ -1,0 +1,34 @@
+"""Chains of sections of second order."""
+
+from __future__ import annotations
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import scalar
+
+
+@scalar
+def chain(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
+    """Pass x through ``count`` sections (direct form II transposed).
+
+    Coefficients b0, b1, b2, a1, a2 of each section begin at ``p[at]``, its two states at ``s[to]``.
+    """
+    for n in range(count):
+        o, q = at + n * layout.SECTION, to + 2 * n
+        y = p[o] * x + s[q]
+        s[q] = p[o + 1] * x - p[o + 3] * y + s[q + 1]
+        s[q + 1] = p[o + 2] * x - p[o + 4] * y
+        x = y
+    return x
+
+
+@scalar
+def settle(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
+    """Set the states of a chain to those of a constant input x; returns its output."""
+    for n in range(count):
+        o, q = at + n * layout.SECTION, to + 2 * n
+        below = 1.0 + p[o + 3] + p[o + 4]
+        y = (p[o] + p[o + 1] + p[o + 2]) / below * x if below != 0.0 else 0.0
+        s[q + 1] = p[o + 2] * x - p[o + 4] * y
+        s[q] = p[o + 1] * x - p[o + 3] * y + s[q + 1]
+        x = y
+    return x

@@ -1,0 +1,117 @@
+"""From t_k to t_(k+1): the delay line, the load, and the plant over the two segments of a tick."""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.segment import segment, slip_step
+from nonlinear._kernels.sense import output_angle
+from nonlinear._kernels.smooth import tanh_segment
+
+FINITE = 1e15
+
+
+@scalar
+def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
+    """M_ext of this tick: constant, series, slope and gravity."""
+    y = output_angle(p, s)
+    M = p[layout.LOAD] + p[layout.LOAD_SLOPE] * y + io[layout.IN_LOAD]
+    if p[layout.GRAVITY] != 0.0:
+        M += p[layout.GRAVITY] * math.sin(y + p[layout.GRAVITY_ANGLE])
+    return M
+
+
+@scalar
+def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
+    """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
+    dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
+    s[layout.S_LOAD] = moment
+    s[layout.S_DRY], s[layout.S_DRY_REVERSE] = p[layout.DRY] + dry, p[layout.DRY_REVERSE] + dry
+    s[layout.S_TORQUE] = p[layout.BACK_DRIVABLE] / p[layout.RATIO] * moment - p[layout.OFFSET] + torque
+
+
+@inlined
+def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
+    """Slip over a segment by its precomputed transition; 0 where the speed might cross zero within."""
+    i, w = s[layout.S_CURRENT], s[layout.S_SPEED]
+    side = 1 if d < 0.0 else 0
+    T = s[layout.S_TORQUE] - d * (s[layout.S_DRY_REVERSE] if d < 0.0 else s[layout.S_DRY])
+    o = layout.SLIP + (2 * side + part) * layout.TRANSITION
+    i1, w1, th1 = slip_step(p, o, i, w, s[layout.S_ANGLE], u, T)
+    if p[layout.SMOOTH] <= 0.0:
+        kM = p[layout.TORQUE_CONSTANT]
+        Cv = p[layout.VISCOUS_REVERSE] if d < 0.0 else p[layout.VISCOUS]
+        drive = p[layout.SOURCE_GAIN] * u + T
+        a0, a1 = d * (kM * i + drive - Cv * w), d * (kM * i1 + drive - Cv * w1)
+        if not (d * w > 0.0 and d * w1 > 0.0) or (a0 < 0.0 and a1 > 0.0):
+            return 0
+    s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i1, w1, th1
+    return 1
+
+
+@inlined
+def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
+    """Rest over a whole segment; 0 where the rotor might break away within."""
+    i, Tb = s[layout.S_CURRENT], s[layout.S_TORQUE]
+    final = u * p[layout.LOCKED_GAIN]
+    i1 = final + (i - final) * p[layout.DECAY + part]
+    kM, Kg = p[layout.TORQUE_CONSTANT], p[layout.SOURCE_GAIN]
+    d0, d1 = kM * i + Kg * u + Tb, kM * i1 + Kg * u + Tb
+    up, down = s[layout.S_DRY] * p[layout.BREAKAWAY], -s[layout.S_DRY_REVERSE] * p[layout.BREAKAWAY]
+    if down <= d0 <= up and down <= d1 <= up:
+        s[layout.S_CURRENT] = i1
+        return 1
+    return 0
+
+
+@inlined
+def quick(p, s, part, u):  # type: ignore[no-untyped-def]
+    """The short way over a segment in which nothing happens; 0 where it has to be looked at."""
+    if p[layout.LOOK] > 0.0:
+        return 0
+    d = s[layout.S_DIRECTION]
+    if d != 0.0:
+        return quick_slip(p, s, part, u, d)
+    return quick_stick(p, s, part, u)
+
+
+@scalar
+def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
+    """One segment by the general way; the number of events in this tick so far, -1 where there are too many."""
+    if p[layout.LAW] > 0.0:
+        tanh_segment(p, s, part, u)
+        return events
+    return segment(p, s, part, u, events)
+
+
+@scalar
+def count_events(s, events):  # type: ignore[no-untyped-def]
+    """Add the events of a tick; -1 marks a failed one."""
+    if events < 0.0:
+        s[layout.S_STATUS] = float(layout.TOO_MANY_EVENTS)
+        return
+    s[layout.S_EVENTS] += events
+    s[layout.S_MAX_EVENTS] = max(s[layout.S_MAX_EVENTS], events)
+
+
+@inlined
+def motion(p, s, io):  # type: ignore[no-untyped-def]
+    """Advance the plant by one tick."""
+    # the delay line holds u_k and the q + 1 before it, oldest first
+    last = layout.S_QUEUE + int(p[layout.DELAY_LINE]) - 1
+    for j in range(layout.S_QUEUE, last):
+        s[j] = s[j + 1]
+    s[last] = s[layout.S_VOLTAGE]
+    if p[layout.RARE_LOAD] > 0.0:
+        put_load(p, s, hinge_moment(p, s, io), io[layout.IN_TORQUE])
+    events = 0.0
+    for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
+        if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:
+            events = closely(p, s, part, s[layout.S_QUEUE + part], events)
+    s[layout.S_HELD] = s[layout.S_QUEUE + 1]
+    if events != 0.0:
+        count_events(s, events)
+    if not (abs(s[layout.S_SPEED]) < FINITE):  # the other states pass through w
+        s[layout.S_STATUS] = float(layout.NOT_FINITE)

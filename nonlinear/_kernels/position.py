@@ -1,0 +1,130 @@
+"""The outermost stage where it is more than a P loop of position on the motor's angle."""
+
+from __future__ import annotations
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.command import shape
+from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.estimate import counted
+from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y, probe
+from nonlinear._kernels.regulator import clamp
+
+
+@inlined
+def limited(p, s, v):  # type: ignore[no-untyped-def]
+    """What the limits of the next stage leave of v, and their flags; nothing is stored."""
+    if p[layout.HAS_VELOCITY] > 0.0:
+        target = clamp(v, p[layout.SPEED_LIMIT])
+        change = target - s[layout.S_SPEED_COMMAND]
+        allowed = clamp(change, p[layout.SPEED_STEP])
+        flags = 0.0 if target == v else float(layout.FLAG_SPEED)
+        if allowed == change:
+            return target, flags
+        return s[layout.S_SPEED_COMMAND] + allowed, flags + float(layout.FLAG_ACCELERATION)
+    if p[layout.HAS_CURRENT] > 0.0:
+        out = clamp(v, s[layout.S_CURRENT_LIMIT])
+        return out, 0.0 if out == v else float(layout.FLAG_CURRENT)
+    out = clamp(v, s[layout.S_VOLTAGE_LIMIT])
+    return out, 0.0 if out == v else float(layout.FLAG_VOLTAGE)
+
+
+@inlined
+def put_voltage(p, s, io, v):  # type: ignore[no-untyped-def]
+    """Make v the voltage of this tick, through its probe."""
+    s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = v
+    if p[PROBE_U] > 0.0:
+        after = probe(p, s, io, layout.POINT_VOLTAGE, v)
+        s[layout.S_VOLTAGE] = clamp(after, s[layout.S_VOLTAGE_LIMIT])
+
+
+@inlined
+def put_current(p, s, io, v):  # type: ignore[no-untyped-def]
+    """Make v the current command, through its probe."""
+    s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = v
+    if p[PROBE_I] > 0.0:
+        after = probe(p, s, io, layout.POINT_CURRENT, v)
+        s[layout.S_CURRENT_REFERENCE] = clamp(after, s[layout.S_CURRENT_LIMIT])
+
+
+@inlined
+def put_outer(p, s, io, out, flags):  # type: ignore[no-untyped-def]
+    """Hand the outermost stage's output to the stage that it drives."""
+    s[layout.S_FLAGS_OUTER] = flags
+    if p[layout.HAS_VELOCITY] > 0.0:
+        s[layout.S_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE] = out
+        if p[PROBE_W] > 0.0:
+            after = probe(p, s, io, layout.POINT_SPEED, out)
+            s[layout.S_SPEED_REFERENCE] = clamp(after, p[layout.SPEED_LIMIT])
+    elif p[layout.HAS_CURRENT] > 0.0:
+        put_current(p, s, io, out)
+    else:
+        put_voltage(p, s, io, out)
+
+
+@scalar
+def probed_output(p, s, io, y):  # type: ignore[no-untyped-def]
+    """The output angle behind its probe."""
+    s[layout.S_OUTPUT_BEFORE] = y
+    s[layout.S_OUTPUT_AFTER] = probe(p, s, io, layout.POINT_OUTPUT, y)
+    return s[layout.S_OUTPUT_AFTER]
+
+
+@scalar
+def position_feedback(p, s, io, th):  # type: ignore[no-untyped-def]
+    """The angle that the position loop sees, as an angle of the motor."""
+    N = p[layout.RATIO]
+    if p[layout.OUTPUT_SENSOR] > 0.0:
+        y = counted(io[layout.IN_OUTPUT], p[layout.POSITION_COUNTS])
+        return N * probed_output(p, s, io, y) if p[PROBE_Y] > 0.0 else N * y
+    angle = counted(th, p[layout.POSITION_COUNTS])
+    return N * probed_output(p, s, io, angle / N) if p[PROBE_Y] > 0.0 else angle
+
+
+@scalar
+def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
+    """Note the reference (motor side); returns k_ff dr/dt and renews the torque feed-forward."""
+    last, before = s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE]
+    change = reference - last
+    s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE] = reference, last
+    torque = p[layout.ACCELERATION_FEEDFORWARD] * (change - (last - before))
+    if change > 0.0:
+        torque += p[layout.FRICTION_FEEDFORWARD]
+    elif change < 0.0:
+        torque -= p[layout.FRICTION_FEEDFORWARD]
+    s[layout.S_TORQUE_FEEDFORWARD] = torque
+    return p[layout.FEEDFORWARD] * change / p[layout.POSITION_PERIOD]
+
+
+@scalar
+def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
+    """P, PI or PID of position with feed-forward; returns the output behind the limits, and flags."""
+    e = reference - position_feedback(p, s, io, th)
+    rate = (e - s[layout.S_ERROR]) / p[layout.POSITION_PERIOD]
+    s[layout.S_ERROR] = e
+    s[layout.S_ERROR_RATE] += p[layout.DERIVATIVE_COEFFICIENT] * (rate - s[layout.S_ERROR_RATE])
+    direct = p[layout.POSITION_GAIN] * e + feedforward(p, s, reference)
+    direct += p[layout.DERIVATIVE] * s[layout.S_ERROR_RATE]
+    if p[layout.HAS_VELOCITY] <= 0.0:
+        direct += s[layout.S_TORQUE_FEEDFORWARD]
+    integral = s[layout.S_POSITION_INTEGRATOR]
+    updated = integral + p[layout.POSITION_INTEGRAL] * e
+    v = direct + updated
+    out, flags = limited(p, s, v)
+    if out == v or (v - out) * e < 0.0:
+        s[layout.S_POSITION_INTEGRATOR] = updated
+        return out, flags
+    kept, _flags = limited(p, s, direct + integral)
+    return kept, flags
+
+
+@scalar
+def outer_rare(p, s, io, th):  # type: ignore[no-untyped-def]
+    """Update the outermost stage, whichever it is."""
+    r = shape(p, s, io[layout.IN_COMMAND])
+    if p[layout.HAS_POSITION] > 0.0:
+        out, flags = position_law(p, s, io, p[layout.RATIO] * r, th)
+    elif p[layout.HAS_VELOCITY] > 0.0:
+        out, flags = limited(p, s, p[layout.RATIO] * r)
+    else:
+        out, flags = limited(p, s, r)
+    put_outer(p, s, io, out, flags + s[layout.S_FLAGS_PROFILE])

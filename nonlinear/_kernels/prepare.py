@@ -1,0 +1,112 @@
+"""Everything of a run that does not change with time, derived once into the row of parameters."""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import entry, scalar
+from nonlinear._kernels.energy import prepare_forms
+from nonlinear._kernels.expm import transition
+from nonlinear._kernels.modal import COMPLEX, describe
+from nonlinear._kernels.smooth import prepare_tanh
+
+
+@entry
+def prepare_sizes(p):  # type: ignore[no-untyped-def]
+    """Places of the parts of the state whose lengths differ from drive to drive, and its length."""
+    p[layout.DELAY_LINE] = p[layout.DELAY_TICKS] + 2.0
+    p[layout.AT_ANGLES] = layout.S_QUEUE + p[layout.DELAY_LINE]
+    p[layout.AT_AVERAGE] = p[layout.AT_ANGLES] + p[layout.DIFFERENCE_SAMPLES]
+    p[layout.AT_PROBES] = p[layout.AT_AVERAGE] + p[layout.PROFILE_SAMPLES]
+    longest, probing = 0.0, 0.0
+    for point in range(4):
+        at = layout.PROBES + point * layout.PROBE_SIZE
+        longest = max(longest, p[at + layout.PROBE_DELAY])
+        probing = max(probing, p[at + layout.PROBE_ON])
+    p[layout.PROBING], p[layout.NOTING] = probing, max(probing, p[layout.OVERLOAD])
+    p[layout.PROBE_RING] = longest + layout.MAX_TAPS + 1.0 if probing > 0.0 else 1.0
+    p[layout.AT_WORK] = p[layout.AT_PROBES] + 4.0 * p[layout.PROBE_RING]
+    p[layout.STATE_SIZE] = p[layout.AT_WORK] + layout.WORK_SIZE
+
+
+@scalar
+def prepare_periods(p):  # type: ignore[no-untyped-def]
+    """Who is outermost, how often it is updated, and what that means for limits and rates."""
+    every = 1.0
+    if p[layout.HAS_POSITION] > 0.0:
+        every = p[layout.EVERY_POSITION]
+    elif p[layout.HAS_VELOCITY] > 0.0:
+        every = p[layout.EVERY_VELOCITY]
+    p[layout.OUTER_EVERY] = every
+    p[layout.POSITION_PERIOD] = every * p[layout.PERIOD]
+    p[layout.VELOCITY_PERIOD] = p[layout.EVERY_VELOCITY] * p[layout.PERIOD]
+    p[layout.SPEED_STEP] = p[layout.ACCELERATION_LIMIT] * p[layout.POSITION_PERIOD]
+
+
+@scalar
+def any_of(p, first, count):  # type: ignore[no-untyped-def]
+    """1 where one of some numbers is not zero."""
+    found = 0.0
+    for j in range(count):
+        if p[first + j] != 0.0:
+            found = 1.0
+    return found
+
+
+@scalar
+def prepare_gates(p):  # type: ignore[no-untyped-def]
+    """One number a stage that says whether it needs more than its short form."""
+    more = max(any_of(p, layout.POSITION_INTEGRAL, int(2)), any_of(p, layout.OUTPUT_SENSOR, int(4)))
+    if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
+        more = 1.0
+    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, int(1))))
+    plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
+    p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
+    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, int(2)), any_of(p, layout.TORQUE_FILTERS, int(1)))
+    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, int(1)))
+    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, int(2)), any_of(p, layout.CURRENT_WINDUP, int(1)))
+    p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
+    more = max(p[layout.SUPPLY], p[layout.OUTPUT_SENSOR])
+    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, int(5)))
+    tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
+    varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
+    p[layout.RARE_LOAD] = 1.0 if varying else 0.0
+
+
+@scalar
+def prepare_plant(p, work):  # type: ignore[no-untyped-def]
+    """Transitions over both segments and both directions, eigenvalues, decay of a locked current."""
+    Ts, f = p[layout.PERIOD], p[layout.DELAY_FRACTION]
+    p[layout.LENGTH], p[layout.LENGTH + 1] = f, Ts - f
+    p[layout.SPLIT] = 1.0 if f > 0.0 else 0.0
+    ringing = 0.0
+    at_work = int(p[layout.AT_WORK])
+    for side in range(2):
+        at = layout.MODES + side * layout.MODAL
+        describe(p, side, at)
+        if int(p[at + layout.KIND]) == COMPLEX and p[at + layout.ROOT] * Ts >= 3.0:
+            ringing = 1.0
+        for part in range(2):
+            place = layout.SLIP + (2 * side + part) * layout.TRANSITION
+            transition(p, side, p[layout.LENGTH + part], work, at_work, place)
+    p[layout.RELAX] = p[layout.RESISTANCE] / p[layout.INDUCTANCE]
+    for part in range(2):
+        p[layout.DECAY + part] = math.exp(-p[layout.RELAX] * p[layout.LENGTH + part])
+    p[layout.LOCKED_GAIN] = 0.0 if p[layout.SOURCE] > 0.0 else 1.0 / p[layout.RESISTANCE]
+    dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
+    same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
+    p[layout.SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
+    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
+
+
+@entry
+def prepare(p, s):  # type: ignore[no-untyped-def]
+    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space."""
+    prepare_periods(p)
+    prepare_gates(p)
+    prepare_plant(p, s)
+    if p[layout.WITH_ENERGY] > 0.0:
+        prepare_forms(p, s)
+    if p[layout.LAW] > 0.0:
+        prepare_tanh(p, s)

@@ -1,0 +1,77 @@
+"""What lies between the plant and the controller's eyes: noise, resolution, jitter, and the supply's voltage."""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.modal import derivative
+from nonlinear._kernels.random import normal
+from nonlinear._kernels.regulator import clamp
+from nonlinear._kernels.smooth import tanh_torque
+
+
+@scalar
+def output_angle(p, s):  # type: ignore[no-untyped-def]
+    """Angle of the output shaft."""
+    return s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
+
+
+@scalar
+def slopes(p, s):  # type: ignore[no-untyped-def]
+    """(i', w') at the sampling instant under the voltage that acted last."""
+    i, w, d, u = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_DIRECTION], s[layout.S_HELD]
+    if d == 0.0:
+        return (u - p[layout.RESISTANCE] * i) * p[layout.LOCKED_GAIN] * p[layout.RELAX], 0.0
+    T = s[layout.S_TORQUE]
+    if p[layout.LAW] > 0.0:
+        T += tanh_torque(p, w, s[layout.S_DRY], s[layout.S_DRY_REVERSE])
+        return derivative(p, layout.MODES, i, w, u, T)
+    T -= d * (s[layout.S_DRY] if d > 0.0 else s[layout.S_DRY_REVERSE])
+    return derivative(p, layout.MODES + (layout.MODAL if d < 0.0 else 0), i, w, u, T)
+
+
+@scalar
+def supply(p, s):  # type: ignore[no-untyped-def]
+    """Bus voltage of this tick (model.md section 6), from voltage and current of the motor; also its energies."""
+    U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
+    power, Ts = s[layout.S_VOLTAGE] * s[layout.S_CURRENT], p[layout.PERIOD]
+    i_b = power / U if U > 0.0 else 0.0
+    ledger = layout.S_ENERGY
+    if i_b >= 0.0 or p[layout.REGENERATIVE] > 0.0:
+        s[layout.S_VOLTAGE_LIMIT] = max(Us - Rs * i_b, 0.0)
+        s[ledger + layout.ENERGY_SUPPLY] += Us * i_b * Ts
+        s[ledger + layout.ENERGY_SUPPLY_LOSS] += Rs * i_b * i_b * Ts
+        return
+    C = p[layout.CAPACITANCE]
+    free = math.sqrt(max(U * U - 2.0 * power * Ts / C, 0.0))
+    s[layout.S_VOLTAGE_LIMIT] = min(free, p[layout.BRAKE_VOLTAGE])
+    after = s[layout.S_VOLTAGE_LIMIT]
+    s[ledger + layout.ENERGY_BRAKE] += 0.5 * C * (free - after) * (free + after)
+    s[ledger + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
+
+
+@scalar
+def sense(p, s, io):  # type: ignore[no-untyped-def]
+    """Write what the controller measures of current, speed and angles, and the bus voltage."""
+    i, w, th, y = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], output_angle(p, s)
+    if p[layout.SUPPLY] > 0.0:
+        if s[layout.S_TICK] > 0.0:
+            supply(p, s)
+        io[layout.IN_BUS] = s[layout.S_VOLTAGE_LIMIT]
+    if p[layout.JITTER] > 0.0:
+        late = clamp(p[layout.JITTER] * normal(s, layout.NOISE_INSTANT), 0.5 * p[layout.PERIOD])
+        di, dw = slopes(p, s)
+        rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
+        i, th, y = i + late * di, th + late * (w + 0.5 * late * dw), y + late * rate
+        w += late * dw
+    if p[layout.CURRENT_NOISE] > 0.0:
+        i += p[layout.CURRENT_NOISE] * normal(s, layout.NOISE_CURRENT)
+    if p[layout.CURRENT_RESOLUTION] > 0.0:
+        i = p[layout.CURRENT_RESOLUTION] * float(math.floor(i / p[layout.CURRENT_RESOLUTION] + 0.5))
+    if p[layout.ANGLE_NOISE] > 0.0:
+        th += p[layout.ANGLE_NOISE] * normal(s, layout.NOISE_ANGLE)
+    if p[layout.OUTPUT_NOISE] > 0.0:
+        y += p[layout.OUTPUT_NOISE] * normal(s, layout.NOISE_OUTPUT)
+    io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE], io[layout.IN_OUTPUT] = i, w, th, y

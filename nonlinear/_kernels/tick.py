@@ -1,0 +1,159 @@
+"""The drive as a machine with a state: `init` once, `step` every tick; `get` and `set_state` copy the state.
+
+All rows are flat.  A state copied out and set again elsewhere goes on with the same bits.
+"""
+
+from __future__ import annotations
+
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import entry, inlined, scalar
+from nonlinear._kernels.control import control
+from nonlinear._kernels.estimate import TRACKING, counted
+from nonlinear._kernels.filters import settle
+from nonlinear._kernels.motion import motion, put_load
+from nonlinear._kernels.probes import fill_ring
+from nonlinear._kernels.random import seed_streams
+from nonlinear._kernels.regulator import clamp
+from nonlinear._kernels.sense import sense
+
+
+@scalar
+def init_controller(p, s):  # type: ignore[no-untyped-def]
+    """Start values of the controller, all histories those of rest or of constant speed."""
+    th = p[layout.ANGLE_START]
+    s[layout.S_CURRENT_INTEGRATOR] = p[layout.CURRENT_INTEGRATOR_START]
+    s[layout.S_VELOCITY_INTEGRATOR] = p[layout.VELOCITY_INTEGRATOR_START]
+    s[layout.S_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE] = p[layout.SPEED_COMMAND_START]
+    s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = p[layout.CURRENT_COMMAND_START]
+    s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = s[layout.S_HELD] = p[layout.VOLTAGE_START]
+    s[layout.S_REFERENCE] = s[layout.S_REFERENCE_BEFORE] = th
+    s[layout.S_CURRENT_LIMIT], s[layout.S_VOLTAGE_LIMIT] = p[layout.CURRENT_LIMIT], p[layout.VOLTAGE_LIMIT]
+    chain = layout.TORQUE_CHAIN
+    settle(p, chain, int(p[layout.TORQUE_FILTERS]), s, layout.S_TORQUE_CHAIN, p[layout.CURRENT_COMMAND_START])
+
+
+@scalar
+def init_estimate(p, s):  # type: ignore[no-untyped-def]
+    """Start values of the speed measurement: those of constant speed."""
+    w, th, T = p[layout.SPEED_START], p[layout.ANGLE_START], p[layout.VELOCITY_PERIOD]
+    m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
+    for j in range(m):
+        s[at + j] = counted(th - (m - j) * T * w, p[layout.COUNTS_PER_RAD])
+    if int(p[layout.SPEED_SOURCE]) == TRACKING:
+        s[layout.S_TRACKED_ANGLE] = counted(th, p[layout.COUNTS_PER_RAD]) - T * w
+        s[layout.S_TRACKED_SPEED] = w
+    s[layout.S_FILTERED_SPEED] = w
+    settle(p, layout.SPEED_CHAIN, int(p[layout.SPEED_FILTERS]), s, layout.S_SPEED_CHAIN, w)
+    s[layout.S_MEASURED_SPEED] = w
+
+
+@scalar
+def init_command(p, s):  # type: ignore[no-untyped-def]
+    """Start values of profile and command filter: at the start angle, or at the start of the outermost stage."""
+    r = p[layout.ANGLE_START] / p[layout.RATIO]
+    if p[layout.HAS_POSITION] <= 0.0:
+        r = p[layout.VOLTAGE_START]
+        if p[layout.HAS_CURRENT] > 0.0:
+            r = p[layout.CURRENT_COMMAND_START]
+        if p[layout.HAS_VELOCITY] > 0.0:
+            r = p[layout.SPEED_COMMAND_START] / p[layout.RATIO]
+    s[layout.S_PROFILE] = s[layout.S_PROFILE_COMMAND] = r
+    n, at = int(p[layout.PROFILE_SAMPLES]), int(p[layout.AT_AVERAGE])
+    for j in range(n):
+        s[at + j] = r
+    s[layout.S_AVERAGE_SUM] = n * r
+    settle(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
+
+
+@scalar
+def init_lines(p, s):  # type: ignore[no-untyped-def]
+    """Fill the delay line and the probes' rings."""
+    u, y = p[layout.VOLTAGE_START], p[layout.ANGLE_START] / p[layout.RATIO]
+    for j in range(int(p[layout.DELAY_LINE])):
+        s[layout.S_QUEUE + j] = u
+    fill_ring(p, s, layout.POINT_OUTPUT, y)
+    fill_ring(p, s, layout.POINT_SPEED, p[layout.SPEED_COMMAND_START])
+    fill_ring(p, s, layout.POINT_CURRENT, p[layout.CURRENT_COMMAND_START])
+    fill_ring(p, s, layout.POINT_VOLTAGE, u)
+    s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = y
+
+
+@entry
+def init(p, s):  # type: ignore[no-untyped-def]
+    """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
+    for j in range(int(p[layout.STATE_SIZE])):
+        s[j] = 0.0
+    s[layout.S_CURRENT], s[layout.S_SPEED] = p[layout.CURRENT_START], p[layout.SPEED_START]
+    s[layout.S_ANGLE] = p[layout.ANGLE_START]
+    w = p[layout.SPEED_START]
+    s[layout.S_DIRECTION] = -1.0 if w < 0.0 else (1.0 if w > 0.0 else 0.0)
+    if p[layout.SMOOTH] > 0.0 or p[layout.LAW] > 0.0:  # these know no rest
+        s[layout.S_DIRECTION] = 1.0
+    put_load(p, s, p[layout.LOAD], 0.0)
+    init_controller(p, s)
+    init_estimate(p, s)
+    init_command(p, s)
+    init_lines(p, s)
+    seed_streams(s, p[layout.SEED])
+
+
+@inlined
+def decide(p, s, io):  # type: ignore[no-untyped-def]
+    """Sense and control at t_k, and note what there is to record."""
+    i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
+    if p[layout.RARE_SENSE] > 0.0:
+        sense(p, s, io)
+        control(p, s, io, io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE])
+    else:
+        control(p, s, io, i, w, th)
+    io[layout.IO_REFERENCE] = io[layout.IN_COMMAND]
+    io[layout.IO_OUTPUT] = s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else th / p[layout.RATIO]
+    io[layout.IO_SPEED], io[layout.IO_CURRENT], io[layout.IO_ANGLE] = w, i, th
+    io[layout.IO_VOLTAGE], io[layout.IO_CURRENT_COMMAND] = s[layout.S_VOLTAGE], s[layout.S_CURRENT_REFERENCE]
+    io[layout.IO_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE]
+    io[layout.IO_FLAGS] = s[layout.S_FLAGS_OUTER] + s[layout.S_FLAGS_VELOCITY] + s[layout.S_FLAGS_CURRENT]
+    if s[layout.S_DIRECTION] == 0.0:
+        io[layout.IO_FLAGS] += float(layout.FLAG_STICK)
+    if p[layout.NOTING] > 0.0:
+        note_more(p, s, io)
+
+
+@scalar
+def note_more(p, s, io):  # type: ignore[no-untyped-def]
+    """Note what stands in front of and behind each probe, and the current command under overload."""
+    if p[layout.OVERLOAD] > 0.0:
+        io[layout.IO_CURRENT_COMMAND] = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
+    at = layout.IO_PROBES
+    io[at], io[at + 1] = s[layout.S_VOLTAGE_BEFORE], s[layout.S_VOLTAGE]
+    io[at + 2], io[at + 3] = s[layout.S_CURRENT_BEFORE], s[layout.S_CURRENT_REFERENCE]
+    io[at + 4], io[at + 5] = s[layout.S_SPEED_COMMAND], s[layout.S_SPEED_REFERENCE]
+    io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
+
+
+@inlined
+def step(p, s, io):  # type: ignore[no-untyped-def]
+    """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well."""
+    decide(p, s, io)
+    motion(p, s, io)
+    s[layout.S_TICK] += 1.0
+
+
+@entry
+def tick(p, s, io):  # type: ignore[no-untyped-def]
+    """`step` to be called from outside; returns the status."""
+    step(p, s, io)
+    return int(s[layout.S_STATUS])
+
+
+@entry
+def get(p, s, to):  # type: ignore[no-untyped-def]
+    """Copy the state out."""
+    for j in range(int(p[layout.STATE_SIZE])):
+        to[j] = s[j]
+
+
+@entry
+def set_state(p, s, source):  # type: ignore[no-untyped-def]
+    """Copy a state in."""
+    for j in range(int(p[layout.STATE_SIZE])):
+        s[j] = source[j]

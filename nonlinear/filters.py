@@ -1,0 +1,98 @@
+"""Sections of second order (b0, b1, b2, a1, a2) of the filters that a design names."""
+
+from __future__ import annotations
+
+from math import isfinite, pi, sqrt, tan
+
+from actuator_lti.design.model import Command, Filter
+from actuator_lti.errors import InputError
+
+Section = tuple[float, float, float, float, float]
+
+
+def tustin(b: tuple[float, float, float], a: tuple[float, float, float], w0: float, period_s: float) -> Section:
+    """``(b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0)`` sampled by ``s = c (z - 1)/(z + 1)``, exact at w0.
+
+    ``c = w0/tan(w0 T/2)``; coefficients are those of falling powers of s.
+    """
+    c = w0 / tan(0.5 * w0 * period_s)
+
+    def sampled(q: tuple[float, float, float]) -> tuple[float, float, float]:
+        square, slope, constant = q[0] * c * c, q[1] * c, q[2]
+        return square + slope + constant, 2.0 * (constant - square), square - slope + constant
+
+    (b0, b1, b2), (a0, a1, a2) = sampled(b), sampled(a)
+    if a[0] == 0.0 and b[0] == 0.0:  # of first order: the common factor z + 1 is left out
+        b0, b1, b2 = b[1] * c + b[2], b[2] - b[1] * c, 0.0
+        a0, a1, a2 = a[1] * c + a[2], a[2] - a[1] * c, 0.0
+    return b0 / a0, b1 / a0, b2 / a0, a1 / a0, a2 / a0
+
+
+def section(item: Filter, period_s: float, where: str = "") -> Section:
+    """The section of one filter of the velocity loop at its period.
+
+    Raises
+    ------
+    InputError
+        For a missing value, a frequency at or above pi/T, or a biquad that does not fit or is unstable.
+
+    Examples
+    --------
+    >>> from actuator_lti.design.model import Filter
+    >>> notch = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
+    >>> [round(x, 12) for x in section(notch, 2e-4)]  # model.md, case K3
+    [0.972166810747, -1.922292822063, 0.965981657580, -1.922292822063, 0.938148468327]
+    """
+    if item.kind == "biquad":
+        return _biquad(item, where)
+    if item.kind == "leadlag":
+        zero, pole = _given(item, "zero", where), _given(item, "pole", where)
+        w0 = _below_nyquist(sqrt(zero * pole), period_s, item.kind, where)
+        return tustin((0.0, 1.0 / zero, 1.0), (0.0, 1.0 / pole, 1.0), w0, period_s)
+    w0 = _below_nyquist(_given(item, "frequency", where), period_s, item.kind, where)
+    if item.kind == "notch":
+        width = _given(item, "width", where)
+        return tustin((1.0, item.depth * width, w0 * w0), (1.0, width, w0 * w0), w0, period_s)
+    if item.order == 1:
+        return tustin((0.0, 0.0, w0), (0.0, 1.0, w0), w0, period_s)
+    return tustin((0.0, 0.0, w0 * w0), (1.0, 2.0 * item.damping * w0, w0 * w0), w0, period_s)
+
+
+def command_section(command: Command, period_s: float) -> Section:
+    """The command filter: first order ``y += T/(TF + T) (x - y)``, second order by backward differences.
+
+    ``y = (x + (2 D q + 2 q^2) y1 - q^2 y2)/(1 + 2 D q + q^2)``, q = TF/T: stable for every time constant.
+    """
+    q = command.filter_time_s / period_s
+    if command.filter_order == 1:
+        return 1.0 / (1.0 + q), 0.0, 0.0, -q / (1.0 + q), 0.0
+    below = 1.0 + 2.0 * command.filter_damping * q + q * q
+    middle = -(2.0 * command.filter_damping * q + 2.0 * q * q) / below
+    return 1.0 / below, 0.0, 0.0, middle, q * q / below
+
+
+def _given(item: Filter, name: str, where: str) -> float:
+    value = getattr(item, f"{name}_rad_s")
+    if value is None or not (isfinite(value) and value > 0.0):
+        message = f"control.velocity.filter: {name} = {value}: a {item.kind} needs one above zero"
+        raise InputError(message, where=where)
+    return float(value)
+
+
+def _below_nyquist(w0: float, period_s: float, kind: str, where: str) -> float:
+    if w0 >= pi / period_s:
+        message = f"control.velocity.filter: {kind} at {w0:g} rad/s: must be below pi/T = {pi / period_s:g}"
+        raise InputError(message, where=where)
+    return w0
+
+
+def _biquad(item: Filter, where: str) -> Section:
+    b, a = (*item.b, 0.0, 0.0, 0.0)[:3], (*item.a, 0.0, 0.0, 0.0)[:3]
+    if not 1 <= len(item.b) <= 3 or not 1 <= len(item.a) <= 3 or a[0] == 0.0:
+        message = "control.velocity.filter: biquad: one to three numbers in b and in a, a[0] not zero"
+        raise InputError(message, where=where)
+    b0, b1, b2, a1, a2 = (x / a[0] for x in (*b, a[1], a[2]))
+    if not (abs(a2) < 1.0 and abs(a1) < 1.0 + a2):
+        message = f"control.velocity.filter: biquad: a = {item.a}: a pole is on or outside the unit circle"
+        raise InputError(message, where=where)
+    return b0, b1, b2, a1, a2
