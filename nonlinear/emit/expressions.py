@@ -61,7 +61,7 @@ class Expressions:
         text, kind = self.emit(node)
         if kind not in ("float", "int"):
             raise self.function.error(node, f"a {kind} where a number is wanted")
-        return text
+        return widened(text, kind)
 
     def _Constant(self, node: ast.Constant) -> Text:
         value = node.value
@@ -142,6 +142,8 @@ class Expressions:
         whole = (a, b) == ("int", "int")
         if whole and kind is ast.Div:
             raise self.function.error(node, "a quotient of whole numbers; use float()")
+        if not whole:
+            left, right = widened(left, a), widened(right, b)
         return f"({left} {_ARITHMETIC[kind]} {right})", "int" if whole else "float"
 
     def _UnaryOp(self, node: ast.UnaryOp) -> Text:
@@ -166,8 +168,14 @@ class Expressions:
         for left, op, right in zip(values, node.ops, values[1:], strict=False):
             if type(op) not in _COMPARE:
                 raise self.function.error(node, f"the comparison {type(op).__name__} is not in the subset")
-            parts.append(f"{self.as_float(left)} {_COMPARE[type(op)]} {self.as_float(right)}")
+            parts.append(self._compared(left, _COMPARE[type(op)], right))
         return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
+
+    def _compared(self, left: ast.expr, sign: str, right: ast.expr) -> str:
+        (a, first), (b, second) = self.emit(left), self.emit(right)
+        if (first, second) == ("int", "int"):
+            return f"{a} {sign} {b}"
+        return f"{self.as_float(left)} {sign} {self.as_float(right)}"
 
     def _IfExp(self, node: ast.IfExp) -> Text:
         (yes, a), (no, b) = self.emit(node.body), self.emit(node.orelse)
@@ -221,6 +229,8 @@ class Expressions:
         if len(texts) != 2:
             raise self.function.error(node, f"{name} of {len(texts)} numbers; two are in the subset")
         suffix = "_int" if kind == "int" else ""
+        if kind == "float":
+            texts = [self.as_float(argument) for argument in node.args]
         return f"{self.prefix}{name}{suffix}({bare(texts[0])}, {bare(texts[1])})", kind
 
     def _math(self, node: ast.Call, name: str) -> tuple[str, str]:
@@ -234,6 +244,11 @@ class Expressions:
         if name not in _MATH:
             raise self.function.error(node, f"math.{name} is not in the subset")
         return f"{name}({texts})", "float"
+
+
+def widened(text: str, kind: Kind) -> str:
+    """A number in floating-point arithmetic: C would convert it by itself, here it is seen."""
+    return f"((double){text})" if kind == "int" else text
 
 
 def bare(text: str) -> str:

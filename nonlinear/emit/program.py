@@ -155,12 +155,15 @@ def _structure(prefix: str, function: Function) -> str:
     return f"typedef struct {{ {fields} }} {result_type(prefix, function)};"
 
 
+_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false"}
+
+
 def _definition(function: Function, head: str, lines: list[str]) -> str:
     text = _plain(ast.get_docstring(function.tree) or "")
     described = [f" * {line}".rstrip() for line in text.splitlines()]
     comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
     declared = [
-        f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {'false' if kind == 'bool' else '0'};"
+        f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
         for name, kind in function.variables.items()
     ]
     return "\n".join([*comment, head, "{", *declared, *lines, "}", ""])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from nonlinear.emit.expressions import Calls, Constant, Expressions, bare
+from nonlinear.emit.expressions import Calls, Constant, Expressions, bare, widened
 from nonlinear.emit.kinds import C_TYPES, Function, Kind, c_name
 
 INDENT = "    "
@@ -59,6 +59,7 @@ class Statements:
             if kind not in ("float", "int"):
                 raise self.function.error(target, f"a {kind} stored in a row")
             self._mark_written(target)
+            text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
             self._put(f"{self.expressions.element(target)} = {text};")
         elif isinstance(target, ast.Name):
             self._declare(target, kind)
