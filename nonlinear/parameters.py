@@ -36,7 +36,9 @@ def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
     return (whole, 0.0) if abs(rest) < 1e-9 * period_s else (whole, rest)
 
 
-def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = True) -> Floats:
+def design_row(
+    design: Design, *, friction_on: bool = True, limits_on: bool = True, kind: type = float
+) -> Floats:
     """Parameters of the plant, the controllers and the limits of a design, at rest, without command or load.
 
     Parameters
@@ -47,6 +49,8 @@ def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = Tr
         the drive without limits is a linear loop.
     limits_on : bool
         ``False`` takes speed, acceleration, peak current and voltage as unlimited.
+    kind : type
+        ``object`` keeps what the values of a stacked design are; `nonlinear.export` follows them so.
 
     Returns
     -------
@@ -58,7 +62,7 @@ def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = Tr
     InputError
         If the stages of the design do not fit together.
     """
-    row = np.zeros(at.SIZE)
+    row = np.zeros(at.SIZE, dtype=kind)
     _plant(design, row)
     _friction(design, row, friction_on)
     _controllers(design, row)
@@ -200,9 +204,12 @@ def _position(design: Design, row: Floats) -> None:
 
 def _torque_gain(row: Floats) -> float:
     """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
+    gain: float = row[at.TORQUE_CONSTANT]
     if row[at.SOURCE]:
-        return float(row[at.SOURCE_GAIN])
-    return float(row[at.TORQUE_CONSTANT] if row[at.HAS_CURRENT] else row[at.TORQUE_CONSTANT] / row[at.RESISTANCE])
+        gain = row[at.SOURCE_GAIN]
+    elif not row[at.HAS_CURRENT]:
+        gain = row[at.TORQUE_CONSTANT] / row[at.RESISTANCE]
+    return gain
 
 
 def _encoder(design: Design, row: Floats, period_s: float) -> None:

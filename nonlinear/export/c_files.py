@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.call import parameters
+from nonlinear.emit.kinds import c_float
 from nonlinear.export.program import header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
 from nonlinear.parameters import design_row
@@ -118,7 +118,7 @@ def _design_source(ours: ExportedDesign) -> str:
     lines = []
     for place, value in enumerate(ours.row):
         if value != 0.0 or place < at.COMMAND:  # signals, probes and chains only where they are set
-            lines.append(f"    p[{place}] = {c_number(float(value))}; /* {_plain(known[place])} */")
+            lines.append(f"    p[{place}] = {c_float(float(value))}; /* {_plain(known[place])} */")
     body = "\n".join(lines)
     return f"""/*
  * Parameters of the design {_plain(ours.design.name)}, SI, motor side.
@@ -136,14 +136,6 @@ void drive_load_design(double *p)
 {body}
 }}
 """
-
-
-def c_number(value: float) -> str:
-    """A double that reads back as the same one; infinity by its name."""
-    if abs(value) == inf:
-        return "INFINITY" if value > 0 else "-INFINITY"
-    text = repr(value)
-    return text if any(c in text for c in ".e") else f"{text}.0"
 
 
 def _plain(text: str) -> str:
