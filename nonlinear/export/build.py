@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from actuator_lti.errors import InputError
+from nonlinear.export.portable_executable import without_time
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
 ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
@@ -81,4 +82,5 @@ def compile_files(
         if done.returncode != 0:
             said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
             raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
-        return (folder / output).read_bytes()
+        data = (folder / output).read_bytes()
+    return without_time(data) if output.endswith(".dll") else data

@@ -32,9 +32,15 @@ from nonlinear.export.variables import (
 
 Version = Literal[2, 3]
 PLATFORMS = ("linux64", "win64")
-_FOLDERS = {2: {"linux64": "linux64", "win64": "win64"}, 3: {"linux64": "x86_64-linux", "win64": "x86_64-windows"}}
+_FOLDERS = {
+    2: {"linux64": "linux64", "win64": "win64"},
+    3: {"linux64": "x86_64-linux", "win64": "x86_64-windows"},
+}
 _SUFFIX = {"linux64": "so", "win64": "dll"}
-_SHARED = {"linux64": ("-shared", "-fPIC", "-fvisibility=hidden"), "win64": ("-shared", "-fvisibility=hidden")}
+_SHARED = {
+    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden"),
+    "win64": ("-shared", "-fvisibility=hidden"),
+}
 
 
 def fmu_bytes(
@@ -73,7 +79,9 @@ def fmu_bytes(
     variables = variables_of(design, trace)
     texts = _sources(design, trace, version)
     names = [name for name in texts if name.endswith(".c")]
-    files = {"modelDescription.xml": description(design, variables, _token(texts, variables), version, names, tool)}
+    files = {
+        "modelDescription.xml": description(design, variables, _token(texts, variables), version, names, tool)
+    }
     texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", _token(texts, variables))
     for platform in platforms:
         library = f"{MODEL}.{_SUFFIX[platform]}"

@@ -68,7 +68,9 @@ def _root_2(design: Design, token: str, sources: Sequence[str], tool: str) -> ET
 
 
 def _root_3(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
-    root = ET.Element("fmiModelDescription", fmiVersion="3.0", instantiationToken=token, **_attributes(design, tool))
+    root = ET.Element(
+        "fmiModelDescription", fmiVersion="3.0", instantiationToken=token, **_attributes(design, tool)
+    )
     ET.SubElement(
         root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUState="true", canSerializeFMUState="true",
@@ -131,7 +133,9 @@ def _variables_2(root: ET.Element, variables: Sequence[Variable]) -> None:
     listed = ET.SubElement(root, "ModelVariables")
     for item in variables:
         scalar = ET.SubElement(listed, "ScalarVariable", **_common(item))
-        ET.SubElement(scalar, types[item.kind], **(_bounds(item) if item.kind == "real" else {}), **_start(item))
+        ET.SubElement(
+            scalar, types[item.kind], **(_bounds(item) if item.kind == "real" else {}), **_start(item)
+        )
     structure = ET.SubElement(root, "ModelStructure")
     index = {item.reference: n + 1 for n, item in enumerate(variables)}
     outputs = [item for item in variables if item.causality == "output"]

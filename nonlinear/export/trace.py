@@ -69,7 +69,9 @@ def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
     def compare(self: Traced, other: Any) -> bool:
         if not isinstance(other, int | float | Traced):
             return False
-        return self.tape.condition(f"{self.name} {sign} {_text(other)}", function(self.number, _number(other)))
+        return self.tape.condition(
+            f"{self.name} {sign} {_text(other)}", function(self.number, _number(other))
+        )
 
     return compare
 

@@ -57,7 +57,13 @@ def _inputs(design: Design) -> tuple[Variable, ...]:
     _, torque = _units(design)
     texts = (
         ("command", words, unit, 0.0, -math.inf),
-        ("hinge_moment", "moment of the load on the output shaft, beside that of the design", torque, 0.0, -math.inf),
+        (
+            "hinge_moment",
+            "moment of the load on the output shaft, beside that of the design",
+            torque,
+            0.0,
+            -math.inf,
+        ),
         ("supply_voltage", "limits.voltage of the design, from outside", "V", supply_voltage(design), 0.0),
     )
     return tuple(
@@ -88,7 +94,10 @@ def _outputs(design: Design) -> tuple[Variable, ...]:
 
 
 def _flags() -> tuple[Variable, ...]:
-    names = [(f"limiter.{name.replace('-', '_')}", f"the {name} limit acted at the last tick") for name in at.LIMITERS]
+    names = [
+        (f"limiter.{name.replace('-', '_')}", f"the {name} limit acted at the last tick")
+        for name in at.LIMITERS
+    ]
     names.append(("at_rest", "the rotor was held by friction at the last tick"))
     return tuple(
         Variable(name=name, reference=FIRST_FLAG + n, causality="output", variability="discrete",
@@ -137,7 +146,10 @@ def structured(path: str) -> str:
     'control.velocity.filter[1].depth'
     """
     indexed = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path)
-    parts = [part if re.fullmatch(r"[A-Za-z_]\w*(\[\d+\])?", part) else _quoted(part) for part in indexed.split(".")]
+    parts = [
+        part if re.fullmatch(r"[A-Za-z_]\w*(\[\d+\])?", part) else _quoted(part)
+        for part in indexed.split(".")
+    ]
     return ".".join(parts)
 
 

@@ -4,7 +4,15 @@
  *
  *     host UNIT.so GUID STEPS STEP COMMAND SAVE_AT
  */
+#ifdef _WIN32
+#include <windows.h>
+#define OPEN(name) (void *)LoadLibraryA(name)
+#define SYMBOL(library, name) (void *)GetProcAddress((HMODULE)(library), name)
+#else
 #include <dlfcn.h>
+#define OPEN(name) dlopen(name, RTLD_NOW)
+#define SYMBOL(library, name) dlsym(library, name)
+#endif
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,7 +38,7 @@ static void say(void *e, const char *name, int status, const char *category, con
 
 static const callbacks CALLBACKS = {say, calloc, free, NULL, NULL};
 
-#define FIND(name) *(void **)&name = dlsym(library, "fmi2" #name); if (name == NULL) { return 3; }
+#define FIND(name) *(void **)&name = SYMBOL(library, "fmi2" #name); if (name == NULL) { return 3; }
 
 int main(int argc, char **argv)
 {
@@ -49,7 +57,7 @@ int main(int argc, char **argv)
     int (*SerializeFMUstate)(void *, void *, char *, size_t);
     int (*DeSerializeFMUstate)(void *, const char *, size_t, void **);
     const unsigned int command = 1U, angle = 10U;
-    void *library = (argc > 6) ? dlopen(argv[1], RTLD_NOW) : NULL;
+    void *library = (argc > 6) ? OPEN(argv[1]) : NULL;
     void *unit, *state = NULL, *copy = NULL;
     double value, step, now = 0.0;
     long steps, save_at;

@@ -22,7 +22,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
-from nonlinear.export.build import system_compiler, zig_command
+from nonlinear.export.build import compile_files, system_compiler, zig_command
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
 from nonlinear.parameters import design_row
@@ -253,6 +253,31 @@ def test_both_platforms_in_one_file_with_the_same_bytes_each_time() -> None:
         assert archive.read("binaries/win64/drive.dll")[:2] == b"MZ"
         assert archive.read("binaries/linux64/drive.so")[:4] == b"\x7fELF"
     assert fmu_bytes(design) == data
+
+
+@pytest.mark.skipif(
+    zig_command() is None or shutil.which("wine") is None, reason="ziglang or wine is not installed"
+)
+def test_win64_binary_runs_under_wine(tmp_path: Path) -> None:
+    """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
+    design = load_design("ilr33-amber")
+    (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, ("win64",)))
+    with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
+        archive.extractall(tmp_path)
+    source = {"host.c": Path(__file__).with_name("c_host.c").read_text(encoding="utf-8")}
+    (tmp_path / "host.exe").write_bytes(compile_files(source, "host.exe", "win64"))
+    guid = fmpy.read_model_description(str(tmp_path / "u.fmu")).guid
+    call = ["wine", "host.exe", "binaries/win64/drive.dll", guid, "300", "1e-4", "0.05", "100"]
+    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
+    try:
+        done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, env=quiet, timeout=120)
+    except subprocess.TimeoutExpired:
+        pytest.skip("wine does not start here")
+    if not done.stdout:
+        pytest.skip("wine does not start here")
+    angles = np.array([float.fromhex(line) for line in done.stdout.split()])
+    ours = simulate(design, commands.step(0.05), 301e-4)
+    assert np.abs(angles - ours.output_angle_rad[1:]).max() < 1e-11 * 0.05
 
 
 @needs_compiler
