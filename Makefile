@@ -3,15 +3,23 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out
+SECONDS ?= 600
+SEED ?= 1
 STAMP := $(VENV)/.installed
+RELEASE := $(VENV)/.release
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Each package is pinned with the hashes of its files; "make lock" writes them anew from constraints.txt.
+COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
+  --no-emit-options --no-emit-index-url --no-emit-find-links
 
-.PHONY: report test check bench clean install browser
+.PHONY: report test machines check bench clean install browser fuzz lock limits release
 
 install: $(STAMP)
 
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml requirements.lock
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(PIP) install --quiet --require-hashes --requirement requirements.lock
+	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
 	touch $(STAMP)
 
 report: $(STAMP)
@@ -20,6 +28,17 @@ report: $(STAMP)
 test: $(STAMP)
 	$(BIN)/python -m pytest -n 2
 
+# The tests of margins, loops and many designs again, as on processors with other linear algebra kernels.
+MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
+  tests/margins/test_delay_margins.py tests/margins/test_step_random.py tests/margins/test_bandwidth.py \
+  tests/loops/test_loops_forms.py tests/loops/test_loops_published.py tests/study/test_compiled_figures.py
+
+machines: $(STAMP)
+	set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
+	  echo "OPENBLAS_CORETYPE=$$kernel"; \
+	  OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q -n 2 $(MACHINE_TESTS); \
+	done
+
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -27,8 +46,30 @@ check: $(STAMP)
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -q --doctest-modules actuator_lti nonlinear analyses reports
 
+# Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
+fuzz: $(STAMP)
+	$(BIN)/python -m tests.hardness.fuzz --seconds $(SECONDS) --seed $(SEED)
+
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.run
+
+limits: $(STAMP)
+	$(BIN)/python -m actuator_lti.bounds > docs/limits.md
+
+$(RELEASE): $(STAMP)
+	$(PIP) install --quiet --constraint constraints.txt '.[release]'
+	touch $(RELEASE)
+
+lock: $(RELEASE)
+	$(COMPILE) --extra dev --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
+
+# Wheel, sources and the bill of materials of what they need to run.
+release: $(RELEASE)
+	rm -rf dist && mkdir dist
+	$(COMPILE) --constraint constraints.txt --output-file dist/runtime.lock pyproject.toml
+	$(BIN)/cyclonedx-py requirements --output-reproducible --pyproject pyproject.toml \
+	  --output-file dist/actuator-lti.cdx.json dist/runtime.lock
+	$(BIN)/python -m build --no-isolation --outdir dist
 
 clean:
 	rm -rf $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,5 +1,7 @@
 """The two ways in which a calculation is refused."""
 
+LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
+
 
 class InputError(ValueError):
     """Bad input: one line that names the place, the key, the value and what is allowed.
@@ -18,8 +20,9 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str, where: str | None = None) -> None:
-        line = f"{where}: {message}" if where else message
-        super().__init__("".join(c if c.isprintable() else "?" for c in " ".join(line.split())))
+        line = " ".join((f"{where}: {message}" if where else message).split())
+        line = line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
+        super().__init__("".join(c if c.isprintable() else "?" for c in line))
         self.message = message
         self.where = where
 

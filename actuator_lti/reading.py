@@ -167,6 +167,7 @@ _UNQUOTED = re.compile(
     r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9][0-9.,eE+-]*\s*[A-Za-zµΩ%/°][^#\"\n]*?)\s*(#.*)?$"
 )
 _COMMA = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9]+,[0-9]+)\s*(#.*)?$")
+_HINT_CHARACTERS = 300  # the expressions take the square of the length of a line
 
 
 def _hint(text: str, error: Exception) -> str:
@@ -176,6 +177,8 @@ def _hint(text: str, error: Exception) -> str:
     if place is None or not 0 < int(place[1]) <= len(lines):
         return ""
     line = lines[int(place[1]) - 1]
+    if len(line) > _HINT_CHARACTERS:
+        return ""
     if found := _COMMA.match(line):
         return f"; use a decimal point: {found[1]} = {found[2].replace(',', '.')}"
     if found := _UNQUOTED.match(line):

@@ -242,7 +242,7 @@ def _threads(
         try:
             while running:
                 finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in finished:
+                for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
                     sink(running.pop(future), future.result())
                     for part in islice(waiting, 1):
                         running[pool.submit(call, part)] = part

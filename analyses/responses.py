@@ -87,7 +87,32 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
     return grid
 
 
-def nyquist_curve(system: Any, omega_rad_s: np.ndarray, reach: float, passes: int = 7) -> np.ndarray:
+def sampled_step(system: Any, samples: int) -> np.ndarray:
+    """Give the first samples of the unit step response of a sampled system, for a figure.
+
+    Parameters
+    ----------
+    system : python-control system
+        One input, one output, sampled.
+    samples : int
+
+    Returns
+    -------
+    ndarray, shape (samples,)
+    """
+    from actuator_lti.margins.loop import rational_loop
+
+    loop = rational_loop(system)
+    state, response = np.zeros(loop.order), np.empty(samples)
+    for k in range(samples):
+        response[k] = float(state @ loop.c) + loop.d
+        state = loop.A @ state + loop.b
+    return response
+
+
+def nyquist_curve(
+    system: Any, omega_rad_s: np.ndarray, reach: float, passes: int = 7
+) -> tuple[np.ndarray, np.ndarray]:
     """Sample L(jw) closely enough for a figure of that reach around -1; NaN where it leaves the frame.
 
     Parameters
@@ -99,7 +124,8 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, reach: float, passes: in
 
     Returns
     -------
-    ndarray of complex, shape (K,)
+    omega_rad_s : ndarray, shape (K,)
+    values : ndarray of complex, shape (K,)
     """
     omega, values = omega_rad_s, response_at(system, omega_rad_s)
     for _ in range(passes):
@@ -111,18 +137,21 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, reach: float, passes: in
         order = np.argsort(np.concatenate([omega, middle]))
         values = np.concatenate([values, response_at(system, middle)])[order]
         omega = np.concatenate([omega, middle])[order]
-    return _framed(values, reach)
+    kept = _framed(values, reach)
+    shown = np.where(np.abs(values + 1.0) < 2.5 * reach, values, np.nan + 0j)
+    return omega[kept], shown[kept]
 
 
 def _framed(values: np.ndarray, reach: float) -> np.ndarray:
-    """Replace what lies outside the frame by NaN, and drop points too near to be told apart."""
+    """Tell which points a figure needs: one outside the frame as a gap, none too near to be told apart."""
     shown = np.where(np.abs(values + 1.0) < 2.5 * reach, values, np.nan + 0j)
-    kept: list[complex] = []
-    for value in shown:
-        if not kept:
-            kept.append(value)
-        elif np.isnan(value) and np.isnan(kept[-1]):
+    kept: list[int] = []
+    for k, value in enumerate(shown):
+        last = shown[kept[-1]] if kept else None
+        if last is None:
+            kept.append(k)
+        elif np.isnan(value) and np.isnan(last):
             continue
-        elif np.isnan(value) or np.isnan(kept[-1]) or abs(value - kept[-1]) > 0.006 * reach:
-            kept.append(value)
-    return np.array(kept)
+        elif np.isnan(value) or np.isnan(last) or abs(value - last) > 0.006 * reach:
+            kept.append(k)
+    return np.array(kept, dtype=int)

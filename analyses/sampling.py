@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Tolerance
 
 _BITS = 32
+_SINGULAR = 1e-12  # what is left of a variance below this is rounding
 _HALF_STEP = 0.5**33  # keeps every coordinate off 0 and 1
 MOST_SAMPLES = 2**31
 BOX_SIGMA = 3.0  # half width of the tolerance box of a normal distribution, in standard deviations
@@ -157,10 +158,7 @@ class Sampler:
     def _root(self) -> np.ndarray | None:
         if np.array_equal(self.correlation, np.eye(len(self.factors))):
             return None
-        try:
-            return np.linalg.cholesky(self.correlation)
-        except np.linalg.LinAlgError as error:
-            raise InputError("the correlations contradict each other: no such distribution exists") from error
+        return semidefinite_root(self.correlation)
 
     def _correlated(self, points: np.ndarray) -> np.ndarray:
         """Uniform coordinates whose normal scores have the wanted correlation."""
@@ -193,6 +191,48 @@ class Sampler:
         return np.array(middle)
 
 
+def semidefinite_root(matrix: np.ndarray) -> np.ndarray:
+    """Lower triangular L with ``L L' = matrix``, for a matrix that may be singular.
+
+    Two parameters that are one (correlation 1 or -1) have a zero on the diagonal of L, so that the second
+    follows the first exactly.
+
+    Raises
+    ------
+    InputError
+        If the matrix is not positive semidefinite.
+
+    Examples
+    --------
+    >>> semidefinite_root(np.array([[1.0, -1.0], [-1.0, 1.0]])).tolist()
+    [[1.0, 0.0], [-1.0, 0.0]]
+    """
+    size = len(matrix)
+    root = np.zeros((size, size))
+    for j in range(size):
+        left = float(matrix[j, j] - sum(root[j, k] ** 2 for k in range(j)))
+        if left < -_SINGULAR:
+            raise InputError("the correlations contradict each other: no such distribution exists")
+        root[j, j] = np.sqrt(left) if left > _SINGULAR else 0.0
+        for i in range(j + 1, size):
+            rest = float(matrix[i, j] - sum(root[i, k] * root[j, k] for k in range(j)))
+            if root[j, j] > 0.0:
+                root[i, j] = rest / root[j, j]
+            elif abs(rest) > _SINGULAR**0.5:
+                raise InputError("the correlations contradict each other: no such distribution exists")
+    return root
+
+
+def correlation_of(design: Design, names: Sequence[str]) -> np.ndarray:
+    """The correlation matrix of some toleranced parameters of a design; pairs beyond them are left out."""
+    matrix = np.eye(len(names))
+    for pair in design.correlations:
+        if pair.first in names and pair.second in names:
+            i, j = names.index(pair.first), names.index(pair.second)
+            matrix[i, j] = matrix[j, i] = pair.coefficient
+    return matrix
+
+
 def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> Sampler:
     """The sampler of a design's tolerances and correlations; columns of a table replace tolerances.
 
@@ -214,16 +254,11 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     for factor in factors:
         _check_reach(factor, design.origin or None)
     names = [factor.path for factor in factors]
-    matrix = np.eye(len(names))
     for pair in design.correlations:
-        if taken & {pair.first, pair.second}:
-            continue
         for name in (pair.first, pair.second):
-            if name not in names:
+            if name not in names and not taken & {pair.first, pair.second}:
                 raise InputError(f"correlation of {name}: it has no tolerance", where=design.origin or None)
-        i, j = names.index(pair.first), names.index(pair.second)
-        matrix[i, j] = matrix[j, i] = pair.coefficient
-    return Sampler(factors, matrix, table, seed)
+    return Sampler(factors, correlation_of(design, names), table, seed)
 
 
 def _check_reach(factor: Factor, where: str | None) -> None:

@@ -9,20 +9,19 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from actuator_lti import load_design
+from actuator_lti.design.model import Design, Filter
 from benchmarks.c_simulator import CSimulator
 from benchmarks.control_cascade import seconds_per_second
 from benchmarks.row import Row
-from nonlinear import commands
+from nonlinear import Rows
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.call import call
-from nonlinear.batch import put_sine, repeat_row, run_rows
-from nonlinear.parameters import design_row
-from nonlinear.setup import Tables, put_signal
 
 GROUP = "simulator"
 DURATION_S = 10.0
@@ -51,6 +50,7 @@ def rows(quick: bool = False) -> Iterator[Row]:
         comparison=">=",
         note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
     )
+    yield from wider_drives(1 if quick else 5)
     yield two_threads(quick)
     yield from constant_cost(quick)
     yield from first_calls()
@@ -58,11 +58,16 @@ def rows(quick: bool = False) -> Iterator[Row]:
 
 def sawtooth_row() -> np.ndarray:
     """5 deg at 1 Hz with 4 N m on the baseline: stick, slip and saturation."""
-    row = design_row(load_design("ilr33-amber"))
-    row[at.TICKS] = round(DURATION_S / row[at.PERIOD])
-    row[at.LOAD] = 4.0
-    put_signal(row, at.COMMAND, commands.sine(np.radians(5.0), 1.0), Tables())
-    return row
+    return sawtooth().values[0]
+
+
+def sawtooth(design: Design | None = None) -> Rows:
+    """The same as one row of a batch, of the baseline or another drive."""
+    rows = Rows.of(design or load_design("ilr33-amber"))
+    rows["ticks"] = round(DURATION_S / rows.value("period"))
+    rows["load"] = 4.0
+    rows.sine("command", np.radians(5.0), 1.0)
+    return rows
 
 
 def numba_seconds(row: np.ndarray, repeats: int) -> float:
@@ -103,7 +108,7 @@ def against_c(row: np.ndarray, repeats: int) -> Row:
         name="time over that of C (-O3 -march=native), 10 s run",
         measured=float(here / there),
         unit="x",
-        target=1.3,
+        target=1.2,
         note=f"C: {1e9 * there / row[at.TICKS]:.1f} ns a tick",
     )
 
@@ -122,15 +127,38 @@ def against_control(best: float) -> Row:
     )
 
 
+def wider_drives(repeats: int) -> Iterator[Row]:
+    """Filters, energies and the tanh law, over the same run without them, in turns."""
+    base = load_design("ilr33-amber")
+    filters = (
+        Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=2000.0, depth=0.1),
+        Filter(kind="notch", frequency_rad_s=9000.0, width_rad_s=4000.0, depth=0.1),
+        Filter(kind="lowpass", frequency_rad_s=12_000.0),
+    )
+    velocity = replace(base.controller.velocity, filters=filters)
+    filtered = replace(base, controller=replace(base.controller, velocity=velocity))
+    smooth = replace(base, friction=replace(base.friction, law="tanh"))
+    cases = (
+        ("two notches and a low-pass", base, filtered, 0.0, 1.5),
+        ("energies, dry friction", base, base, 1.0, 2.0),
+        ("energies, tanh law", smooth, smooth, 1.0, 2.0),
+    )
+    for name, without, design, energy, target in cases:
+        plain, rows = sawtooth(without).values[0], sawtooth(design)
+        rows["with_energy"] = energy
+        pairs = [[numba_seconds(row, repeats) for row in (rows.values[0], plain)] for _ in range(4)]
+        measured, reference = np.array(pairs).min(axis=0)
+        name = f"time with {name}, over that without"
+        yield Row(group=GROUP, name=name, measured=float(measured / reference), unit="x", target=target)
+
+
 def two_threads(quick: bool) -> Row:
     """A batch of 1000 runs on two threads over one; and what two processes of plain arithmetic get here."""
-    row = sawtooth_row()
-    row[at.TICKS] = 2000 if quick else 20_000
-    batch = repeat_row(row, 1000)
-    put_sine(batch, at.COMMAND, np.linspace(0.001, 0.1, 1000), 3.0)
+    batch = sawtooth().repeat(1000)
+    batch["ticks"] = 2000 if quick else 20_000
+    batch.sine("command", np.linspace(0.001, 0.1, 1000), 3.0)
     pairs = [
-        [best_of(lambda n=n: run_rows(batch, threads=n), 1, time.perf_counter) for n in (1, 2)]
-        for _ in range(3)
+        [best_of(lambda n=n: batch.run(threads=n), 1, time.perf_counter) for n in (1, 2)] for _ in range(3)
     ]
     one, two = np.array(pairs).min(axis=0)
     return Row(

@@ -7,13 +7,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from nonlinear import commands, loads
     from nonlinear.batch import Reducers, Run, simulate_many
+    from nonlinear.drive import Drive
     from nonlinear.probe import Probe
+    from nonlinear.rows import LIMITERS, Rows
     from nonlinear.simulation import simulate
     from nonlinear.trajectory import State, Trajectory
 
 __all__ = [
+    "LIMITERS",
+    "Drive",
     "Probe",
     "Reducers",
+    "Rows",
     "Run",
     "State",
     "Trajectory",
@@ -24,8 +29,11 @@ __all__ = [
 ]
 
 _WHERE = {
+    "Drive": "nonlinear.drive",
+    "LIMITERS": "nonlinear.rows",
     "Probe": "nonlinear.probe",
     "Reducers": "nonlinear.batch",
+    "Rows": "nonlinear.rows",
     "Run": "nonlinear.batch",
     "State": "nonlinear.trajectory",
     "Trajectory": "nonlinear.trajectory",

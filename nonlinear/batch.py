@@ -1,14 +1,6 @@
 """Many runs at once over the cores: different designs, commands and parameters, reduced as they run.
 
-Two entries.  `simulate_many` takes `Run` objects.  `run_rows` takes an array of parameter rows, one a run,
-whose columns are the names of ``nonlinear._kernels.layout``; use it for thousands of runs::
-
-    rows = repeat_row(design_row(design), n)          # shape (n, layout.SIZE)
-    rows[:, layout.TICKS] = ticks
-    rows[:, layout.RESISTANCE] = samples              # any column may differ from run to run
-    put_sine(rows, layout.COMMAND, amplitude, frequency)
-    put_window(rows, ticks_of_window, cycles)
-    result = run_rows(rows)
+`simulate_many` takes `Run` objects; `nonlinear.rows.Rows` sets up thousands of runs by array arithmetic.
 
 Every run is done by the same compiled function as `nonlinear.simulate`, by one thread, from its own row: the
 numbers do not depend on the number of threads, nor on what else is in the batch.  A run needs no memory
@@ -163,7 +155,7 @@ def run_rows(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> BatchResult:
-    """Run parameter rows, shape (n, layout.SIZE); see the module's text.
+    """Run parameter rows, shape (n, layout.SIZE), of `nonlinear.rows.Rows`.
 
     Raises
     ------
@@ -220,48 +212,3 @@ def _spans(ticks: Floats, threads: int) -> list[tuple[int, int]]:
     cuts = np.unique(np.searchsorted(work, np.arange(size, work[-1], size), side="right"))
     edges = [0, *(int(c) for c in cuts if 0 < c < ticks.size), int(ticks.size)]
     return list(pairwise(edges))
-
-
-def repeat_row(row: Floats, n: int) -> Floats:
-    """The same row n times, to have columns changed."""
-    return np.tile(row, (n, 1))
-
-
-def put_sine(
-    rows: Floats,
-    place: int,
-    amplitude: npt.ArrayLike,
-    frequency_hz: npt.ArrayLike,
-    phase_rad: npt.ArrayLike = 0.0,
-) -> None:
-    """Write a sine into all rows: at ``layout.COMMAND``, ``layout.BIAS`` or `injection_place`."""
-    rows[:, place] = at.SINE
-    rows[:, place + 1], rows[:, place + 2] = amplitude, 0.0
-    rows[:, place + 3], rows[:, place + 4] = frequency_hz, phase_rad
-
-
-def put_ramp(rows: Floats, place: int, rate_rad_s: npt.ArrayLike) -> None:
-    """Write a ramp from t = 0 into all rows."""
-    rows[:, place] = at.RAMP
-    rows[:, place + 1], rows[:, place + 2], rows[:, place + 3] = rate_rad_s, 0.0, np.inf
-
-
-def put_step(rows: Floats, place: int, amplitude_rad: npt.ArrayLike, start_s: npt.ArrayLike = 0.0) -> None:
-    """Write a step into all rows."""
-    rows[:, place] = at.STEP
-    rows[:, place + 1], rows[:, place + 2] = amplitude_rad, start_s
-
-
-def put_window(rows: Floats, ticks: npt.ArrayLike, cycles: npt.ArrayLike, harmonics: int = 1) -> None:
-    """Write the reducers' window into all rows (`nonlinear.reduced.whole_periods` finds ticks and cycles)."""
-    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = ticks, cycles, harmonics
-
-
-def injection_place(point: str) -> int:
-    """Where the injected signal of a break point lies in a row."""
-    return at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE + at.PROBE_SIGNAL
-
-
-def probe_place(point: str) -> int:
-    """Where the probe of a break point lies in a row: add ``layout.PROBE_ON``, ``layout.PROBE_GAIN``."""
-    return at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE

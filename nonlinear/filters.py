@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from math import isfinite, pi, sqrt, tan
+from math import inf, pi
+from typing import Any
+
+import numpy as np
 
 from actuator_lti.design.model import Command, Filter
 from actuator_lti.errors import InputError
 
-Section = tuple[float, float, float, float, float]
+Section = tuple[Any, Any, Any, Any, Any]  # floats, or arrays stacked over designs
+Polynomial = tuple[Any, Any, Any]
 
 
-def tustin(b: tuple[float, float, float], a: tuple[float, float, float], w0: float, period_s: float) -> Section:
+def tustin(b: Polynomial, a: Polynomial, w0: Any, period_s: Any) -> Section:
     """``(b2 s^2 + b1 s + b0)/(a2 s^2 + a1 s + a0)`` sampled by ``s = c (z - 1)/(z + 1)``, exact at w0.
 
     ``c = w0/tan(w0 T/2)``; coefficients are those of falling powers of s.
     """
-    c = w0 / tan(0.5 * w0 * period_s)
+    c = w0 / np.tan(0.5 * w0 * period_s)
 
-    def sampled(q: tuple[float, float, float]) -> tuple[float, float, float]:
+    def sampled(q: Polynomial) -> Polynomial:
         square, slope, constant = q[0] * c * c, q[1] * c, q[2]
         return square + slope + constant, 2.0 * (constant - square), square - slope + constant
 
@@ -28,7 +32,7 @@ def tustin(b: tuple[float, float, float], a: tuple[float, float, float], w0: flo
     return b0 / a0, b1 / a0, b2 / a0, a1 / a0, a2 / a0
 
 
-def section(item: Filter, period_s: float, where: str = "") -> Section:
+def section(item: Filter, period_s: Any, where: str = "") -> Section:
     """The section of one filter of the velocity loop at its period.
 
     Raises
@@ -47,7 +51,7 @@ def section(item: Filter, period_s: float, where: str = "") -> Section:
         return _biquad(item, where)
     if item.kind == "leadlag":
         zero, pole = _given(item, "zero", where), _given(item, "pole", where)
-        w0 = _below_nyquist(sqrt(zero * pole), period_s, item.kind, where)
+        w0 = _below_nyquist(np.sqrt(zero * pole), period_s, item.kind, where)
         return tustin((0.0, 1.0 / zero, 1.0), (0.0, 1.0 / pole, 1.0), w0, period_s)
     w0 = _below_nyquist(_given(item, "frequency", where), period_s, item.kind, where)
     if item.kind == "notch":
@@ -58,31 +62,31 @@ def section(item: Filter, period_s: float, where: str = "") -> Section:
     return tustin((0.0, 0.0, w0 * w0), (1.0, 2.0 * item.damping * w0, w0 * w0), w0, period_s)
 
 
-def command_section(command: Command, period_s: float) -> Section:
-    """The command filter: first order ``y += T/(TF + T) (x - y)``, second order by backward differences.
+def command_section(command: Command, period_s: Any, where: str = "") -> Section:
+    """The command filter at the period of the outermost stage: a low-pass with w0 = 1/filter_time."""
+    w0 = 1.0 / command.filter_time_s
+    lowpass = Filter(
+        kind="lowpass", frequency_rad_s=w0, order=command.filter_order, damping=command.filter_damping
+    )
+    if np.any(w0 * np.asarray(period_s) >= pi):
+        message = f"command.filter_time = {np.min(command.filter_time_s):g} s"
+        raise InputError(f"{message}: must be above T/pi = {np.max(period_s) / pi:g} s", where=where)
+    return section(lowpass, period_s, where)
 
-    ``y = (x + (2 D q + 2 q^2) y1 - q^2 y2)/(1 + 2 D q + q^2)``, q = TF/T: stable for every time constant.
-    """
-    q = command.filter_time_s / period_s
-    if command.filter_order == 1:
-        return 1.0 / (1.0 + q), 0.0, 0.0, -q / (1.0 + q), 0.0
-    below = 1.0 + 2.0 * command.filter_damping * q + q * q
-    middle = -(2.0 * command.filter_damping * q + 2.0 * q * q) / below
-    return 1.0 / below, 0.0, 0.0, middle, q * q / below
 
-
-def _given(item: Filter, name: str, where: str) -> float:
+def _given(item: Filter, name: str, where: str) -> Any:
     value = getattr(item, f"{name}_rad_s")
-    if value is None or not (isfinite(value) and value > 0.0):
+    if value is None or not np.all((np.asarray(value) > 0.0) & (np.asarray(value) < inf)):
         message = f"control.velocity.filter: {name} = {value}: a {item.kind} needs one above zero"
         raise InputError(message, where=where)
-    return float(value)
+    return value
 
 
-def _below_nyquist(w0: float, period_s: float, kind: str, where: str) -> float:
-    if w0 >= pi / period_s:
-        message = f"control.velocity.filter: {kind} at {w0:g} rad/s: must be below pi/T = {pi / period_s:g}"
-        raise InputError(message, where=where)
+def _below_nyquist(w0: Any, period_s: Any, kind: str, where: str) -> Any:
+    nyquist = pi / np.asarray(period_s)
+    if np.any(w0 >= nyquist):
+        message = f"control.velocity.filter: {kind} at {np.max(w0):g} rad/s"
+        raise InputError(f"{message}: must be below pi/T = {np.min(nyquist):g}", where=where)
     return w0
 
 

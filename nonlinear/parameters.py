@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from math import ceil, floor, inf
-from typing import get_args
+from math import inf
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.filters import command_section, section
+from nonlinear.filters import Section, command_section, section
 
 Floats = npt.NDArray[np.float64]
 
@@ -23,38 +23,47 @@ ANTI_WINDUP = get_args(AntiWindup)  # in the order of the kernel's numbers
 SPEED_SOURCES = get_args(SpeedSource)
 
 
-def split_delay(delay_s: float, period_s: float) -> tuple[int, float]:
+def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     """Whole ticks and the rest in seconds of a computing delay; a rest below 1e-9 of a tick is none.
 
     Examples
     --------
     >>> split_delay(3e-4, 1e-4)
-    (3, 0.0)
+    (3.0, 0.0)
     """
-    whole = floor(delay_s / period_s + 1e-9)
+    whole = np.floor(delay_s / period_s + 1e-9)
     rest = delay_s - whole * period_s
-    return (whole, 0.0) if abs(rest) < 1e-9 * period_s else (whole, rest)
+    return whole[()], np.where(np.abs(rest) < 1e-9 * period_s, 0.0, rest)[()]
 
 
 def design_row(
     design: Design, *, friction_on: bool = True, limits_on: bool = True, kind: type = float
+) -> Floats:
+    """The one row of a design, see `design_rows`."""
+    return design_rows(design, 1, friction_on=friction_on, limits_on=limits_on, kind=kind)[0]
+
+
+def design_rows(
+    design: Design, count: int, *, friction_on: bool = True, limits_on: bool = True, kind: type = float
 ) -> Floats:
     """Parameters of the plant, the controllers and the limits of a design, at rest, without command or load.
 
     Parameters
     ----------
     design : Design
+        One design, or one stacked over ``count``: with arrays of shape (count,) for some of its numbers
+        (`actuator_lti.design.access.stacked`); which stages there are is the same in all.
     friction_on : bool
         ``False`` leaves out the dry friction (C0, CM) and the offset torque; viscous friction stays, so that
         the drive without limits is a linear loop.
     limits_on : bool
         ``False`` takes speed, acceleration, peak current and voltage as unlimited.
     kind : type
-        ``object`` keeps what the values of a stacked design are; `nonlinear.export` follows them so.
+        ``object`` keeps values that are no floats as they are; `nonlinear.export` follows a design's keys so.
 
     Returns
     -------
-    ndarray, shape (layout.SIZE,)
+    ndarray, shape (count, layout.SIZE)
         SI, motor side; the places are the names of ``nonlinear._kernels.layout``.
 
     Raises
@@ -62,7 +71,8 @@ def design_row(
     InputError
         If the stages of the design do not fit together.
     """
-    row = np.zeros(at.SIZE, dtype=kind)
+    rows = np.zeros((count, at.SIZE), dtype=kind)
+    row = rows.T  # a place of it is a column
     _plant(design, row)
     _friction(design, row, friction_on)
     _controllers(design, row)
@@ -72,12 +82,12 @@ def design_row(
     _instruments(design, row)
     _limits(design, row, limits_on)
     row[at.MAX_EVENTS] = MAX_EVENTS_PER_TICK
-    row[at.RECORD_EVERY] = 1
+    row[at.RECORD_EVERY] = row[at.CYCLES] = row[at.HARMONICS] = 1
     row[at.TANH_TOLERANCE] = TANH_TOLERANCE
     row[at.TANH_LEVEL] = -1.0
     for point in range(4):
         row[at.PROBES + point * at.PROBE_SIZE + at.PROBE_GAIN] = 1.0
-    return row
+    return rows
 
 
 def _plant(design: Design, row: Floats) -> None:
@@ -115,7 +125,7 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
     row[at.DRY], row[at.DRY_REVERSE] = friction.dry_Nm(0.0, 1), friction.dry_Nm(0.0, -1)
     row[at.LOAD_COEFFICIENT] = friction.load_coefficient
     row[at.OFFSET] = friction.offset_torque_Nm
-    if friction.breakaway_ratio < 1.0:
+    if np.any(np.asarray(friction.breakaway_ratio) < 1.0):
         message = f"friction.breakaway_ratio = {friction.breakaway_ratio}: must be at least 1"
         raise InputError(message, where=design.name)
 
@@ -140,12 +150,13 @@ def _controllers(design: Design, row: Floats) -> None:
     velocity, current = controller.velocity, controller.current
     if velocity is not None:
         row[at.HAS_VELOCITY], row[at.EVERY_VELOCITY] = 1.0, velocity.every
+        row[at.SPEED_SENSOR] = velocity.sensor == "output"
         _regulator(row, at.VELOCITY_GAIN, at.VELOCITY_WINDUP, velocity.gain, velocity, velocity.every * Ts)
         for place in ("speed", "torque"):
             _filters(design, row, place, velocity.every * Ts)
     _encoder(design, row, row[at.EVERY_VELOCITY] * Ts)
     if current is not None:
-        if row[at.SOURCE]:
+        if row[at.SOURCE].any():
             message = "control.current: an ideal torque source has no current to control"
             raise InputError(message, where=design.name)
         row[at.HAS_CURRENT] = 1.0
@@ -156,7 +167,7 @@ def _controllers(design: Design, row: Floats) -> None:
 
 
 def _regulator(
-    row: Floats, gain_at: int, windup_at: int, gain: float, loop: VelocityLoop | CurrentLoop, T: float
+    row: Floats, gain_at: int, windup_at: int, gain: float, loop: VelocityLoop | CurrentLoop, T: Any
 ) -> None:
     """Gain, Kp T/Tn and anti-windup of a PI; T/Tt of the back-calculation is T/Tn where Tt is not given."""
     row[gain_at] = gain
@@ -167,7 +178,7 @@ def _regulator(
     row[windup_at + 1] = T / (loop.integral_time_s if loop.tracking_time_s is None else loop.tracking_time_s)
 
 
-def _filters(design: Design, row: Floats, place: FilterPlace, period_s: float) -> None:
+def _filters(design: Design, row: Floats, place: FilterPlace, period_s: Any) -> None:
     count_at, chain_at = {
         "speed": (at.SPEED_FILTERS, at.SPEED_CHAIN),
         "torque": (at.TORQUE_FILTERS, at.TORQUE_CHAIN),
@@ -179,8 +190,12 @@ def _filters(design: Design, row: Floats, place: FilterPlace, period_s: float) -
         raise InputError(message, where=design.name)
     row[count_at] = len(chosen)
     for k, item in enumerate(chosen):
-        begin = chain_at + k * at.SECTION
-        row[begin : begin + at.SECTION] = section(item, period_s, where=design.name)
+        _put_section(row, chain_at + k * at.SECTION, section(item, period_s, where=design.name))
+
+
+def _put_section(row: Floats, begin: int, numbers: Section) -> None:
+    for k, number in enumerate(numbers):
+        row[begin + k] = number
 
 
 def _position(design: Design, row: Floats) -> None:
@@ -195,24 +210,23 @@ def _position(design: Design, row: Floats) -> None:
     row[at.DERIVATIVE] = loop.gain * loop.derivative_time_s
     row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
     row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
-    row[at.ACCELERATION_FEEDFORWARD] = loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+    row[at.ACCELERATION_FEEDFORWARD] = (
+        loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+    )
     if loop.sensor == "output":
         row[at.OUTPUT_SENSOR] = 1.0
         quantum = design.output_quantum_rad
         row[at.POSITION_COUNTS] = 0.0 if quantum is None else 1.0 / quantum
 
 
-def _torque_gain(row: Floats) -> float:
+def _torque_gain(row: Floats) -> Floats:
     """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
-    gain: float = row[at.TORQUE_CONSTANT]
-    if row[at.SOURCE]:
-        gain = row[at.SOURCE_GAIN]
-    elif not row[at.HAS_CURRENT]:
-        gain = row[at.TORQUE_CONSTANT] / row[at.RESISTANCE]
-    return gain
+    if row[at.SOURCE].any():
+        return row[at.SOURCE_GAIN]
+    return row[at.TORQUE_CONSTANT] / (1.0 if row[at.HAS_CURRENT].any() else row[at.RESISTANCE])
 
 
-def _encoder(design: Design, row: Floats, period_s: float) -> None:
+def _encoder(design: Design, row: Floats, period_s: Any) -> None:
     encoder = design.encoder
     row[at.FILTER_COEFFICIENT] = period_s / (encoder.filter_time_s + period_s)
     row[at.SPEED_SOURCE] = SPEED_SOURCES.index(encoder.speed)
@@ -225,8 +239,10 @@ def _encoder(design: Design, row: Floats, period_s: float) -> None:
     else:
         w0T = encoder.bandwidth_rad_s * period_s
         row[at.TRACKING_ANGLE], row[at.TRACKING_SPEED] = 2.0 * w0T, w0T * encoder.bandwidth_rad_s
-    quantum = design.angle_quantum_rad
-    row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / quantum
+    quantum, ratio = design.angle_quantum_rad, 1.0
+    if row[at.SPEED_SENSOR].any():
+        quantum, ratio = design.output_quantum_rad, design.total_ratio
+    row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / (quantum * ratio)
 
 
 def _command(design: Design, row: Floats) -> None:
@@ -234,26 +250,26 @@ def _command(design: Design, row: Floats) -> None:
     command, control = design.command, design.controller
     outermost = control.outermost
     period = row[at.PERIOD] * (row[at.EVERY_POSITION] if control.position else row[at.EVERY_VELOCITY])
-    limits = [command.rate_rad_s, command.acceleration_rad_s2, command.jerk_rad_s3]
-    if outermost in ("current", "voltage") and min(limits) < inf:
+    limits: list[Any] = [command.rate_rad_s, command.acceleration_rad_s2, command.jerk_rad_s3]
+    limited = any(np.min(limit) < inf for limit in limits)
+    if outermost in ("current", "voltage") and limited:
         message = f"command: rate, acceleration and jerk need a position or a velocity loop, not {outermost}"
         raise InputError(message, where=design.name)
     # a speed command is limited itself where an angle's first derivative is
     ranges = [inf, *limits] if outermost == "position" else [*limits, inf]
     row[at.PROFILE_RANGE], row[at.PROFILE_RATE], row[at.PROFILE_ACCELERATION] = ranges[:3]
-    row[at.PROFILED] = min(limits) < inf
-    if ranges[3] < inf:
-        if ranges[2] == inf:
+    row[at.PROFILED] = limited
+    if np.min(ranges[3]) < inf:
+        if np.max(ranges[2]) == inf:
             raise InputError("command.jerk: needs command.acceleration as well", where=design.name)
-        samples = ceil(2.0 * ranges[2] / (ranges[3] * period) - 1e-9)
-        if samples > LONGEST_AVERAGE:
-            message = f"command.jerk = {ranges[3]:g}: asks for a mean over {samples} samples"
+        samples = np.ceil(2.0 * ranges[2] / (ranges[3] * period) - 1e-9)
+        if np.max(samples) > LONGEST_AVERAGE:
+            message = f"command.jerk = {np.min(ranges[3]):g}: a mean over {np.max(samples):.0f} samples"
             raise InputError(f"{message}; at most {LONGEST_AVERAGE} fit", where=design.name)
-        row[at.PROFILE_SAMPLES] = max(samples, 1)
-    if command.filter_time_s > 0.0:
+        row[at.PROFILE_SAMPLES] = np.maximum(samples, 1.0)
+    if np.any(np.asarray(command.filter_time_s) > 0.0):
         row[at.COMMAND_FILTERS] = 1
-        lowpass = command_section(command, period)
-        row[at.COMMAND_CHAIN : at.COMMAND_CHAIN + at.SECTION] = lowpass
+        _put_section(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
 
 
 def _supply(design: Design, row: Floats) -> None:
@@ -290,7 +306,7 @@ def _limits(design: Design, row: Floats, limits_on: bool) -> None:
         return
     tau = limits.overload_time_s
     if tau is not None:
-        if not row[at.HAS_CURRENT]:
+        if not row[at.HAS_CURRENT].any():
             raise InputError("limits.peak_time: needs a current loop", where=design.name)
         row[at.OVERLOAD], row[at.OVERLOAD_RATE] = 1.0, row[at.PERIOD] / tau
         row[at.OVERLOAD_RELEASE], row[at.CONTINUOUS_CURRENT] = limits.release, limits.continuous_current_A

@@ -12,6 +12,8 @@ from nonlinear._kernels import layout as at
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
+COLUMNS = {name.lower(): place for name, place in vars(at).items() if name in at.COLUMN_NAMES}
+"""The columns of a row by name: every parameter of ``_kernels.layout`` in small letters."""
 
 
 def whole_periods(
@@ -73,6 +75,20 @@ class BatchResult:
         """Which runs reached their end."""
         return self.status == at.OK
 
+    def column(self, name: str) -> Floats:
+        """A column of the parameters, by its name in `COLUMNS`."""
+        return self.rows[:, COLUMNS[name]]
+
+    def part(self, which: np.ndarray | slice) -> BatchResult:
+        """Some of the runs."""
+        return BatchResult(rows=self.rows[which], outs=self.outs[which], status=self.status[which])
+
+    def with_part(self, which: np.ndarray, other: BatchResult) -> BatchResult:
+        """The same with some runs taken from another result."""
+        rows, outs, status = self.rows.copy(), self.outs.copy(), self.status.copy()
+        rows[which], outs[which], status[which] = other.rows, other.outs, other.status
+        return BatchResult(rows=rows, outs=outs, status=status)
+
     @property
     def events(self) -> npt.NDArray[np.int64]:
         """Landings, breakaways and reversals of each run."""
@@ -82,6 +98,11 @@ class BatchResult:
     def stick_fraction(self) -> Floats:
         """Fraction of ticks that began at rest."""
         return self.outs[:, at.OUT_STICK_TICKS] / self.rows[:, at.TICKS]
+
+    @property
+    def final_motor_angle_rad(self) -> Floats:
+        """Motor angle after the last tick."""
+        return self.outs[:, at.OUT_ANGLE]
 
     @property
     def final_output_rad(self) -> Floats:

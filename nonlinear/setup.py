@@ -40,6 +40,13 @@ class Tables:
             self.known[id(key)] = place
         return place
 
+    def append(self, other: Tables) -> int:
+        """Append all series of another set; returns where they begin."""
+        base = self.size
+        self.parts.extend(other.parts)
+        self.size += other.size
+        return base
+
     def joined(self) -> Floats:
         """One array for the kernel."""
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
@@ -64,11 +71,14 @@ def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> Non
 
 
 def check_frequency(design: Design, command: Command) -> None:
-    """Refuse a command that the position loop, sampled every n_p ticks, cannot follow in principle."""
-    nyquist = 0.5 / (design.controller.period_s * design.controller.position_loop.every)
+    """Refuse a command that the outermost loop, sampled every so many ticks, cannot follow in principle."""
+    control = design.controller
+    loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
+    nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
-        raise InputError(f"{message} of the position loop, {nyquist:g} Hz", where=design.name)
+        stage = "the drive" if loop is None else f"the {control.outermost} loop"
+        raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)
 
 
 def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
@@ -107,10 +117,8 @@ def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
 
 
 def _check_point(row: Floats, point: str) -> None:
-    missing = (point == "w_ref" and not row[at.HAS_VELOCITY]) or (
-        point == "i_ref" and not row[at.HAS_CURRENT]
-    )
-    if missing:
+    stages = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}
+    if point in stages and not row[stages[point]]:
         raise InputError(f"probe point = {point!r}: this design has no such stage")
 
 

@@ -67,8 +67,7 @@ def simulate(
     duration_s : float
         Rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
     load_Nm : float or LoadMoment
-        Hinge moment at the output shaft, held over each tick.  The slope in the design file is not added by
-        itself: pass ``loads.proportional(design.load.moment_slope_Nm_rad)``.
+        Hinge moment at the output shaft, held over each tick; slope and gravity of the design add to it.
     bias : Command, optional
         Motion added under the command, in the same unit.
     probes : sequence of Probe
@@ -80,7 +79,7 @@ def simulate(
     friction_on, limits_on : bool
         ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
     energy : bool
-        Integrate the energies (some ten times slower).
+        Integrate the energies (at most some twice as slow).
     record_every : int
         Keep every so many rows.
     tanh_tolerance : float

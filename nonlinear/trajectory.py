@@ -130,8 +130,8 @@ class Trajectory:
     Attributes
     ----------
     limit_flags : ndarray of uint8
-        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32 limit in
-        front of the torque filters, 64 overload protection, 128 profile of the command.
+        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32
+        limit in front of the torque filters, 64 overload protection, 128 profile of the command.
     limits : mapping
         `LimitUse` by name: speed, acceleration, current, voltage; torque-command, overload and profile where
         the design has them.
@@ -189,6 +189,16 @@ class Trajectory:
         """Rows in which a limiter acts."""
         return (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
 
+    @property
+    def at_rest(self) -> npt.NDArray[np.bool_]:
+        """Rows in which the rotor stands still."""
+        return (self.limit_flags & at.FLAG_STICK) != 0
+
+    @property
+    def limited(self) -> npt.NDArray[np.bool_]:
+        """Rows in which any limiter acts."""
+        return (self.limit_flags & ~np.uint8(at.FLAG_STICK)) != 0
+
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
         names = (
@@ -206,7 +216,7 @@ class Trajectory:
         out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
         for name in self.limits:
             out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
-        out["at_rest"] = (self.limit_flags & at.FLAG_STICK) != 0
+        out["at_rest"] = self.at_rest
         for record in self.probes.values():
             out[f"probe_{record.point}_before"], out[f"probe_{record.point}_after"] = (
                 record.before,

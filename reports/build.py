@@ -14,6 +14,7 @@ from reports import document as doc
 
 if TYPE_CHECKING:
     from analyses.isolation import Missing
+    from analyses.loop_figures import LoopFigures
     from analyses.loop_survey import LoopSurvey
     from analyses.requirements import RequirementVerdict
 
@@ -48,10 +49,11 @@ def design_report(
     from actuator_lti.design import design_hash, warnings_of
     from analyses.isolation import isolated
     from reports.provenance import provenance
+    from reports.sections import answer
 
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
-        loops = _loops(design, progress)
+        figures, loops = _loops(design, progress)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
         *notices(missing, "linear"),
@@ -59,8 +61,11 @@ def design_report(
         *first,
         *loops[1:],
         *(part for part in validation if part not in first),
-        *closing_sections(design, head, origin, warnings_of(design)),
+        *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
+    if loops:
+        items = [item for block in doc.walk(loops[0]) for item in block.get("items", ())]
+        sections.insert(0, answer.section(figures, items, sections))
     return doc.document(
         title=design.title or design.name,
         subtitle=design.description,
@@ -70,7 +75,7 @@ def design_report(
     )
 
 
-def _loops(design: Design, progress: Progress | None) -> list[doc.Section]:
+def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, LoopFigures], list[doc.Section]]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
     from analyses.isolation import attempt
     from analyses.loop_survey import survey_loops
@@ -78,9 +83,9 @@ def _loops(design: Design, progress: Progress | None) -> list[doc.Section]:
 
     survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
     if survey is None:
-        return []
+        return {}, []
     verdicts = attempt("requirements", lambda: evaluate_requirements(design, survey.figures), ())
-    return loop_sections(survey, verdicts)
+    return survey.figures, loop_sections(survey, verdicts)
 
 
 def validation_sections(
@@ -152,12 +157,18 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
 
 
 def closing_sections(
-    design: Design, head: Mapping[str, Any], origin: Mapping[str, Any], warnings: Sequence[str]
+    design: Design,
+    head: Mapping[str, Any],
+    origin: Mapping[str, Any],
+    warnings: Sequence[str],
+    *,
+    checked: bool = True,
 ) -> list[doc.Section]:
-    """Make the sections that every report of a design ends with."""
-    from reports.sections import parameters, provenance
+    """Make the sections that every report of a design ends with; ``checked``: by simulation too."""
+    from reports.sections import answer, parameters, provenance
 
-    return [parameters.section(design, warnings), provenance.section(head, origin)]
+    findings = () if checked else (answer.unchecked(),)
+    return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
 
 
 def design_head(design: Design) -> dict[str, Any]:
@@ -172,7 +183,7 @@ def design_head(design: Design) -> dict[str, Any]:
 
 
 def write_report(
-    made: Mapping[str, Any], folder: str | Path, *, processes: int = 1, progress: Progress | None = None
+    made: Mapping[str, Any], folder: str | Path, *, progress: Progress | None = None
 ) -> tuple[Path, Path]:
     """Write ``report.html`` and ``report.json``; both or neither.
 
@@ -184,7 +195,7 @@ def write_report(
     from reports.html import page
 
     content = doc.dumps(made)
-    html = page(doc.loads(content), processes=processes, progress=progress)
+    html = page(doc.loads(content), progress=progress)
     paths = (Path(folder) / "report.html", Path(folder) / "report.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths

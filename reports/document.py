@@ -16,7 +16,10 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
+from reports.certain import certain
 from reports.document_schema import SCHEMA, VERSION, validate
+from reports.findings import Finding
+from reports.findings import plain as plain_findings
 from reports.verdict_summary import summary
 
 Block = dict[str, Any]
@@ -66,7 +69,7 @@ def column(
     ----------
     format : str
         ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
-        ``"fix:1"`` (decimals) or ``"yesno"``.
+        ``"fix:1"`` (decimals), ``"int"`` (a count) or ``"yesno"``.
     """
     side = align or ("left" if format in ("text", "yesno") else "right")
     return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
@@ -163,10 +166,30 @@ def details(title: str, blocks: Sequence[Block]) -> Block:
 
 
 def section(
-    id: str, title: str, blocks: Sequence[Block], *, intro: str = "", status: str = "info"
+    id: str,
+    title: str,
+    blocks: Sequence[Block],
+    *,
+    result: str = "",
+    intro: str = "",
+    status: str = "info",
+    findings: Iterable[Finding] = (),
 ) -> Section:
-    """Make a section; ``id`` is its anchor."""
-    return {"id": id, "title": title, "intro": intro, "status": status, "blocks": list(blocks)}
+    """Make a section.
+
+    Parameters
+    ----------
+    id : str
+        Its anchor.
+    result : str
+        One sentence that says what was found; it comes first.
+    intro : str
+        How it was found.
+    findings : iterable of Finding
+        What the first screen has to say of it.
+    """
+    made = {"id": id, "title": title, "result": result, "intro": intro, "status": status}
+    return {**made, "blocks": list(blocks), "findings": plain_findings(findings)}
 
 
 def document(
@@ -178,7 +201,10 @@ def document(
     sections: Sequence[Section],
     kind: str = "report",
 ) -> dict[str, Any]:
-    """Put a document together; its verdict counts every verdict in its sections."""
+    """Put a document together; its verdict counts every verdict in its sections.
+
+    Numbers are rounded to the digits that are the same on every machine (`reports.certain`).
+    """
     made = {
         "schema": SCHEMA,
         "version": VERSION,
@@ -188,7 +214,7 @@ def document(
         "design": plain(design),
         "provenance": plain(provenance),
         "verdict": summary(block for part in sections for block in walk(part)),
-        "sections": list(sections),
+        "sections": [certain(part) for part in sections],
     }
     check(made)
     return made

@@ -46,7 +46,7 @@ class Column(_Part):
     label: str
     unit: str
     align: Literal["left", "right", "center"]
-    format: Annotated[str, Field(pattern=r"^(text|yesno|(sig|short|fix):1?[0-9])$")]
+    format: Annotated[str, Field(pattern=r"^(text|yesno|int|(sig|short|fix):1?[0-9])$")]
 
 
 class TableBlock(_Part):
@@ -123,8 +123,49 @@ class DetailsBlock(_Part):
     blocks: list[Block]
 
 
+class GlanceFigure(_Part):
+    """One figure of a loop on the first screen, with the limit that is nearest to it."""
+
+    label: str
+    value: Scalar
+    unit: str
+    format: str
+    limit: float | None
+    comparison: str
+    distance: float | None
+    passed: bool | None
+
+
+class GlanceLoop(_Part):
+    """One loop on the first screen."""
+
+    loop: str
+    anchor: str
+    stable: Cell
+    figures: list[GlanceFigure]
+
+
+class FindingItem(_Part):
+    """One sentence that a reader must know."""
+
+    severity: Literal["fail", "warn", "info"]
+    text: str
+    where: str
+
+
+class GlanceBlock(_Part):
+    """The first screen."""
+
+    kind: Literal["glance"]
+    loops: list[GlanceLoop]
+    weakest: dict[str, Scalar] | None
+    findings: list[FindingItem]
+    more: int
+
+
 Block = Annotated[
-    TableBlock | FigureBlock | TextBlock | FactsBlock | VerdictsBlock | DetailsBlock, Discriminator("kind")
+    TableBlock | FigureBlock | TextBlock | FactsBlock | VerdictsBlock | DetailsBlock | GlanceBlock,
+    Discriminator("kind"),
 ]
 
 
@@ -133,8 +174,10 @@ class SectionPart(_Part):
 
     id: Annotated[str, Field(min_length=1)]
     title: str
+    result: str = ""
     intro: str
     status: Status
+    findings: list[FindingItem] = Field(default_factory=list)
     blocks: list[Block]
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import html
 import itertools
-import re
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -23,7 +21,7 @@ from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
 from reports.verdict_summary import verdict_lines
 
-SMALLEST, LARGEST = 0.92, 1.35  # pixels for a point of a figure: text stays between 8 and 12 pixels
+LONG_TABLE = 13  # rows; longer tables fold
 KICKERS = {"report": "Loop analysis report"}
 
 
@@ -31,7 +29,6 @@ def page(
     made: Mapping[str, Any],
     *,
     template: str = "report.html",
-    processes: int = 1,
     progress: Progress | None = None,
 ) -> str:
     """Make the page of a document.
@@ -42,16 +39,14 @@ def page(
         A document of `reports.document`.
     template : str
         The template that lays it out; it gets the document as ``doc``.
-    processes : int
-        How many processes draw the figures; the page does not depend on it.
     progress : callable, optional
         Called with (figures drawn, figures in all).
     """
     blocks = figures(made)
-    drawings = dict(zip(map(id, blocks), draw_all(blocks, processes, progress), strict=True))
+    drawings = dict(zip(map(id, blocks), draw_all(blocks, progress), strict=True))
 
     def drawn(block: Mapping[str, Any]) -> Markup:
-        return _labelled(drawings[id(block)], block["alt"])
+        return Markup(drawings[id(block)])
 
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
     return render(template, doc=made, drawn=drawn, kicker=kicker)
@@ -65,9 +60,10 @@ def render(template: str, **context: Any) -> str:
         .get_template(template)
         .render(
             stylesheet=Markup(asset("style.css")),
-            script=Markup(asset("page.js")),
-            security_policy=security_policy(asset("page.js")),
+            script=Markup(script()),
+            security_policy=security_policy(script()),
             verdict_lines=verdict_lines,
+            LONG_TABLE=LONG_TABLE,
             unique=lambda letter: f"{letter}{next(counter)}",
             **context,
         )
@@ -96,6 +92,12 @@ def asset(name: str) -> str:
     return source
 
 
+@cache
+def script() -> str:
+    """Give the one script of every page: folds and printing, then the live figures."""
+    return asset("page.js") + asset("live.js")
+
+
 def security_policy(*scripts: str) -> str:
     """Give the page's content security policy: no request at all, and only these scripts run."""
     hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
@@ -113,13 +115,3 @@ def show_signed(value: float | None, digits: int = 3) -> str:
 
 def _sha256(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-
-
-def _labelled(svg: str, alt: str) -> Markup:
-    """Give a figure the text that stands for it where it cannot be seen, and the bounds of its width."""
-    box = re.search(r'viewBox="0 0 ([\d.]+) ', svg)
-    width = float(box.group(1)) if box else 600.0
-    bounds = f"min-width:{SMALLEST * width:.0f}px;max-width:{LARGEST * width:.0f}px"
-    return Markup(
-        svg.replace("<svg ", f'<svg role="img" aria-label="{html.escape(alt)}" style="{bounds}" ', 1)
-    )

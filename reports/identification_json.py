@@ -6,11 +6,14 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from analyses.campaign_design import CampaignSuggestion
     from analyses.identification.campaign import CampaignResult
     from analyses.identification.contributions import Contribution
+    from analyses.identification.verdict import Item
+    from analyses.records.record import Record
 
 
 def campaign_json(
@@ -18,6 +21,8 @@ def campaign_json(
     shares: Sequence[Contribution],
     suggestion: CampaignSuggestion | None,
     at: dict[str, float],
+    items: Sequence[Item] = (),
+    written: Path | None = None,
 ) -> dict[str, Any]:
     """Give everything that `identify` found, in SI.
 
@@ -34,6 +39,13 @@ def campaign_json(
         "runs_used": len(fit.points),
         "set_aside": [asdict(run) for run in result.set_aside],
         "outliers": [asdict(run) for run in fit.outliers],
+        "contradicting": [asdict(run) for run in result.contradicting],
+        "checks": items_json(items),
+        "passed": all(item.passed is not False for item in items),
+        "design": None if written is None else str(written),
+        "held": dict(fit.held),
+        "relative_residual": fit.relative_residual,
+        "inputs": campaign_inputs(result),
         "rows_in": result.imported.rows_in,
         "rows_out": result.imported.rows_out,
         "criterion": str(result.criterion),
@@ -64,3 +76,22 @@ def campaign_json(
             for p in fit.points
         ],
     }
+
+
+def items_json(items: Sequence[Item]) -> list[dict[str, Any]]:
+    """The verdict, item by item; values and limits as shares."""
+    return [asdict(item) for item in items]
+
+
+def campaign_inputs(result: CampaignResult) -> list[dict[str, Any]]:
+    """The account of the columns of a campaign's files."""
+    from reports.sections.identification_inputs import campaign_rows
+
+    return [{k: v for k, v in row.items() if k != "_status"} for row in campaign_rows(result)]
+
+
+def inputs_json(record: Record, used: Mapping[str, str]) -> list[dict[str, Any]]:
+    """The account of a record's columns."""
+    from reports.sections.identification_inputs import input_rows
+
+    return [{k: v for k, v in row.items() if k != "_status"} for row in input_rows(record, used)]

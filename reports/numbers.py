@@ -24,6 +24,8 @@ def show(value: Any, format: str = "text") -> str:
     if isinstance(value, str):
         return value
     kind, _, digits = format.partition(":")
+    if kind == "int":
+        return to_minus(f"{value:.0f}")
     if kind == "fix":
         return fixed(value, int(digits))
     if kind == "sig":
@@ -34,7 +36,7 @@ def show(value: Any, format: str = "text") -> str:
 def fixed(value: float, decimals: int) -> str:
     """Write a number with so many decimals."""
     text = f"{value:.{decimals}f}"
-    return _minus(text.lstrip("-") if float(text) == 0 else text)
+    return to_minus(text.lstrip("-") if float(text) == 0 else text)
 
 
 def short(value: float, digits: int = 4) -> str:
@@ -49,9 +51,9 @@ def significant(value: float, digits: int = 3) -> str:
         return "0"
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if -4 <= exponent < 6:
-        return _minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")
+        return to_minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    return _minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
+    return to_minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
 
 
 def seconds(value: float) -> str:
@@ -73,6 +75,34 @@ def time_unit(span_s: float) -> tuple[float, str]:
     return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
 
 
-def _minus(text: str) -> str:
+def plain_decade(value: float) -> str:
+    """Write a tick such as 0.1, 10, 1k.
+
+    Examples
+    --------
+    >>> plain_decade(0.01), plain_decade(100.0), plain_decade(2e4), plain_decade(1e-6)
+    ('0.01', '100', '20k', '10⁻⁶')
+    """
+    for scale, letter in ((1e6, "M"), (1e3, "k")):
+        if scale <= value < 1e9:
+            return f"{value / scale:.6g}{letter}"
+    if 1e-4 <= value < 1e9:
+        return f"{value:.6g}"
+    words = short(value, 2)
+    return words[2:] if words.startswith("1×") else words
+
+
+def hertz(value: float) -> str:
+    """Write a frequency with its unit.
+
+    Examples
+    --------
+    >>> hertz(88.457), hertz(1909.4)
+    ('88.5 Hz', '1.91 kHz')
+    """
+    return f"{short(value / 1e3, 3)} kHz" if value >= 1e3 else f"{short(value, 3)} Hz"
+
+
+def to_minus(text: str) -> str:
     """Use the minus sign of typography."""
     return text.replace("-", "−")

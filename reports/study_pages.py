@@ -35,13 +35,13 @@ def study_document(
 
 
 def write_pages(
-    made: Mapping[str, Any], folder: Path, stem: str, *, processes: int = 1, progress: Progress | None = None
+    made: Mapping[str, Any], folder: Path, stem: str, *, progress: Progress | None = None
 ) -> tuple[Path, Path]:
     """Write ``<stem>.html`` and ``<stem>.json``."""
     from reports.html import page
 
     content = doc.dumps(made)
-    html = page(doc.loads(content), processes=processes, progress=progress)
+    html = page(doc.loads(content), progress=progress)
     paths = (folder / f"{stem}.html", folder / f"{stem}.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths

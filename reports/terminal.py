@@ -78,7 +78,7 @@ def _label(column: Mapping[str, Any]) -> str:
 
 def verdict_table(block: Mapping[str, Any]) -> Table:
     """Lay verdicts out."""
-    made = _empty("Requirements")
+    made = _empty(block.get("what", "requirements").capitalize())
     for label in ("Requirement", "Verdict"):
         made.add_column(label)
     for label in ("Found", "Limit", "Distance"):

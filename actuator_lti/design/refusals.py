@@ -37,7 +37,15 @@ def validated(tree: dict[str, Any], where: str) -> Any:
 
 
 def _line(finding: Any, tree: dict[str, Any]) -> str:
-    location = [part for part in finding["loc"] if isinstance(part, int) or "[" not in part]
+    steps, last = finding["loc"], len(finding["loc"]) - 1
+    unknown = (
+        finding["type"] == "extra_forbidden"
+    )  # then the last step is a key as written, whatever it holds
+    location = [
+        part
+        for k, part in enumerate(steps)
+        if isinstance(part, int) or "[" not in part or (unknown and k == last)
+    ]
     location = [part for part in location if part not in ("RawTolerance", "str", "int", "float")]
     path = _dotted(location, tree)
     kind, given = finding["type"], shown(finding.get("input"))

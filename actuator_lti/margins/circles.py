@@ -21,7 +21,6 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 NEAR_AXIS = 0.1
-_APART = 6.0  # shifts of a careful search lie this factor apart
 _DEGENERATE = 1e-9
 
 
@@ -83,6 +82,8 @@ class ShiftedLoop:
 
     def _zeros(self, H: Real, B: Real, C: Real, D: float) -> Complex:
         H -= (B / D)[:, None] * C
+        if not np.isfinite(H).all():
+            raise NumericalError("the Hamiltonian matrix overflows: rescale the loop")
         re, im, _, _, info = dgeev(H, compute_vl=0, compute_vr=0, overwrite_a=1)
         if info:
             raise NumericalError(
@@ -128,15 +129,11 @@ class Circles:
         At least one state.
     poles : array (n,), complex
         Eigenvalues of A, to keep the shift away from them.
-    careful : bool
-        Gather the candidates of shifts all over the spectrum: for loops whose gain spans so much that one
-        shift leaves candidates too coarse.
     """
 
-    def __init__(self, loop: RationalLoop, poles: Complex, careful: bool = False) -> None:
+    def __init__(self, loop: RationalLoop, poles: Complex) -> None:
         self._loop = loop
         self._shifts = _shifts(loop, poles)
-        self._careful = careful
         self._tried: dict[int, ShiftedLoop] = {}
 
     def _system(self, k: int) -> ShiftedLoop:
@@ -153,19 +150,11 @@ class Circles:
         return self._zeros(lambda system: system.real_axis())
 
     def _zeros(self, equation: Callable[[ShiftedLoop], Complex | None]) -> Complex | None:
-        found: list[Complex] = []
-        used: list[float] = []
         for k in range(len(self._shifts)):
-            shift = float(self._shifts[k])
-            if any(_APART * u > shift > u / _APART for u in used):
-                continue
             zeros = equation(self._system(k))
             if zeros is not None:
-                found.append(zeros)
-                used.append(shift)
-                if not self._careful:
-                    break
-        return np.concatenate(found) if found else None
+                return zeros
+        return None
 
 
 def on_axis(zeros: Complex) -> Complex:
@@ -192,7 +181,7 @@ def _shifts(loop: RationalLoop, poles: Complex) -> Real:
     points = np.concatenate((shifts, -shifts)).astype(complex)
     if loop.in_z:
         points = (1.0 + points) / (1.0 - points)
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         gain = np.log(np.maximum(np.abs(loop.at(points)), 1.0)).reshape(2, -1).max(axis=0)
     distance = np.abs(np.abs(poles.real)[:, None] + 1j * poles.imag[:, None] - shifts).min(axis=0) / shifts
     cost = gain + 0.5 * np.abs(position) - 3.0 * np.log(np.minimum(distance, 0.2) + 1e-30)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.assemble import delay_margins, verdict_of
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, values
@@ -16,7 +17,6 @@ from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.rational import delay_margins, verdict_of
 from actuator_lti.margins.results import (
     Agreement,
     DiskMargin,
@@ -115,9 +115,8 @@ def _assembled(
         method=method,
         agreement=agreement,
         notes=tuple(notes),
+        evidence_reason=_reason(agreement),
     )
-    if not agreement.agree:
-        return replace(result, notes=(*notes, "poles and Nyquist count disagree: no figure is given"))
     phase_margins = _phase_margins(form, gains, (low, high))
     return replace(
         result,
@@ -128,6 +127,12 @@ def _assembled(
         modulus_frequency_rad_s=distances[0][1] * unit,
         disk_margin=DiskMargin(distances[1][0], distances[1][1] * unit),
     )
+
+
+def _reason(agreement: Agreement) -> str:
+    if agreement.unstable_poles is None:
+        return "intervals with a bound that leaves nothing between them; stability by the Nyquist count alone"
+    return "intervals with a bound that leaves nothing between them; poles and Nyquist count agree"
 
 
 def _gain_margins(

@@ -6,28 +6,35 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from actuator_lti.errors import InputError
-from actuator_lti.margins.delay_form import delay_form, from_rational
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.delay_form import DelayForm, delay_form, from_rational
 from actuator_lti.margins.delayed import delayed_margins
-from actuator_lti.margins.loop import rational_loop
+from actuator_lti.margins.given import Given, given_of
+from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured import measured_margins
-from actuator_lti.margins.rational import rational_margins
+from actuator_lti.margins.rational import checked_margins
 from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.trust import Doubtful
 
 _MOST_SAMPLES = 100
 
 
 def stability_margins(
-    system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None
+    system: Any,
+    delay_s: float = 0.0,
+    band_rad_s: tuple[float, float] | None = None,
+    *,
+    certify: bool = False,
 ) -> StabilityMargins:
     """Find all margins of a loop L closed by negative unit feedback.
 
     Rational loops need no grid: crossovers are eigenvalues (Boyd, Balakrishnan, Kabamba 1989), each held by a
     change of sign and polished by Newton. With delays, inside or in series, intervals are split until a bound
     on the change of L shows that nothing hides between two points. Stability is found twice: from closed-loop
-    poles (with delays, by collocation) and from the Nyquist curve alone; where they disagree no figure is
-    given. Quoted are, see `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to
-    0 deg with its sign, the smallest delay margin (0 for an unstable loop), the smallest distance to -1.
+    poles (with delays, by collocation) and from the Nyquist curve alone. What double precision cannot check
+    in this way is worked out in exact arithmetic; ``.evidence`` says how the answer is known. Quoted are, see
+    `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
+    smallest delay margin (0 for an unstable loop), the smallest distance to -1.
 
     Parameters
     ----------
@@ -42,6 +49,8 @@ def stability_margins(
         Where margins are listed. Default: everywhere; under a delay, whose phase crossovers never end, up to
         where the gain stays below -40 dB (``.band_rad_s`` of the result). The verdict, the modulus and the
         disk margin are those of the whole axis in any case.
+    certify : bool, optional
+        Exact arithmetic in any case.
 
     Returns
     -------
@@ -71,28 +80,57 @@ def stability_margins(
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
-            return delayed_margins(delay_form(system, delay_s), band_rad_s)
+            return _delayed(delay_form(system, delay_s), band_rad_s, certify)
         system = system.to_state_space()
     if not (hasattr(system, "num") or hasattr(system, "A")):
         raise InputError(
             f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or FrequencyResponseData"
         )
-    if delay_s:
-        return _behind_delay(system, delay_s, band_rad_s)
-    loop = rational_loop(system, warp=True)
-    if loop.period_s is not None and not loop.in_z and abs(1.0 + loop.d) <= 1e-9:
-        loop = rational_loop(system)  # a closed-loop pole at z = -1, at infinity of the s-plane
-    return within(rational_margins(loop), band_rad_s)
+    given = given_of(system)
+    if not delay_s:
+        return within(_rational(given, certify), band_rad_s)
+    samples = None if given.period_s is None else whole_samples(delay_s / given.period_s)
+    if samples is None:
+        return _delayed(from_rational(loop_of(given), delay_s), band_rad_s, certify)
+    late = _rational(replace(given, samples=samples), certify)
+    return replace(within(late, band_rad_s), delay_s=delay_s)
 
 
-def _behind_delay(system: Any, delay_s: float, band: tuple[float, float] | None) -> StabilityMargins:
-    loop = rational_loop(system)
-    if loop.period_s is not None:
-        samples = delay_s / loop.period_s
-        whole = round(samples)
-        if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES:
-            return replace(within(rational_margins(loop.delayed(whole)), band), delay_s=delay_s)
-    return delayed_margins(from_rational(loop, delay_s), band)
+def _rational(given: Given, certify: bool) -> StabilityMargins:
+    """In double precision, and by exact arithmetic where that is not sure of itself."""
+    from actuator_lti.margins.certified import certified_margins  # python-flint only where it is needed
+
+    if certify:
+        return certified_margins(given)
+    try:
+        return checked_margins(loop_of(given, warp=True))
+    except Doubtful:
+        return certified_margins(given)
+
+
+def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
+    """In double precision, and by certified intervals where the two ways to stability do not both tell."""
+    from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
+
+    found = delayed_margins(form, band)
+    told_twice = found.agreement.agree and None not in (
+        found.agreement.unstable_poles,
+        found.agreement.unstable_nyquist,
+    )
+    if form.sampled or (told_twice and not certify):
+        return found
+    try:
+        return certified_delayed_margins(form, found, band)
+    except (NumericalError, InputError) as error:
+        if not found.agreement.agree:
+            return withheld(found, f"poles and Nyquist count disagree; {error}")
+        return replace(found, evidence_reason=f"{found.evidence_reason}; not certified: {error}")
+
+
+def whole_samples(samples: float) -> int | None:
+    """The number of samples, where it is a whole one and becomes states."""
+    whole = round(samples)
+    return whole if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES else None
 
 
 def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
 
-from actuator_lti.errors import InputError
+from actuator_lti.margins.given import Given, Real, given_of
 
-Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 _AT_MINUS_ONE = 1e-13
+_REFINEMENTS = 2
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class RationalLoop:
         Whether the matrices are those of the z-plane.
     numerator, denominator : array or None
         Coefficients, where the loop was given by them: they are then evaluated directly.
+    in_z_size : array or None
+        Of a loop brought from z: the sizes of the coefficients that it was given by, numerator and
+        denominator, shape (2, n + 1), highest power first, in the same unit. Their rounding is the accuracy
+        of the data.
     """
 
     A: Real
@@ -47,6 +51,7 @@ class RationalLoop:
     in_z: bool = False
     numerator: Real | None = None
     denominator: Real | None = None
+    in_z_size: Real | None = None
 
     @property
     def order(self) -> int:
@@ -70,49 +75,67 @@ class RationalLoop:
 
     def at(self, points: Complex) -> Complex:
         """L at any complex points s or z, shape kept (1-D)."""
-        if self.numerator is not None and self.denominator is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                return np.polyval(self.numerator, points) / np.polyval(self.denominator, points)
-        if self.order == 0:
-            return np.full(points.shape, self.d, dtype=complex)
-        return self.d + np.linalg.solve(self._resolvent(points), self.b[:, None])[..., 0] @ self.c
+        return self._values(points - 1.0 if self._about_one else points)
 
     def response(self, x: Real) -> Complex:
         """L on the border of stability."""
-        return self.at(self.point(x))
+        return self._values(self._variable(x))
 
     def response_and_slope(self, x: Real) -> tuple[Complex, Complex]:
         """L and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), from c (x I - A)^-2 b."""
-        points = self.point(x)
-        turn = 1j * points if self.in_z else 1j
+        p = self._variable(x)
+        turn = 1j * self.point(x) if self.in_z else 1j
         if self.numerator is not None and self.denominator is not None:
             num, den = self.numerator, self.denominator
-            below = np.polyval(den, points)
-            L = np.polyval(num, points) / below
-            d_num = np.polyval(num[:-1] * np.arange(num.size - 1, 0, -1), points)
-            d_den = np.polyval(den[:-1] * np.arange(den.size - 1, 0, -1), points)
+            below = np.polyval(den, p)
+            L = np.polyval(num, p) / below
+            d_num = np.polyval(num[:-1] * np.arange(num.size - 1, 0, -1), p)
+            d_den = np.polyval(den[:-1] * np.arange(den.size - 1, 0, -1), p)
             return L, turn * (d_num / below - L * (d_den / below))
         if self.order == 0:
-            return np.full(points.shape, self.d, dtype=complex), np.zeros(points.shape, dtype=complex)
-        matrix = self._resolvent(points)
+            return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
+        matrix = self._resolvent(p)
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
         return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
 
+    def sharp_response(self, x: Real) -> Complex:
+        """L on the border, with the residual of the solution in extended precision."""
+        wide = np.asarray(x, dtype=np.longdouble) * 1j
+        p = np.expm1(wide) if self._about_one else np.exp(wide) if self.in_z else wide
+        if self.numerator is not None and self.denominator is not None:
+            above, below = (np.asarray(c, np.longdouble) for c in (self.numerator, self.denominator))
+            return (np.polyval(above, p) / np.polyval(below, p)).astype(complex)
+        if self.order == 0:
+            return np.full(p.shape, self.d, dtype=complex)
+        A = np.asarray(self._state(), np.longdouble)
+        matrix = self._resolvent(p.astype(complex))
+        X = np.zeros((p.size, self.order), dtype=np.clongdouble)
+        for _ in range(_REFINEMENTS + 1):
+            residual = self.b - p[:, None] * X + X @ A.T
+            X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
+        return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
+
     def jet(self, x: float) -> tuple[complex, complex, complex]:
         """L and its first two derivatives by x at one point."""
-        point = cmath.exp(1j * x) if self.in_z else 1j * x
         if self.order == 0:
             return complex(self.d), 0j, 0j
-        lu, pivots, _ = zgetrf(self._resolvent(np.array([point]))[0], overwrite_a=1)
+        lu, pivots, _ = zgetrf(self._resolvent(self._variable(np.array([x])))[0], overwrite_a=1)
         first = zgetrs(lu, pivots, self.b)[0]
         second = zgetrs(lu, pivots, first)[0]
         third = zgetrs(lu, pivots, second)[0]
         L = complex(self.d + first @ self.c)
         d_point, dd_point = -complex(second @ self.c), 2.0 * complex(third @ self.c)
         if self.in_z:
+            point = cmath.exp(1j * x)
             return L, 1j * point * d_point, -point * (d_point + point * dd_point)
         return L, 1j * d_point, -dd_point
+
+    def given(self) -> Given:
+        """The same loop as data for exact arithmetic; a loop from z keeps its s-plane."""
+        if self.numerator is not None and self.denominator is not None:
+            return Given(None if not self.in_z else self.period_s, self.numerator, self.denominator)
+        return Given(self.period_s if self.in_z else None, A=self.A, b=self.b, c=self.c, d=self.d)
 
     def delayed(self, samples: int) -> RationalLoop:
         """The loop behind whole samples of delay (z-plane only), each a further state."""
@@ -124,12 +147,31 @@ class RationalLoop:
         b[:n], b[n], c[-1] = self.b, self.d, 1.0
         return from_matrices(A, b, c, 0.0, self.period_s)
 
-    def _resolvent(self, points: Complex) -> Complex:
+    def _variable(self, x: Real) -> Complex:
+        """The number that stands on the diagonal: s, or z - 1, exact near z = 1."""
+        return np.expm1(1j * x) if self._about_one else self.point(x)
+
+    @property
+    def _about_one(self) -> bool:
+        return self.in_z and self.numerator is None
+
+    def _state(self) -> Real:
+        return self.A - np.eye(self.order) if self.in_z else self.A
+
+    def _values(self, p: Complex) -> Complex:
+        if self.numerator is not None and self.denominator is not None:
+            with np.errstate(all="ignore"):
+                return np.polyval(self.numerator, p) / np.polyval(self.denominator, p)
+        if self.order == 0:
+            return np.full(p.shape, self.d, dtype=complex)
+        return self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c
+
+    def _resolvent(self, p: Complex) -> Complex:
         n = self.order
-        matrix = np.empty((points.size, n, n), dtype=complex)
-        matrix[:] = -self.A
+        matrix = np.empty((p.size, n, n), dtype=complex)
+        matrix[:] = -self._state()
         index = np.arange(n)
-        matrix[:, index, index] += points[:, None]
+        matrix[:, index, index] += p[:, None]
         return matrix
 
 
@@ -148,19 +190,16 @@ def rational_loop(system: Any, warp: bool = False) -> RationalLoop:
     InputError
         More than one input or output, an improper transfer function, or a value that is not finite.
     """
-    if system.ninputs != 1 or system.noutputs != 1:
-        raise InputError(
-            f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
-        )
-    period_s = _period(system.dt)
-    if hasattr(system, "num"):
-        num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
-        den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
-        return from_coefficients(num, den, period_s, warp)
-    A = np.asarray(system.A, dtype=float)
-    b = np.asarray(system.B, dtype=float)[:, 0]
-    c = np.asarray(system.C, dtype=float)[0]
-    return from_matrices(A, b, c, float(system.D[0, 0]), period_s)
+    return loop_of(given_of(system), warp)
+
+
+def loop_of(given: Given, warp: bool = False) -> RationalLoop:
+    """The same from the given doubles."""
+    if given.A is None:
+        loop = from_coefficients(given.numerator, given.denominator, given.period_s, warp)
+    else:
+        loop = from_matrices(given.A, given.b, given.c, given.d, given.period_s)
+    return loop.delayed(given.samples) if given.samples else loop
 
 
 def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -> RationalLoop:
@@ -168,8 +207,6 @@ def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -
     n = b.size
     whole: Real = np.empty((n + 1, n + 1))
     whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = A, b, c, d
-    if not np.isfinite(whole).all():
-        raise InputError("the loop holds a value that is not finite")
     if n:
         whole = _balanced(whole)
     return RationalLoop(whole[:n, :n], whole[:n, n], whole[n, :n], d, period_s, period_s is not None)
@@ -177,19 +214,14 @@ def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -
 
 def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool = False) -> RationalLoop:
     """Companion form of num/den (highest power first), which is exact, then balanced."""
-    if not den.size:
-        raise InputError("the denominator of the loop is zero")
-    if num.size > den.size:
-        raise InputError(
-            f"the loop is improper (numerator of degree {num.size - 1} over {den.size - 1}): "
-            "it needs at least as many poles as zeros"
-        )
     n = den.size - 1
-    if warp and period_s is not None and n and np.isfinite(num).all() and np.isfinite(den).all():
+    if warp and period_s is not None and n:
         warped_den = warped_coefficients(den, n)
         if abs(warped_den[0]) > _AT_MINUS_ONE * np.abs(den).sum():
             loop = from_coefficients(warped_coefficients(num, n), warped_den, None)
-            return replace(loop, period_s=period_s)
+            size = np.zeros((2, n + 1))
+            size[0, n + 1 - num.size :], size[1] = np.abs(num / warped_den[0]), np.abs(den / warped_den[0])
+            return replace(loop, period_s=period_s, in_z_size=size)
     above = np.zeros(n + 1)
     above[n + 1 - num.size :] = num / den[0]
     below = den / den[0]
@@ -229,9 +261,3 @@ def _balanced(whole: Real) -> Real:
     n = scale.size - 1
     scaled[n, n] = whole[n, n]
     return scaled
-
-
-def _period(dt: Any) -> float | None:
-    if dt is None or (dt == 0 and dt is not True):
-        return None
-    return 1.0 if dt is True else float(dt)

@@ -11,7 +11,8 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import Complex, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
-_SUSPICIOUS = 1e-5
+_SHARP = 1e-3  # a border pole's error, over its modulus
+_SAFE = 10.0
 _SCATTER = 1.0
 _MOST_INTEGRATORS = 6
 
@@ -41,6 +42,8 @@ class SortedPoles:
     cloud : float
         How far the eigenvalues of a multiple pole at zero frequency are scattered about it by rounding:
         nearer than some times that, the response says nothing.
+    doubtful : bool
+        Some pole, other than those at zero frequency, may lie on either side of the border.
     """
 
     values: Complex
@@ -48,6 +51,7 @@ class SortedPoles:
     border: tuple[BorderPole, ...]
     border_count: int = 0
     cloud: float = 0.0
+    doubtful: bool = False
 
     @property
     def at_dc(self) -> int:
@@ -59,17 +63,16 @@ def eigenvalues(A: Real) -> Complex:
     """Eigenvalues of a real matrix."""
     if not A.size:
         return np.empty(0, dtype=complex)
-    re, im, _, _, info = dgeev(A, compute_vl=0, compute_vr=0)
-    if info:
-        raise NumericalError("the poles did not converge: rescale the states of the loop")
-    return re + 1j * im
+    return _eigen(A, vectors=False)[0]
 
 
 def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     """Sort the eigenvalues of A (balanced) by the border of stability.
 
-    An eigenvalue is on the border where its distance is below its own error bound,
-    10 n eps (|v|* |A| |w|) / |v* w| with the left and right eigenvectors v and w, entry by entry.
+    The error of an eigenvalue is bounded by 10 n eps (|v|* |A| |w|) / |v* w| with the left and right
+    eigenvectors v and w, entry by entry. It is on the border where that bound reaches the border and is much
+    smaller than its modulus (at zero frequency: than that of the next one). Where the bound reaches the
+    border and is not small, the eigenvalue is simply not determined.
 
     Parameters
     ----------
@@ -81,33 +84,34 @@ def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
         Take eigenvalues as close to zero frequency as a multiple pole there is scattered by rounding for
         that pole (for open loops, where nothing else hangs on it).
     """
-    values = eigenvalues(A)
-    if not values.size:
-        return SortedPoles(values, 0, ())
+    if not A.size:
+        return SortedPoles(np.empty(0, dtype=complex), 0, ())
+    values, radius = _with_error_bounds(A)
+    centre, cloud = (1.0 if in_z else 0.0), 0.0
+    if gather:
+        values, radius, cloud = _gathered(values, radius, float(np.abs(A).max()), in_z)
     distance: Real = np.abs(values) - 1.0 if in_z else values.real
-    scale = max(float(np.abs(A).max()), _EPS) if not in_z else 1.0
-    suspicious = np.abs(distance) <= _SUSPICIOUS * scale
-    if not suspicious.any():
+    radius[values == centre] = 0.0
+    if not (np.abs(distance) <= _SAFE * radius).any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)), ())
-    at_dc = (values == 1.0) if in_z else (values == 0.0)
-    radius: Real = np.zeros(values.size)
-    cloud = 0.0
-    if (at_dc == suspicious).all():
-        on_border = at_dc
-    else:
-        values, radius = _with_error_bounds(A)
-        if gather:
-            values, radius, cloud = _gathered(values, radius, float(np.abs(A).max()), in_z)
-        distance = np.abs(values) - 1.0 if in_z else values.real
-        on_border = np.abs(distance) <= radius
-        if gather:
-            centre = 1.0 if in_z else 0.0
-            scattered = on_border & (np.abs(values - centre) <= 2.0 * radius)
-            cloud = max(cloud, float(np.abs(values - centre)[scattered].max(initial=0.0)))
-            values[scattered], radius[scattered] = centre, 0.0
+    size = np.abs(values - centre)
+    on_border = (np.abs(distance) <= radius) & _placed(values, radius, size)
+    if gather:
+        scattered = on_border & (size <= 2.0 * radius)
+        cloud = max(cloud, float(size[scattered].max(initial=0.0)))
+        values[scattered], radius[scattered] = centre, 0.0
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     border = _clusters(values, radius, on_border, in_z)
-    return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), cloud)
+    doubtful = bool((np.abs(distance) <= _SAFE * radius)[values != centre].any())
+    return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), cloud, doubtful)
+
+
+def _placed(values: Complex, radius: Real, size: Real) -> Mask:
+    """Whether each error is much smaller than the modulus, at zero frequency than that of the next pole."""
+    beyond = [size[size > 10.0 * max(r, s)].min(initial=np.inf) for r, s in zip(radius, size, strict=True)]
+    next_size = np.where(np.isinf(beyond), 0.0, beyond)
+    placed: Mask = radius <= _SHARP * np.where(size > radius, np.abs(values), next_size)
+    return placed
 
 
 def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[Complex, Real, float]:
@@ -132,18 +136,25 @@ def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[C
 
 def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
     """Eigenvalues sharpened by a Rayleigh quotient v* A w / v* w, and their bounds from v* abs(A) w."""
-    re, im, left, right, info = dgeev(A, compute_vl=1, compute_vr=1)
-    if info:
-        raise NumericalError("the poles did not converge: rescale the states of the loop")
-    V, W = _complex_vectors(left, im), _complex_vectors(right, im)
+    values, left, right = _eigen(A, vectors=True)
+    V, W = _complex_vectors(left, values.imag), _complex_vectors(right, values.imag)
     overlap = (V.conj() * W).sum(axis=0)
     weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=0)
-    values = re + 1j * im
     with np.errstate(divide="ignore", invalid="ignore"):
-        radius = 10.0 * re.size * _EPS * weight / np.abs(overlap)
+        radius = 10.0 * values.size * _EPS * weight / np.abs(overlap)
         sharper = (V.conj() * (A @ W)).sum(axis=0) / overlap
     good = np.abs(sharper - values) <= np.minimum(10.0 * radius, 1e-3 * np.abs(values))
-    return np.where(good, sharper, values), np.minimum(radius, 1e-4 * np.abs(A).sum(axis=1).max())
+    return np.where(good, sharper, values), np.where(np.isnan(radius), np.inf, radius)
+
+
+def _eigen(A: Real, vectors: bool) -> tuple[Complex, Real, Real]:
+    """Eigenvalues, left and right eigenvectors as LAPACK packs them; never NaN to LAPACK, which prints."""
+    if not np.isfinite(A).all():
+        raise NumericalError("the loop overflows double precision: rescale its states")
+    re, im, left, right, info = dgeev(A, compute_vl=int(vectors), compute_vr=int(vectors))
+    if info:
+        raise NumericalError("the poles did not converge: rescale the states of the loop")
+    return re + 1j * im, left, right
 
 
 def _complex_vectors(packed: Real, im: Real) -> Complex:

@@ -19,6 +19,7 @@ __all__ = [
     "Agreement",
     "DelayMargin",
     "DiskMargin",
+    "Evidence",
     "GainMargin",
     "PhaseMargin",
     "StabilityMargins",
@@ -27,6 +28,7 @@ __all__ = [
 
 _PRINTED = 8
 Verdict = Literal["stable", "unstable", "on the border", "undecided"]
+Evidence = Literal["certified", "checked", "withheld"]
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,17 @@ class StabilityMargins:
     - ``disk_margin``: balanced (S + T).
 
     For an unstable loop the crossings are still listed: they say how far it is from the border, and their
-    signs (a negative phase margin, a lower gain margin) say in which direction. Where the two ways to
-    stability disagree, or where stability cannot be known (measured data), ``stable`` is ``None``; in the
-    first case every figure is withheld (empty lists, ``None``).
+    signs (a negative phase margin, a lower gain margin) say in which direction. Where stability is not
+    known (measured data, or a withheld answer), ``stable`` is ``None``; a withheld answer has no figures at
+    all (empty lists, ``None``).
+
+    How an answer is known (``evidence``):
+
+    - ``"certified"``: by exact arithmetic on the given doubles and roots in certified intervals; the same
+      for data 8 ulp away.
+    - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
+      right, no pole lies within its own error of the border, and each figure has a small bound of its error.
+    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it.
 
     Attributes
     ----------
@@ -69,6 +79,10 @@ class StabilityMargins:
         The two ways to stability.
     notes : tuple of str
         What else has to be known to read the figures.
+    evidence : str
+        ``"certified"``, ``"checked"`` or ``"withheld"``.
+    evidence_reason : str
+        Why it is that: one line.
     """
 
     stable: bool | None
@@ -85,11 +99,13 @@ class StabilityMargins:
     method: str
     agreement: Agreement
     notes: tuple[str, ...] = ()
+    evidence: Evidence = "checked"
+    evidence_reason: str = ""
 
     @property
     def withheld(self) -> bool:
-        """Whether the figures are withheld because the two ways to stability disagree."""
-        return not self.agreement.agree
+        """Whether there are no figures, because the data do not determine them."""
+        return self.evidence == "withheld" or not self.agreement.agree
 
     @property
     def gain_margin(self) -> GainMargin | None:
@@ -149,8 +165,9 @@ def _lines(m: StabilityMargins) -> list[str]:
         "undecided": "closed loop: stability not known",
     }
     lines = [heads[m.verdict] + f" [{m.agreement}]"]
+    evidence = f"evidence: {m.evidence}" + (f" ({m.evidence_reason})" if m.evidence_reason else "")
     if m.withheld:
-        return [*lines, *(f"note: {note}" for note in m.notes)]
+        return [*lines, evidence, *(f"note: {note}" for note in m.notes)]
     named = (("gain", m.gain_margins), ("phase", m.phase_margins), ("delay", m.delay_margins))
     for name, margins in named:
         if not margins:
@@ -163,4 +180,4 @@ def _lines(m: StabilityMargins) -> list[str]:
     if m.disk_margin is not None:
         lines.append(f"disk margin: {m.disk_margin}")
     lines.append(f"band: {m.band_rad_s[0]:.6g} to {m.band_rad_s[1]:.6g} rad/s; method: {m.method}")
-    return [*lines, *(f"note: {note}" for note in m.notes)]
+    return [*lines, evidence, *(f"note: {note}" for note in m.notes)]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,14 +14,17 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.identification.differentiation import filtered_motion
+from analyses.records.consistency import Finding, check_record
+from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
     from nonlinear import State
+    from nonlinear.loads import LoadMoment
 
 FloatArray = NDArray[np.float64]
 
-REFERENCES = {"rotary": "reference", "linear": "position_reference"}
+LOADS = {"rotary": "torque", "linear": "load_force"}
 UNITS = {
     "angle": "rad",
     "output_angle": "rad",
@@ -32,6 +35,7 @@ UNITS = {
     "voltage": "V",
     "force": "N",
 }
+COMMANDS = {"rotary": ("reference",), "linear": ("position_reference",)}
 VELOCITY_CUTOFF_HZ = 100.0
 
 
@@ -40,7 +44,8 @@ class CorrelationResult:
     """The comparison of every signal that the record and the model share.
 
     ``limits`` tells for each limiter what share of the simulated time it was active. ``notes`` tells what was
-    done to the record, and what the model was given.
+    done to the record, and what the model was given. ``used`` tells for each signal what it was used for,
+    ``findings`` whether the record agrees with itself and with the design's limits.
     """
 
     record: str
@@ -50,6 +55,9 @@ class CorrelationResult:
     notes: tuple[str, ...]
     counts: str
     sha256: str
+    source: Record
+    used: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
 
     def __getitem__(self, name: str) -> SignalComparison:
         for signal in self.signals:
@@ -88,14 +96,12 @@ def correlate_record(
     InputError
         If the record holds no command, or nothing to compare.
     """
+    record = prepared(record)
     notes = list(record.notes)
-    if not record.is_regular:
-        record = record.resampled()
-        notes.append(record.notes[-1])
-    measured = _measured(design, record, derive_velocity, notes)
+    findings = check_record(design, record)
+    measured = measured_signals(design, record, derive_velocity, notes)
     if not measured:
         raise InputError(f"nothing to compare; known signals: {', '.join(UNITS)}", where=record.name)
-    design = _with_supply(design, record, notes)
     modelled, limits = model_signals(design, record, measured, notes, progress)
     signals = tuple(
         compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
@@ -109,12 +115,45 @@ def correlate_record(
         notes=tuple(notes),
         counts=str(record.counts),
         sha256=record.sha256,
+        source=record,
+        used=_used(design, record, measured),
+        findings=findings,
     )
 
 
-def _measured(design: Design, record: Record, derive: bool, notes: list[str]) -> dict[str, FloatArray]:
+def _used(design: Design, record: Record, measured: Mapping[str, FloatArray]) -> dict[str, str]:
+    used = {name: "compared" for name in measured if name in record.signals}
+    command = command_of(design, record)
+    if command is not None:
+        used[command[0]] = "command"
+    used |= {name: "load" for name in (LOADS[design.axis],) if name in record.signals}
+    used |= {"supply": "supply", "enable": "enabled part"}
+    if "force" in measured and "force" not in record.signals:
+        used["voltage"] = "force, by the source's gain"
+    return {name: text for name, text in used.items() if name in record.signals}
+
+
+def command_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
+    """The command of a record that the design's drive takes: its signal and values; None without one."""
+    for name in COMMANDS[design.axis]:
+        if name in record.signals:
+            return name, record[name]
+    return None
+
+
+def measured_signals(
+    design: Design, record: Record, derive: bool = False, notes: list[str] | None = None
+) -> dict[str, FloatArray]:
+    """The recorded signals that the model has too; with ``derive``, a speed from the position as well.
+
+    A signal that is zero throughout is left out.
+    """
+    notes = [] if notes is None else notes
     found = {name: record[name] for name in UNITS if name in record.signals}
-    gain = design.motor.source_gain_Nm_V
+    for name in [name for name, values in found.items() if not np.any(values)]:
+        del found[name]
+        notes.append(f"{name} is zero throughout: not compared")
+    gain = design.effective_motor.source_gain_Nm_V
     if design.axis == "linear":
         place, rate = "position", "velocity"
         if "force" not in found and "voltage" in found and gain is not None:
@@ -158,24 +197,26 @@ def model_signals(
     notes : list of str, optional
         What was done is added to it.
     """
-    from nonlinear import commands, loads, simulate
+    from nonlinear import commands, simulate
 
-    wanted = REFERENCES[design.axis]
-    if wanted not in record.signals:
+    command = command_of(design, record)
+    if command is None:
+        wanted = COMMANDS[design.axis][0]
         raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
-    reference = record[wanted]
+    notes = [] if notes is None else notes
+    design = _with_supply(design, record, notes)
     time = record.time_s - record.time_s[0]
-    load = 0.0 if "torque" not in record.signals else loads.series(time, record["torque"])
+    load = _load(design, record, time, notes)
     period = design.controller.period_s
     run = simulate(
         design,
-        commands.sampled(time, reference, where=record.name),
+        commands.sampled(time, command[1], where=record.name),
         float(time[-1]) + 2.0 * period,
         load,
         initial=_initial(design, measured),
         progress=progress,
     )
-    gain = design.motor.source_gain_Nm_V
+    gain = design.effective_motor.source_gain_Nm_V
     series = {
         "angle": run.motor_angle_rad,
         "output_angle": run.output_angle_rad,
@@ -186,10 +227,25 @@ def model_signals(
         "voltage": run.voltage_V,
         "force": run.voltage_V * (1.0 if gain is None else gain),
     }
-    if notes is not None:
-        notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between samples")
+    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between samples")
     limits = {name: use.fraction for name, use in run.limits.items()}
     return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
+
+
+def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> LoadMoment:
+    """The recorded load; without one, the design's own slope of the load over the angle."""
+    from nonlinear import loads
+
+    name = LOADS[design.axis]
+    slope = design.load.moment_slope_Nm_rad
+    if name in record.signals:
+        if slope:
+            notes.append("the recorded load holds all of it: the design's load.moment_slope is not added")
+        return loads.series(time, record[name])
+    if slope:
+        notes.append(f"load: the design's load.moment_slope, {slope:g} per unit of output deflection")
+        return loads.proportional(slope)
+    return loads.constant(0.0)
 
 
 def _initial(design: Design, measured: dict[str, FloatArray]) -> State:

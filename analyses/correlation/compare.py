@@ -19,7 +19,8 @@ class SignalComparison:
 
     ``relative_error`` is the norm of the difference over the norm of the measured; ``fit_percent`` is
     ``100 (1 - norm of the difference / norm of the measured about its mean)``; ``max_error`` is the largest
-    absolute difference, at ``max_error_time_s``. ``delay_s`` is by how much the measured signal comes later
+    absolute difference, at ``max_error_time_s``; ``mean_error`` the mean of the absolute difference,
+    ``rms_error`` its root mean square. ``delay_s`` is by how much the measured signal comes later
     than the model (negative: earlier), the shift that fits best; None where the signal does not tell.
     """
 
@@ -28,6 +29,8 @@ class SignalComparison:
     samples: int
     relative_error: float
     fit_percent: float
+    mean_error: float
+    rms_error: float
     max_error: float
     max_error_time_s: float
     delay_s: float | None
@@ -73,6 +76,8 @@ def compare_signals(
         samples=len(measured),
         relative_error=size / norm,
         fit_percent=100.0 * (1.0 - size / about_mean) if about_mean > 0.0 else float("nan"),
+        mean_error=float(np.mean(np.abs(difference))),
+        rms_error=float(np.sqrt(np.mean(difference**2))),
         max_error=float(abs(difference[worst])),
         max_error_time_s=float(time_s[worst]),
         delay_s=delay_between(time_s, measured, modelled),

@@ -7,13 +7,14 @@ critically damped second-order tracker whose bandwidth is a setting (1000 rad/s 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.least_squares import by_record, correlated_covariance
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -70,7 +71,9 @@ def read_odrive(path: str | Path) -> Record:
 def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S) -> VoltageMotor:
     """Fit gain and time constant to the speed after a voltage step.
 
-    The step falls somewhere between two rows; its moment is fitted too, one for each record.
+    The step falls somewhere between two rows; its moment is fitted too, one for each record. The standard
+    errors hold the correlation in time of what is left and, with several records, the scatter between those
+    fitted alone.
 
     Raises
     ------
@@ -79,11 +82,29 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
     NumericalError
         If the fit does not converge.
     """
-    from scipy.optimize import least_squares
-
     steps = [_Step.of(record) for record in records]
     if not steps:
         raise InputError("at least one record of a step is needed")
+    joint = _fit(steps, estimator_rad_s)
+    if len(steps) == 1:
+        return joint
+    alone = [_fit([step], estimator_rad_s) for step in steps]
+    told = [
+        {"gain": (m.gain_rad_sV, m.gain_std), "time": (m.time_constant_s, m.time_constant_std_s)}
+        for m in alone
+    ]
+    scatter = by_record(told, ("gain", "time"))
+    return replace(
+        joint,
+        gain_std=float(np.hypot(joint.gain_std, scatter["gain"][1])),
+        time_constant_std_s=float(np.hypot(joint.time_constant_std_s, scatter["time"][1])),
+    )
+
+
+def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
+    """One motor for all steps, with the standard errors of this fit alone."""
+    from scipy.optimize import least_squares
+
     gain = float(np.mean([step.steady / step.level for step in steps]))
 
     def motor(p: FloatArray) -> VoltageMotor:
@@ -110,8 +131,8 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
     solution = least_squares(residual, start, diff_step=1e-3, x_scale=np.maximum(np.abs(start), 0.1))
     if not solution.success:
         raise NumericalError(f"the step does not fit a first-order motor: {solution.message}")
-    variance = 2.0 * solution.cost / (len(solution.fun) - len(start))
-    std = np.sqrt(np.diag(variance * np.linalg.inv(solution.jac.T @ solution.jac)))
+    ends = np.cumsum([len(step.speed) for step in steps]).tolist()
+    std = np.sqrt(np.diag(correlated_covariance(solution.jac, solution.fun, ends)))
     size = float(np.linalg.norm(np.concatenate([s.speed for s in steps])))
     return VoltageMotor(
         gain_rad_sV=float(solution.x[0] * gain),

@@ -9,9 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.static_threshold import StaticThreshold, static_threshold
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_step, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import Rows
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
 WITHIN, COUNT = 0.05, 51
@@ -80,19 +78,19 @@ def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray, ticks: in
     Bisection over the length of the run, all steps at once: a run that ends before the motion leaves the
     angle untouched.
     """
-    rows = repeat_row(design_row(design), len(sizes))
-    rows[:, at.LOAD] = load_Nm
-    put_step(rows, at.COMMAND, sizes)
+    rows = Rows.of(design, len(sizes))
+    rows["load"] = load_Nm
+    rows.step("command", sizes)
     none, some = np.zeros(len(sizes)), np.full(len(sizes), float(ticks))
-    rows[:, at.TICKS] = ticks
+    rows["ticks"] = ticks
     moving = _moved(rows)
     while (some - none).max() > 1.0:
         middle = np.floor(0.5 * (none + some))
-        rows[:, at.TICKS] = np.maximum(middle, 1.0)
+        rows["ticks"] = np.maximum(middle, 1.0)
         hit = _moved(rows)
         some, none = np.where(hit, middle, some), np.where(hit, none, middle)
     return np.where(moving, some * design.controller.period_s, np.inf)
 
 
-def _moved(rows: np.ndarray) -> np.ndarray:
-    return np.asarray(run_rows(rows).outs[:, at.OUT_ANGLE] != 0.0)
+def _moved(rows: Rows) -> np.ndarray:
+    return np.asarray(rows.run().final_motor_angle_rad != 0.0)

@@ -12,10 +12,7 @@ from analyses.drive_figures import drive_figures
 from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
 from analyses.friction_effects.stick_slip import StickSlipCycle
 from analyses.large_signal.steady_start import PLACES
-from nonlinear import commands, simulate
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_step, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import Rows, commands, simulate
 
 WAIT_TICKS = 40_000
 BELOW = 0.3
@@ -170,18 +167,18 @@ def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmati
     """Start in the shape of the cycle at many sizes; find where motion turns from dying out to growing."""
     Ts = design.controller.period_s
     window = round(3.0 / (cycle.frequency_hz * Ts))
-    rows = repeat_row(design_row(design, limits_on=False), len(SCALES))
-    rows[:, at.LOAD] = load_Nm
-    put_step(rows, at.COMMAND, 0.0)
+    rows = Rows.of(design, len(SCALES), limits_on=False)
+    rows["load"] = load_Nm
+    rows.step("command", 0.0)
     for name, value in cycle.state.items():
         if name in PLACES:
-            rows[:, PLACES[name]] = SCALES * cycle.speed_amplitude_rad_s * value.real
+            rows[PLACES[name]] = SCALES * cycle.speed_amplitude_rad_s * value.real
     if "th" in cycle.state and design.controller.velocity is not None:
         before = -design.controller.position_loop.gain * cycle.state["th"].real
-        rows[:, at.SPEED_COMMAND_START] = SCALES * cycle.speed_amplitude_rad_s * before
-    rows[:, at.WINDOW], rows[:, at.CYCLES] = window, 3
-    rows[:, at.TICKS] = round(CYCLES_WATCHED / 3.0) * window
-    result = run_rows(rows)
+        rows["speed_command_start"] = SCALES * cycle.speed_amplitude_rad_s * before
+    rows.window(window, 3, 0)
+    rows["ticks"] = round(CYCLES_WATCHED / 3.0) * window
+    result = rows.run()
     low, high = result.span("motor_speed_rad_s")
     peak = np.maximum(-low, high)
     grows = ~result.ok | (peak > SCALES * cycle.speed_amplitude_rad_s)
@@ -190,17 +187,14 @@ def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmati
         return Confirmation(cycle, None, None)
     k = int(turns[0])
     ratio = float(math.sqrt(SCALES[k] * SCALES[k + 1]))
-    run = simulate_row(design, rows[k if cycle.stable else k + 1], window)
+    run = simulate_row(rows.take(k if cycle.stable else k + 1), window)
     return Confirmation(cycle, ratio, run)
 
 
-def simulate_row(design: Design, row: np.ndarray, ticks: int) -> float | None:
+def simulate_row(row: Rows, ticks: int) -> float | None:
     """Frequency of the motor speed over the first ticks of a row."""
-    from nonlinear.simulation import run_row
-
-    row = row.copy()
-    row[at.TICKS] = ticks
-    run = run_row(design, row, np.zeros(1))
+    row["ticks"] = ticks
+    run = row.trajectory()
     return _frequency(run.time_s, run.motor_speed_rad_s)
 
 
@@ -220,8 +214,8 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
         amplitude_rad=step_rad,
         wait_s=WAIT_TICKS * Ts,
         error_rad=float(last.mean()) if hunting else float(last[-1]),
-        at_rest=bool(run.limit_flags[-1] & at.FLAG_STICK),
-        limited=bool((run.limit_flags[-quarter:] & ~np.uint8(at.FLAG_STICK)).any()),
+        at_rest=bool(run.at_rest[-1]),
+        limited=bool(run.limited[-quarter:].any()),
         hunting=hunting,
         hunting_rad=0.5 * span if hunting else None,
         hunting_hz=frequency if hunting else None,

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.points import steady_points
 from analyses.identification.richer import RicherLaws, compare_laws
+from analyses.identification.run_checks import check_runs
 from analyses.identification.steady import SteadyCriterion
-from analyses.identification.surface import SurfaceFit, fit_surface
+from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
+from analyses.identification.verdict import Item, residual_item, simulated_item, sizes_item
 from analyses.records.campaign_import import ImportedCampaign, SetAside
+from analyses.records.consistency import Finding
 
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignResult:
     """Everything that a campaign told: the fit, the runs behind it, and those set aside with their reasons.
 
-    ``runs_listed == len(fit.points) + len(set_aside) + outliers set aside``.
+    ``runs_listed == len(fit.points) + len(set_aside) + outliers set aside``. ``contradicting`` are those of
+    the runs set aside whose record does not agree with what is said of it.
     """
 
     imported: ImportedCampaign
@@ -27,6 +31,8 @@ class CampaignResult:
     set_aside: tuple[SetAside, ...]
     criterion: SteadyCriterion
     torque_constant_Nm_A: float
+    contradicting: tuple[SetAside, ...] = ()
+    findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
 
     @property
     def runs_listed(self) -> int:
@@ -40,6 +46,7 @@ def identify_campaign(
     *,
     criterion: SteadyCriterion | None = None,
     richer: bool = True,
+    fixed: Mapping[str, float] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> CampaignResult:
     """Identify C0, Cv and CM (paper, section 3) from imported runs.
@@ -53,6 +60,8 @@ def identify_campaign(
         When a motion counts as steady.
     richer : bool
         Whether to ask, by cross-validation, for a richer law.
+    fixed : mapping, optional
+        Coefficients (C0, Cv, CM) that are held at a value.
     progress : callable, optional
         Called with (steps done, steps in all).
 
@@ -61,19 +70,25 @@ def identify_campaign(
     InputError
         Without a torque constant, or with too few usable runs; the reasons of those set aside are told.
     """
-    constant = design.motor.torque_constant_Nm_A
+    constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         raise InputError(
             "motor.torque_constant: the design has none, so currents cannot become torques", design.name
         )
     criterion = SteadyCriterion() if criterion is None else criterion
     points, restless = steady_points(imported.runs, constant, criterion)
-    aside = (*imported.set_aside, *restless)
+    checked = check_runs(design, imported.runs, points, imported.campaign.instruments)
+    aside = (*imported.set_aside, *restless, *checked.contradicting)
     if progress is not None:
         progress(1, 3)
     try:
         fit = fit_surface(
-            points, imported.campaign.instruments, constant, outliers=imported.campaign.outliers
+            checked.points,
+            imported.campaign.instruments,
+            constant,
+            outliers=imported.campaign.outliers,
+            fixed=fixed,
+            kept=_values_of(design),
         )
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
@@ -82,7 +97,7 @@ def identify_campaign(
         ) from None
     if progress is not None:
         progress(2, 3)
-    laws = compare_laws(fit) if richer else None
+    laws = compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None
     if progress is not None:
         progress(3, 3)
     return CampaignResult(
@@ -92,4 +107,40 @@ def identify_campaign(
         set_aside=aside,
         criterion=criterion,
         torque_constant_Nm_A=constant,
+        contradicting=checked.contradicting,
+        findings=checked.findings,
     )
+
+
+def _values_of(design: Design) -> dict[str, float]:
+    """The design's own C0, Cv and CM, kept where the runs do not tell them."""
+    friction = design.friction
+    values = (friction.dry_torque_Nm, friction.viscous_Nms_rad, friction.load_coefficient)
+    return dict(zip(NAMES, values, strict=True))
+
+
+def campaign_items(
+    design: Design, result: CampaignResult, simulated: float | None, limit: float
+) -> tuple[Item, ...]:
+    """The verdict on a campaign: runs, residual, size, and the written design simulated again."""
+    fit, wrong = result.fit, result.contradicting
+    items = [
+        Item(
+            id="runs",
+            label="Runs agree with their set speed and load, themselves and the design",
+            passed=not wrong,
+            reason="; ".join(f"run {run.id}: {run.reason}" for run in wrong[:3])
+            + (f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""),
+        ),
+        _size_item(design, fit),
+        residual_item(fit.relative_residual, limit),
+    ]
+    if simulated is not None:
+        items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))
+    return tuple(items)
+
+
+def _size_item(design: Design, fit: SurfaceFit) -> Item:
+    before = _values_of(design)
+    ratios = {NAMES[k]: float(fit.values[k]) / before[NAMES[k]] for k in fit.told if before[NAMES[k]] > 0.0}
+    return sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, leading="C0")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.differentiation import Motion, decimated, filtered_motion
+from analyses.identification.least_squares import solve
 
 FloatArray = NDArray[np.float64]
 FrictionForm = Literal["symmetric", "per-direction"]
@@ -28,15 +29,25 @@ MAX_CONDITION = 1e6
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """The choices of the identification; the defaults are the published ones for EMPS."""
+    """The choices of the identification; the defaults are the published ones for EMPS.
+
+    ``skip_end_samples`` are left out at the end of a record that ends in motion: there the filter, which has
+    no further samples, bends the position. The published recipe keeps them.
+    """
 
     cutoff_hz: float = 100.0
     filter_order: int = 4
     skip_samples: int = 49
     decimation: int = 10
+    skip_end_samples: int = 0
 
     def __post_init__(self) -> None:
-        for name, low in (("filter_order", 1), ("skip_samples", 0), ("decimation", 1)):
+        for name, low in (
+            ("filter_order", 1),
+            ("skip_samples", 0),
+            ("skip_end_samples", 0),
+            ("decimation", 1),
+        ):
             if getattr(self, name) < low:
                 raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
 
@@ -73,7 +84,7 @@ class DynamicModel:
 
     def drive(self, motion: Motion) -> FloatArray:
         """The force or torque that the model wants for a motion."""
-        return np.asarray(_regressor(motion, self.form) @ self.values)
+        return np.asarray(base_columns(motion, self.form) @ self.values)
 
 
 def identify_dynamics(
@@ -115,7 +126,7 @@ def identify_dynamics(
         raise InputError(f'form = "{form}": one of {", ".join(NAMES)}')
     motion = filtered_motion(position, period_s, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order)
     skip = recipe.skip_samples
-    rows = decimated(np.column_stack([_regressor(motion, form), drive])[skip:], recipe.decimation)
+    rows = decimated(np.column_stack([base_columns(motion, form), drive])[skip:], recipe.decimation)
     return _least_squares(rows[:, :-1], rows[:, -1], form, recipe, len(position))
 
 
@@ -137,7 +148,8 @@ def _checked(
     return position, drive
 
 
-def _regressor(motion: Motion, form: FrictionForm) -> FloatArray:
+def base_columns(motion: Motion, form: FrictionForm) -> FloatArray:
+    """Columns of inertia and friction for a motion, in the order of ``NAMES[form]``."""
     velocity, direction = motion.velocity, np.sign(motion.velocity)
     if form == "symmetric":
         return np.column_stack([motion.acceleration, velocity, direction, np.ones_like(velocity)])
@@ -157,17 +169,15 @@ def _least_squares(
             f"the motion does not excite all of {', '.join(NAMES[form])} (condition {condition:.2g}): "
             "it needs several speeds and accelerations, and for per-direction both directions"
         )
-    values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
-    residual = y - w @ values
-    covariance = np.asarray(np.var(residual, ddof=1) * np.linalg.inv(w.T @ w))
+    found = solve(w, y)
     return DynamicModel(
         form=form,
         names=NAMES[form],
-        values=values,
-        standard_errors=np.sqrt(np.diag(covariance)),
-        covariance=covariance,
-        relative_residual=float(np.linalg.norm(residual) / np.linalg.norm(y)),
-        residual=residual,
+        values=found.values,
+        standard_errors=np.sqrt(np.diag(found.white)),
+        covariance=found.white,
+        relative_residual=float(np.linalg.norm(found.residual) / np.linalg.norm(y)),
+        residual=found.residual,
         rows_in=rows_in,
         rows_used=len(y),
         recipe=recipe,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.design import parameter_value, with_values
+from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.least_squares import correlated_covariance
 
 FloatArray = NDArray[np.float64]
 
@@ -41,6 +43,7 @@ def refine_by_output_error(
     simulate_output: Callable[[Design], FloatArray],
     measured: FloatArray,
     *,
+    ends: Sequence[int] = (),
     max_iterations: int = 12,
     progress: Callable[[int, int], None] | None = None,
 ) -> OutputErrorResult:
@@ -58,30 +61,32 @@ def refine_by_output_error(
     simulate_output : callable
         Gives the output for a design, sampled as ``measured``; see `analyses.correlation.closed_loop`.
     measured : array, shape (n,)
+    ends : sequence of int, optional
+        Where each record ends in it.
 
     Raises
     ------
     InputError
-        For outputs of different shape, or a start at zero (then it has no scale).
+        For outputs of different shape, or where all starting values are zero (then there is no scale).
     NumericalError
         If the output does not depend on a parameter.
     """
     start = np.array([parameter_value(design, path) for path in paths])
-    if np.any(start == 0.0):
-        raise InputError(
-            f"{paths[int(np.argmin(np.abs(start)))]} = 0: output error needs a start that is not zero"
-        )
+    scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
 
-    def residual(relative: FloatArray) -> FloatArray:
-        values = dict(zip(paths, (float(v) for v in start * relative), strict=True))
-        output = simulate_output(with_values(design, values, check=False))
+    def values_at(moved: FloatArray) -> dict[str, float]:
+        found = start + scale * (moved - 1.0)
+        return {path: _allowed(path, float(v)) for path, v in zip(paths, found, strict=True)}
+
+    def residual(moved: FloatArray) -> FloatArray:
+        output = simulate_output(with_values(design, values_at(moved), check=False))
         if output.shape != measured.shape:
             raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
         return np.asarray(measured - output)
 
     p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, max_iterations, progress)
-    covariance = _covariance(jac, rest) * np.outer(start, start)
-    values = {path: float(v) for path, v in zip(paths, start * p, strict=True)}
+    covariance = _covariance(jac, rest, ends) * np.outer(scale, scale)
+    values = values_at(p)
     norm = float(np.linalg.norm(measured))
     return OutputErrorResult(
         values=values,
@@ -134,8 +139,25 @@ def _halved_step(
     return p, rest, False
 
 
-def _covariance(jac: FloatArray, rest: FloatArray) -> FloatArray:
-    from analyses.identification.means import correlation_time
+def _covariance(jac: FloatArray, rest: FloatArray, ends: Sequence[int]) -> FloatArray:
+    """Of the residual as it is correlated in time; see `least_squares.solve`."""
+    return correlated_covariance(jac, rest, ends)
 
-    variance = float(rest @ rest) / (len(rest) - jac.shape[1])
-    return np.asarray(variance * correlation_time(rest) * np.linalg.inv(jac.T @ jac))
+
+def _scale(design: Design, path: str, start: float) -> float:
+    """What a parameter is measured by: its start, or where that is zero a part of a like one."""
+    if start != 0.0:
+        return abs(start)
+    like = {
+        "friction.offset_torque": 0.1 * design.friction.dry_torque_Nm,
+        "friction.dry_torque": 0.01 * abs(design.friction.offset_torque_Nm),
+    }.get(path, 0.0)
+    if like == 0.0:
+        raise InputError(f"{path} = 0: a refinement by simulation needs a start that is not zero")
+    return like
+
+
+def _allowed(path: str, value: float) -> float:
+    """A tried value, kept within what its key allows."""
+    field = field_of(path)
+    return value if field is None else min(max(value, field.low), field.high)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.least_squares import told_apart
 from analyses.identification.outliers import find_outliers
 from analyses.identification.points import SteadyPoint
 from analyses.identification.systematic import ErrorDraws, SharedError, draw_errors, effects_of, shared_errors
@@ -19,7 +20,6 @@ FloatArray = NDArray[np.float64]
 NAMES = ("C0", "Cv", "CM")
 UNITS = ("N*m", "N*m*s/rad", "N*m/(N*m)")
 PATHS = ("friction.dry_torque", "friction.viscous", "friction.load_coefficient")
-MIN_RUNS = 5
 ITERATIONS = 6
 
 
@@ -43,7 +43,7 @@ class SurfaceFit:
     distributions. ``residuals_Nm`` (``own_residuals_Nm``: less the most likely shared errors) and
     ``residual_stds_Nm`` are those of the runs used, in the order of ``points``. ``run_scatter_Nm`` is the
     scatter between runs that their own noise does not explain, ``birge_ratio`` the ratio of the two (1:
-    explained).
+    explained). ``held`` names the coefficients that were not fitted, with the reason; their errors are zero.
     """
 
     points: tuple[SteadyPoint, ...]
@@ -61,6 +61,18 @@ class SurfaceFit:
     birge_ratio: float
     outliers: tuple[Outlier, ...]
     freedom: int
+    held: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def told(self) -> tuple[int, ...]:
+        """Positions of the coefficients that were fitted."""
+        return tuple(k for k, name in enumerate(NAMES) if name not in self.held)
+
+    @property
+    def relative_residual(self) -> float:
+        """Norm of the residuals over norm of the torques."""
+        torque = np.array([p.torque_Nm for p in self.points])
+        return float(np.linalg.norm(self.residuals_Nm) / np.linalg.norm(torque))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -75,8 +87,8 @@ class SurfaceFit:
     @property
     def correlation(self) -> FloatArray:
         """Correlation matrix of the coefficients."""
-        std = self.standard_errors
-        return self.covariance / np.outer(std, std)
+        std = np.where(self.standard_errors > 0.0, self.standard_errors, 1.0)
+        return np.asarray(self.covariance / np.outer(std, std))
 
     def predict_Nm(self, speed_rad_s: FloatArray, load_Nm: FloatArray) -> FloatArray:
         """Friction torque at speeds and loads."""
@@ -89,6 +101,8 @@ def fit_surface(
     torque_constant_Nm_A: float,
     *,
     outliers: str = "keep",
+    fixed: Mapping[str, float] | None = None,
+    kept: Mapping[str, float] | None = None,
 ) -> SurfaceFit:
     """Fit the surface by generalised least squares with errors in all variables.
 
@@ -107,6 +121,10 @@ def fit_surface(
         The kM that made the torques.
     outliers : {"keep", "set-aside"}
         Whether runs that are named as outliers stay in the fit.
+    fixed : mapping, optional
+        Coefficients that are held at a value, by name.
+    kept : mapping, optional
+        Values that those coefficients keep which the runs do not tell apart; without it that is an error.
 
     Raises
     ------
@@ -116,20 +134,21 @@ def fit_surface(
         The runs do not tell the coefficients apart.
     """
     used = tuple(points)
-    _check_excited(used)
+    held = _held(used, dict(fixed or {}), kept)
     names = tuple(point.run for point in used)
     x, y = _table(used)
-    start = _ordinary(x, y)
+    start = _ordinary(x, y, held)
     errors = shared_errors(used, instruments, start[2], torque_constant_Nm_A)
-    found = find_outliers(x, y, _own_variance(used, start), effects_of(errors, len(y)))
+    free, rest = _free(x, y, held)
+    found = find_outliers(free, rest, _own_variance(used, start), effects_of(errors, len(y)))
     named = tuple(
         Outlier(run=names[k], standardised=float(value), limit=found.limit, set_aside=outliers == "set-aside")
         for k, value in zip(found.rows, found.standardised, strict=True)
     )
     if outliers == "set-aside" and named:
         used = tuple(point for k, point in enumerate(used) if k not in set(found.rows))
-        _check_excited(used)
-    return _fitted(used, instruments, torque_constant_Nm_A, named)
+        held = _held(used, dict(fixed or {}), kept)
+    return _fitted(used, instruments, torque_constant_Nm_A, named, held)
 
 
 def _fitted(
@@ -137,21 +156,26 @@ def _fitted(
     instruments: Instruments,
     torque_constant: float,
     named: tuple[Outlier, ...],
+    held: Mapping[str, Held],
 ) -> SurfaceFit:
     x, y = _table(points)
-    theta, scatter, birge = _ordinary(x, y), 0.0, 1.0
+    free, rest = _free(x, y, held)
+    told = [k for k, name in enumerate(NAMES) if name not in held]
+    theta, scatter, birge = _ordinary(x, y, held), 0.0, 1.0
     shared: tuple[SharedError, ...] = ()
     for _ in range(ITERATIONS):
         own = _own_variance(points, theta)
         shared = shared_errors(points, instruments, theta[2], torque_constant)
-        scatter, birge = _run_scatter(x, y, own, shared)
-        gain = gain_matrix(x, torque_covariance(own + scatter, shared))
-        change = gain @ y - theta
+        scatter, birge = _run_scatter(free, rest, own, shared)
+        gain = np.zeros((len(NAMES), len(y)))
+        gain[told] = gain_matrix(free, torque_covariance(own + scatter, shared))
+        change = np.zeros(len(NAMES))
+        change[told] = gain[told] @ rest - theta[told]
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
             break
     variance = own + scatter
-    freedom = len(y) - len(theta)
+    freedom = len(y) - len(told)
     random_covariance = (gain * variance) @ gain.T
     shifts = {error.name: gain @ error.effect for error in shared}
     moved = np.array(list(shifts.values())).reshape(len(shifts), len(theta))
@@ -172,6 +196,7 @@ def _fitted(
         birge_ratio=birge,
         outliers=named,
         freedom=freedom,
+        held={name: one.reason for name, one in held.items()},
     )
 
 
@@ -180,18 +205,58 @@ def _table(points: tuple[SteadyPoint, ...]) -> tuple[FloatArray, FloatArray]:
     return x, np.array([p.torque_Nm for p in points])
 
 
-def _check_excited(points: tuple[SteadyPoint, ...]) -> None:
-    if len(points) < MIN_RUNS:
-        raise InputError(f"{len(points)} usable runs: at least {MIN_RUNS} are needed for three coefficients")
+@dataclass(frozen=True)
+class Held:
+    """A coefficient that is not fitted: its value, and why."""
+
+    value: float
+    reason: str
+
+
+def _held(
+    points: tuple[SteadyPoint, ...], fixed: Mapping[str, float], kept: Mapping[str, float] | None
+) -> dict[str, Held]:
+    """What is not fitted: what was asked for, and what the runs do not tell apart."""
+    held = {name: Held(value, "fixed as asked") for name, value in fixed.items()}
+    names = [name for name in NAMES if name not in held]
+    if not names:
+        raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
+    if kept is None or not points:
+        _check_count(points, len(names))
     x, _ = _table(points)
-    if not np.linalg.cond(x / np.maximum(np.linalg.norm(x, axis=0), 1e-300)) < 1e4:
+    _, left = told_apart(x[:, [NAMES.index(name) for name in names]], names)
+    if left and kept is None:
         raise NumericalError(
             "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
         )
+    for one in left:
+        why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
+        held[one.name] = Held((kept or {})[one.name], f"{why}: the design's value kept")
+    _check_count(points, len(NAMES) - len(held))
+    return held
 
 
-def _ordinary(x: FloatArray, y: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.lstsq(x, y, rcond=None)[0])
+def _check_count(points: tuple[SteadyPoint, ...], coefficients: int) -> None:
+    """Two runs more than coefficients."""
+    words = {3: "three coefficients", 2: "two coefficients", 1: "one coefficient"}[coefficients]
+    if len(points) < coefficients + 2:
+        raise InputError(f"{len(points)} usable runs: at least {coefficients + 2} are needed for {words}")
+
+
+def _free(x: FloatArray, y: FloatArray, held: Mapping[str, Held]) -> tuple[FloatArray, FloatArray]:
+    """The columns that are fitted, and the torques less what is held."""
+    told = [k for k, name in enumerate(NAMES) if name not in held]
+    rest = y - sum((one.value * x[:, NAMES.index(name)] for name, one in held.items()), np.zeros(len(y)))
+    return x[:, told], np.asarray(rest)
+
+
+def _ordinary(x: FloatArray, y: FloatArray, held: Mapping[str, Held]) -> FloatArray:
+    free, rest = _free(x, y, held)
+    theta = np.array([held[name].value if name in held else 0.0 for name in NAMES])
+    theta[[k for k, name in enumerate(NAMES) if name not in held]] = np.linalg.lstsq(free, rest, rcond=None)[
+        0
+    ]
+    return theta
 
 
 def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatArray:
@@ -237,7 +302,7 @@ def _run_scatter(
     birge = float(np.sqrt(first / freedom))
     if first <= freedom:
         return 0.0, birge
-    low, high = 0.0, 10.0 * float(np.var(y - x @ _ordinary(x, y))) + float(np.max(own))
+    low, high = 0.0, 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
     for _ in range(30):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if chi_square(middle) > freedom else (low, middle)

@@ -14,7 +14,7 @@ from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from nonlinear._kernels import layout as at
+from nonlinear import LIMITERS
 
 FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)
@@ -154,5 +154,5 @@ def _bisect(
         hit = seen.max(axis=1) > 0.0
         low, high = np.where(hit, low, middle), np.where(hit, middle, high)
         last = np.where(hit[:, None], seen, last)
-    names = [at.LIMITERS[int(np.argmax(row))] if ok else "" for row, ok in zip(last, valid, strict=True)]
+    names = [LIMITERS[int(np.argmax(row))] if ok else "" for row, ok in zip(last, valid, strict=True)]
     return np.where(valid, np.exp(0.5 * (low + high)), np.nan), names

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from analyses.large_signal.formulas import PARABOLA_THIRD, TRIANGLE_THIRD
-from nonlinear._kernels import layout as at
+from nonlinear import LIMITERS
 from nonlinear.reduced import BatchResult
 
-CAUSES = ("none", "friction", "stiction", *at.LIMITERS)
+CAUSES = ("none", "friction", "stiction", *LIMITERS)
 WAVEFORMS = ("sine", "triangle", "parabola", "stick-slip", "no motion", "distorted", "not steady")
 SINE_DISTORTION = 0.02
 STICK_FRACTION = 0.10
@@ -51,8 +51,8 @@ def waveforms(result: BatchResult) -> np.ndarray:
 
 
 def limiter_fractions(result: BatchResult) -> np.ndarray:
-    """Fraction of the last window in which each limiter acts, shape (runs, 4)."""
-    return np.stack([result.window_limit_fraction(name) for name in at.LIMITERS], axis=1)
+    """Fraction of the last window in which each limiter acts, shape (runs, limiters)."""
+    return np.stack([result.window_limit_fraction(name) for name in LIMITERS], axis=1)
 
 
 def causes(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
@@ -73,7 +73,7 @@ def causes(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -
     limited = fractions.max(axis=1) > 0.0
     stuck = result.window_stick_fraction >= STICK_FRACTION
     choices = [
-        CAUSES.index(at.LIMITERS[0]) + np.argmax(fractions, axis=1),
+        CAUSES.index(LIMITERS[0]) + np.argmax(fractions, axis=1),
         np.full(len(off), CAUSES.index("stiction")),
         np.full(len(off), CAUSES.index("friction")),
     ]

@@ -15,7 +15,6 @@ from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.static_threshold import static_threshold
-from nonlinear._kernels import layout as at
 
 Progress = Callable[[int, int], None]
 AMPLITUDES, FREQUENCIES = 25, 40
@@ -34,7 +33,7 @@ class AmplitudeMap:
     frequency_hz : ndarray, shape (f,)
     cause, waveform : ndarray of int, shape (a, f)
         Index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`.
-    limiter_fraction : ndarray, shape (a, f, 4)
+    limiter_fraction : ndarray, shape (a, f, limiters)
         Fraction of the last window in which speed, acceleration, current and voltage limits act.
     stick_fraction, distortion, unsteadiness : ndarray, shape (a, f)
         Of the output in the last window.
@@ -137,12 +136,12 @@ def amplitude_map(
         frequency_hz=omega / (2.0 * np.pi),
         cause=causes(result, start.output[which], amplitude).reshape(shape),
         waveform=waveforms(result).reshape(shape),
-        limiter_fraction=limiter_fractions(result).reshape((*shape, 4)),
+        limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),
         distortion=result.distortion("output_angle_rad").reshape(shape),
         unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
         response=(result.phasor("output_angle_rad") / amplitude).reshape(shape),
         linear=start.output,
         onset_rad=border.each_rad,
-        ticks=int(result.rows[:, at.TICKS].sum()),
+        ticks=int(result.column("ticks").sum()),
     )

@@ -10,16 +10,16 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops
 from analyses.large_signal.formulas import FULL_TRIANGLE
-from nonlinear._kernels import layout as at
+from nonlinear import Rows
 
 PLACES = {
-    "i": at.CURRENT_START,
-    "w": at.SPEED_START,
-    "th": at.ANGLE_START,
-    "I_current": at.CURRENT_INTEGRATOR_START,
-    "I_velocity": at.VELOCITY_INTEGRATOR_START,
-    "hold_i_ref": at.CURRENT_COMMAND_START,
-    "u1": at.VOLTAGE_START,
+    "i": "current_start",
+    "w": "speed_start",
+    "th": "angle_start",
+    "I_current": "current_integrator_start",
+    "I_velocity": "velocity_integrator_start",
+    "hold_i_ref": "current_command_start",
+    "u1": "voltage_start",
 }
 DECAY = math.log(1e3)
 LONGEST_PERIODS = 20_000
@@ -33,24 +33,24 @@ class LinearSteadyState:
     ----------
     output : ndarray of complex, shape (K,)
         Command to output angle: the fundamental over all ticks.
-    states : dict of int to ndarray of complex, shape (K,)
-        By place in a parameter row: value at t = 0 is the imaginary part.
+    states : dict of str to ndarray of complex, shape (K,)
+        By column of the rows: value at t = 0 is the imaginary part.
     stable : bool
     settling_ticks : int
         Ticks in which the slowest mode falls to a thousandth.
     """
 
     output: np.ndarray
-    states: dict[int, np.ndarray]
+    states: dict[str, np.ndarray]
     stable: bool
     settling_ticks: int
 
-    def put(self, rows: np.ndarray, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
+    def put(self, rows: Rows, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
         """Write the initial state of each row: tone ``which[r]`` at an amplitude."""
         if not self.stable:
             return
         for place, values in self.states.items():
-            rows[:, place] = amplitude_rad * values.imag[which]
+            rows[place] = amplitude_rad * values.imag[which]
 
 
 def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadyState:
@@ -75,7 +75,7 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     if speed:
         row = system.outputs.index("w_ref")
         C, D = phases[0][2], phases[0][3]
-        states[at.SPEED_COMMAND_START] = (x @ C[row] + D[row, 0]) / z
+        states["speed_command_start"] = (x @ C[row] + D[row, 0]) / z
     radius = float(np.max(np.abs(np.linalg.eigvals(A))))
     stable = radius < 1.0
     periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS) if 0.0 < radius < 1.0 else 1
@@ -84,7 +84,7 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     return LinearSteadyState(output / loops.design.total_ratio, states, stable, periods * M)
 
 
-def triangle_start(design: Design, rows: np.ndarray, amplitude_rad: np.ndarray) -> None:
+def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray) -> None:
     """Begin sines far beyond the speed limit on the flank of the triangle that they end in.
 
     A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period; from the
@@ -93,12 +93,12 @@ def triangle_start(design: Design, rows: np.ndarray, amplitude_rad: np.ndarray) 
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):
         return
-    rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows[:, at.COMMAND + 3]
+    rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows.frequency_hz()
     x = omega * amplitude_rad / rate
     which = np.flatnonzero(x >= FULL_TRIANGLE)
     lag = np.arccos(np.pi / (2.0 * x[which]))
-    rows[which, at.ANGLE_START] = -limit * lag / omega[which]
-    rows[which, at.SPEED_START] = rows[which, at.SPEED_COMMAND_START] = limit
+    rows["angle_start"][which] = -limit * lag / omega[which]
+    rows["speed_start"][which] = rows["speed_command_start"][which] = limit
     drag = design.friction.viscous(1) * limit
     motor = design.motor
     if motor.has_electrical_dynamics and motor.torque_constant_Nm_A:
@@ -107,8 +107,8 @@ def triangle_start(design: Design, rows: np.ndarray, amplitude_rad: np.ndarray) 
     else:
         current, voltage = 0.0, drag / (motor.source_gain_Nm_V or 1.0)
     cascaded = design.controller.current is not None
-    rows[which, at.CURRENT_START] = current
-    rows[which, at.VOLTAGE_START] = voltage
-    rows[which, at.CURRENT_COMMAND_START] = current if cascaded else 0.0
-    rows[which, at.CURRENT_INTEGRATOR_START] = voltage if cascaded else 0.0
-    rows[which, at.VELOCITY_INTEGRATOR_START] = current if cascaded else voltage
+    rows["current_start"][which] = current
+    rows["voltage_start"][which] = voltage
+    rows["current_command_start"][which] = current if cascaded else 0.0
+    rows["current_integrator_start"][which] = voltage if cascaded else 0.0
+    rows["velocity_integrator_start"][which] = current if cascaded else voltage

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +10,7 @@ from actuator_lti.design.model import Design
 from analyses.large_signal.classify import STEADY
 from analyses.large_signal.grid import Tone
 from analyses.large_signal.steady_start import LinearSteadyState, triangle_start
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_sine, put_window, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import Rows
 from nonlinear.reduced import BatchResult
 
 Progress = Callable[[int, int], None]
@@ -48,28 +45,27 @@ def run_tones(
     insist : bool
         Repeat what has not settled, with a start-up four times as long and several periods more.
     """
-    rows = repeat_row(design_row(design, friction_on=friction_on), len(which))
+    rows = Rows.of(design, len(which), friction_on=friction_on)
     windows = np.array([t.ticks for t in tones])[which]
     cycles = np.array([t.cycles for t in tones])[which]
-    put_sine(rows, at.COMMAND, amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
-    put_window(rows, windows, cycles, harmonics)
+    rows.sine("command", amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
+    rows.window(windows, cycles, harmonics)
     start.put(rows, which, start_amplitude_rad)
     triangle_start(design, rows, amplitude_rad)
-    rows[:, at.LOAD] = load_Nm
-    rows[:, at.TICKS] = start.settling_ticks + 2 * windows
-    result = run_rows(rows, progress=progress)
-    return _again(result, start.settling_ticks) if insist else result
+    rows["load"] = load_Nm
+    rows["ticks"] = start.settling_ticks + 2 * windows
+    result = rows.run(progress=progress)
+    return _again(rows, result, start.settling_ticks) if insist else result
 
 
-def _again(result: BatchResult, settling_ticks: int) -> BatchResult:
+def _again(rows: Rows, result: BatchResult, settling_ticks: int) -> BatchResult:
     """Repeat the runs that are not steady with a longer start-up."""
     moving = result.window_stick_fraction < 1.0
     late = np.flatnonzero(result.ok & moving & (result.unsteadiness("output_angle_rad") > STEADY))
     if not len(late):
         return result
-    rows, outs, status = result.rows.copy(), result.outs.copy(), result.status.copy()
-    more = np.minimum(MORE_WINDOWS * rows[late, at.WINDOW], MORE_TICKS)
-    rows[late, at.TICKS] += LONGER * settling_ticks + np.ceil(more)
-    repeated = run_rows(rows[late])
-    outs[late], status[late] = repeated.outs, repeated.status
-    return replace(result, rows=rows, outs=outs, status=status)
+    longer = rows.take(late)
+    longer["ticks"] += LONGER * settling_ticks + np.ceil(
+        np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS)
+    )
+    return result.with_part(late, longer.run())

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.batch import Population
 from actuator_lti.errors import InputError
 from analyses.engine import Arrays
+
+if TYPE_CHECKING:
+    from nonlinear import Rows
 
 
 @dataclass(frozen=True)
@@ -51,85 +55,22 @@ def step_units() -> dict[str, str]:
     }
 
 
-def step_rows(step: StepCheck, population: Population) -> np.ndarray:
-    """Simulator rows of every design: the nominal one with the changed columns put in."""
-    from nonlinear._kernels import layout as at
-    from nonlinear.batch import Reducers, put_step, repeat_row
-    from nonlinear.parameters import design_row
+def step_rows(step: StepCheck, population: Population) -> Rows:
+    """Simulator rows of every design."""
+    from nonlinear import Rows
 
-    rows = repeat_row(design_row(population.design), population.count)
-    _put_plant(population, rows)
-    _put_controllers(population, rows)
-    places = {
-        at.SPEED_LIMIT: "limits.speed", at.ACCELERATION_LIMIT: "limits.acceleration",
-        at.CURRENT_LIMIT: "limits.peak_current", at.VOLTAGE_LIMIT: "limits.voltage",
-    }  # fmt: skip
-    for place, path in places.items():
-        if path in population.values:
-            rows[:, place] = population.get(path)
-    rows[:, at.LOAD] = step.load_Nm
-    rows[:, at.TICKS] = np.maximum(np.round(step.duration_s / rows[:, at.PERIOD]), 1.0)
-    Reducers(step_target_rad=step.amplitude_rad, extremes=True).write(rows)
-    put_step(rows, at.COMMAND, step.amplitude_rad)
+    rows = Rows.of(population.stacked, population.count)
+    rows["load"] = step.load_Nm
+    rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
+    rows.step_figures(step.amplitude_rad)
+    rows.extremes()
+    rows.step("command", step.amplitude_rad)
     return rows
-
-
-def _put_plant(population: Population, rows: np.ndarray) -> None:
-    from nonlinear._kernels import layout as at
-
-    rows[:, at.RATIO] = population.stacked.total_ratio
-    rows[:, at.INERTIA] = population.stacked.inertia_kgm2
-    rows[:, at.DRY], rows[:, at.DRY_REVERSE] = (
-        population.stacked.friction.dry_Nm(0.0, way) for way in (1, -1)
-    )
-    rows[:, at.VISCOUS], rows[:, at.VISCOUS_REVERSE] = (
-        population.stacked.friction.viscous(way) for way in (1, -1)
-    )
-    places = {
-        at.RESISTANCE: "motor.resistance", at.INDUCTANCE: "motor.inductance",
-        at.BACK_EMF: "motor.back_emf_constant", at.TORQUE_CONSTANT: "motor.torque_constant",
-        at.SOURCE_GAIN: "motor.source_gain", at.LOAD_COEFFICIENT: "friction.load_coefficient",
-        at.BREAKAWAY: "friction.breakaway_ratio", at.SMOOTHING: "friction.smoothing_speed",
-        at.OFFSET: "friction.offset_torque",
-    }  # fmt: skip
-    for place, path in places.items():
-        if path in population.values:
-            rows[:, place] = population.get(path)
-
-
-def _put_controllers(population: Population, rows: np.ndarray) -> None:
-    from nonlinear._kernels import layout as at
-
-    design, period = population.design, np.asarray(population.get("control.period"))
-    ratio = np.asarray(population.get("control.computing_delay")) / period
-    whole = np.floor(ratio + 1e-9)
-    rest = (ratio - whole) * period
-    rows[:, at.PERIOD] = period
-    rows[:, at.DELAY_TICKS] = whole
-    rows[:, at.DELAY_FRACTION] = np.where(np.abs(rest) < 1e-9 * period, 0.0, rest)
-    rows[:, at.POSITION_GAIN] = population.get("control.position.gain")
-    rows[:, at.FEEDFORWARD] = population.get("control.position.feedforward")
-    velocity, current = design.controller.velocity, design.controller.current
-    if velocity is not None:
-        gain = population.get("control.velocity.gain")
-        rows[:, at.VELOCITY_GAIN] = gain
-        if velocity.integral_time_s is not None:
-            held = velocity.every * period
-            rows[:, at.VELOCITY_INTEGRAL] = gain * held / population.get("control.velocity.integral_time")
-        filter_time = np.asarray(population.get("encoder.filter_time"))
-        rows[:, at.FILTER_COEFFICIENT] = velocity.every * period / (filter_time + velocity.every * period)
-    if current is not None:
-        gain = population.get("control.current.gain")
-        rows[:, at.CURRENT_GAIN] = gain
-        if current.integral_time_s is not None:
-            rows[:, at.CURRENT_INTEGRAL] = gain * period / population.get("control.current.integral_time")
 
 
 def step_columns(step: StepCheck, population: Population) -> Arrays:
     """Figures of the nonlinear step of every design, by the columns of `step_units`."""
-    from nonlinear.batch import run_rows
-
-    result = run_rows(step_rows(step, population), threads=1)
+    result = step_rows(step, population).run(threads=1)
     low, high = result.extreme("current_A")
     figures = result.step
     columns = {

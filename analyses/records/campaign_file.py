@@ -42,6 +42,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
+from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.records.toml_tables import Table, read_toml
 
@@ -177,6 +178,9 @@ def _spec(table: Table) -> RecordSpec:
         }
         for name, default in (("bad_rows", "error"), ("missing", "drop"), ("disorder", "error")):
             parts[name] = table.text(name, default, ("error", "drop"))
+        tolerance = table.quantity("resample_tolerance", "")
+        if tolerance is not None:
+            parts["resample_tolerance"] = tolerance
         table.done()
         return RecordSpec(**parts)
     except InputError as error:
@@ -201,6 +205,7 @@ def _format(table: Table) -> CsvFormat:
         names=names,
         skip_lines=table.integer("skip_lines", 0),
         encoding=table.text("encoding", "utf-8"),
+        matrix=table.text("matrix", ""),
     )
 
 
@@ -223,13 +228,16 @@ def _signals(table: Table) -> tuple[SignalColumn, ...]:
     signals = []
     for name in table:
         one = table.table(name)
+        unit = one.text("unit", "1")
         signals.append(
             SignalColumn(
-                name=name,
+                name=canonical(name, unit),
                 column=one.column("column", name),
-                unit=one.text("unit", "1"),
+                unit=unit,
                 scale=one.number("scale", 1.0) or 0.0,
                 offset=one.number("offset", 0.0) or 0.0,
+                value=one.text("value", "dc", ("dc", "rms", "peak")),
+                between=one.text("between", "line-line", ("line-line", "phase")),
             )
         )
         one.done()

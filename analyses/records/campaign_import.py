@@ -13,7 +13,8 @@ from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, Method, join_records
 from analyses.records.csv_stream import MAX_ROWS, read_csv_record
 from analyses.records.mat_reader import read_mat_record
-from analyses.records.record import Record, RowCounts
+from analyses.records.parquet_reader import read_parquet_record
+from analyses.records.record import InputColumn, Record, RowCounts
 from analyses.records.spec import RecordSpec
 
 
@@ -32,6 +33,8 @@ class ImportedRun:
     speed_rad_s: float | None
     load_Nm: float | None
     sensor_counts: RowCounts | None = None
+    sensor_inputs: tuple[InputColumn, ...] = ()
+    sensor_sha256: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +112,8 @@ def read_record(path: Path, spec: RecordSpec, max_rows: int = MAX_ROWS) -> Recor
     """A record of either kind, by the file's ending."""
     if path.suffix.lower() == ".mat":
         return read_mat_record(path, spec)
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return read_parquet_record(path, spec)
     return read_csv_record(path, spec, max_rows=max_rows)
 
 
@@ -142,6 +147,8 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         speed_rad_s=entry.speed_rad_s,
         load_Nm=entry.load_Nm,
         sensor_counts=None if sensor is None else sensor.counts,
+        sensor_inputs=() if sensor is None else sensor.inputs,
+        sensor_sha256="" if sensor is None else sensor.sha256,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from analyses.records.correlate_clocks import Fit, fit_by_correlation
 from analyses.records.events import motion_events
+from analyses.records.factors import named_factor
 from analyses.records.record import FloatArray, Record
 
 Method = Literal["event", "correlation", "given"]
@@ -94,7 +95,9 @@ def join_records(
     elif method in ("event", "correlation"):
         a, b = np.abs(first[first_signal]), np.abs(second[second_signal])
         find = _by_event if method == "event" else fit_by_correlation
-        fit = find(first.time_s, a, second.time_s, b, f"{first.name} with {second.name}")
+        where = f"{first.name} with {second.name}"
+        _check_durations(first.time_s, a, second.time_s, b, where)
+        fit = find(first.time_s, a, second.time_s, b, where)
     else:
         raise InputError(f'join method "{method}": "event", "correlation" or "given"')
     join = ClockJoin(
@@ -136,6 +139,32 @@ def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
     )
 
 
+def _check_durations(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> None:
+    """Refuse two records in which one motion lasts differently long: no clock is off by so much.
+
+    Raises
+    ------
+    InputError
+        With the ratio, and the factor that explains it where there is one.
+    """
+    events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
+    if events_a is None or events_b is None or events_a.stop_s is None or events_b.stop_s is None:
+        return
+    span_a, span_b = events_a.stop_s - events_a.start_s, events_b.stop_s - events_b.start_s
+    if not (span_a > 0.0 and span_b > 0.0):
+        return
+    ratio = span_a / span_b
+    step = max(float(np.median(np.diff(t_a))) / span_a, float(np.median(np.diff(t_b))) / span_b)
+    if abs(ratio - 1.0) > RATE_SPREAD + 3.0 * step:
+        factor = named_factor(ratio)
+        told = f"factor {factor}" if factor else "a clock is off, or the records are of two runs"
+        raise InputError(
+            f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other, "
+            f"{ratio:.4f} times as long: {told}",
+            where=where,
+        )
+
+
 def _by_event(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> Fit:
     events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
     if events_a is None or events_b is None:
@@ -147,10 +176,6 @@ def _by_event(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, wh
     if events_a.stop_s is not None and events_b.stop_s is not None:
         span = events_b.stop_s - events_b.start_s
         estimate = (events_a.stop_s - events_a.start_s) / span
-        if abs(estimate - 1.0) > RATE_SPREAD:
-            raise InputError(
-                f"the events last {estimate:.4f} times as long in one record as in the other", where=where
-            )
         if step / span < RATE_SPREAD / 10.0:
             rate, rate_std = estimate, float(np.sqrt(2.0) * step / span)
     offset = events_a.start_s - rate * events_b.start_s

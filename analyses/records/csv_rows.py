@@ -28,6 +28,7 @@ class Account:
     rows_out: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
     first: dict[str, str] = field(default_factory=dict)
+    columns: tuple[str, ...] = ()
 
     def drop(self, reason: str, where: str, count: int = 1) -> None:
         """Count rows that are left out, and where the first of them was."""

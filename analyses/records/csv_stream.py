@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
+from analyses.records.inputs import inputs_of
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
 from analyses.records.time_axis import TimeAxis
@@ -78,6 +79,8 @@ def read_csv_record(
         averaged=rows.factor,
         sha256=digest.hexdigest(),
         notes=notes,
+        inputs=inputs_of(spec, account.columns),
+        resample_tolerance=spec.resample_tolerance,
     )
 
 
@@ -133,6 +136,7 @@ def _blocks(
                 if header is None and not text:
                     continue
                 columns = find_columns(header, text, spec, str(path))
+                account.columns = header or tuple(str(k + 1) for k in range(columns.count))
             if text:
                 yield _rows(text, line, columns, spec, account, str(path))
             if progress is not None:

@@ -1,8 +1,8 @@
 """Real numeric arrays out of a MATLAB level 5 file, by a small reader that trusts nothing in it.
 
 A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
-MathWorks, "MAT-File Format" (R2019b), chapter 1. Cells, structures, texts, sparse and complex arrays are
-passed over and named.
+MathWorks, "MAT-File Format" (R2019b), chapter 1. Texts and cells of texts are read as lists of names, numeric
+fields of a structure as ``name.field``; all else (sparse, complex, objects) is passed over and named.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 HEADER = 128
 MATRIX, COMPRESSED = 14, 15
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+CELL, STRUCTURE, TEXT = 1, 2, 4
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX_FLAG = 0x08
 MAX_BYTES = 1 << 31
@@ -30,9 +31,10 @@ MAX_DIMENSIONS = 32
 
 @dataclass
 class MatContent:
-    """The arrays by name, and the names (or kinds) of what was passed over."""
+    """Arrays by name, lists of texts by name, and the names (or kinds) of what was passed over."""
 
     arrays: dict[str, FloatArray] = field(default_factory=dict)
+    texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     passed_over: list[str] = field(default_factory=list)
 
 
@@ -81,6 +83,10 @@ def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -
         return
     flags = struct.unpack(f"{order}I", parts[0][1][:4])[0]
     name = parts[2][1].decode("latin-1")
+    special = {CELL: _take_cell, STRUCTURE: _take_structure, TEXT: _take_text}.get(flags & 0xFF)
+    if special is not None:
+        special(name, parts, order, content)
+        return
     if (flags & 0xFF) not in NUMERIC_CLASSES or (flags >> 8) & COMPLEX_FLAG or len(parts) < 4:
         content.passed_over.append(name)
         return
@@ -95,6 +101,71 @@ def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -
     if min(dimensions) < 0 or count != len(values):
         raise InputError(f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}')
     content.arrays[name] = values.reshape(dimensions, order="F")
+
+
+Parts = list[tuple[int, bytes, int]]
+
+
+def _take_text(name: str, parts: Parts, order: str, content: MatContent) -> None:
+    """A text: one name for each row of a character array."""
+    shape = _numbers(parts[1][0], parts[1][1], order)
+    if len(parts) < 4 or shape is None or len(shape) != 2:
+        content.passed_over.append(name)
+        return
+    rows, columns = int(shape[0]), int(shape[1])
+    kind, body = parts[3][0], parts[3][1]
+    codes = _numbers({16: 2, 17: 4}.get(kind, kind), body, order)
+    if codes is None or len(codes) != rows * columns or np.any(codes > 0x10FFFF) or np.any(codes < 0):
+        content.passed_over.append(name)
+        return
+    table = codes.astype(int).reshape((rows, columns), order="F")
+    content.texts[name] = tuple("".join(map(chr, row)).strip() for row in table.tolist())
+
+
+def _take_cell(name: str, parts: Parts, order: str, content: MatContent) -> None:
+    """A cell array whose cells are all texts of one row."""
+    inner = MatContent()
+    found: list[str] = []
+    for kind, body, place in parts[3:]:
+        inner.texts.clear()
+        if kind == MATRIX and _class_of(body, order) == TEXT:
+            _take(kind, body, place, order, inner)
+        texts = [text for rows in inner.texts.values() for text in rows]
+        if len(texts) != 1:
+            content.passed_over.append(name)
+            return
+        found += texts
+    content.texts[name] = tuple(found)
+
+
+def _take_structure(name: str, parts: Parts, order: str, content: MatContent) -> None:
+    """The numeric fields of a single structure, as ``name.field``."""
+    shape = _numbers(parts[1][0], parts[1][1], order)
+    if len(parts) < 5 or shape is None or np.prod(shape) != 1:
+        content.passed_over.append(name)
+        return
+    length = _numbers(parts[3][0], parts[3][1], order)
+    size = 0 if length is None or not len(length) else int(length[0])
+    text = parts[4][1]
+    if not 0 < size <= 64 or len(text) % size:
+        content.passed_over.append(name)
+        return
+    fields = [text[k : k + size].split(b"\0")[0].decode("latin-1") for k in range(0, len(text), size)]
+    for field_name, (kind, body, place) in zip(fields, parts[5:], strict=False):
+        if kind != MATRIX or _class_of(body, order) not in NUMERIC_CLASSES:
+            content.passed_over.append(f"{name}.{field_name}")
+            continue
+        inner = MatContent()
+        _take(kind, body, place, order, inner)
+        content.arrays |= {f"{name}.{field_name}": values for values in inner.arrays.values()}
+
+
+def _class_of(body: bytes, order: str) -> int:
+    """The class of an array; 0 where it is incomplete."""
+    first = next(iter(_elements(body, 0, len(body), order)), None)
+    if first is None or len(first[1]) < 4:
+        return 0
+    return int(struct.unpack(f"{order}I", first[1][:4])[0]) & 0xFF
 
 
 def _elements(data: bytes, start: int, stop: int, order: str) -> Iterator[tuple[int, bytes, int]]:

@@ -1,28 +1,23 @@
-"""MATLAB files (level 5, not the HDF5 of 7.3) as records."""
+"""MATLAB files (level 5, not the HDF5 of 7.3) as records: vectors by name, or a matrix with named columns."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-
-import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.records.csv_rows import Account, Block
-from analyses.records.mat5 import MAX_BYTES, read_mat5
+from analyses.records.mat5 import MAX_BYTES, MatContent, read_mat5
 from analyses.records.record import FloatArray, Record
-from analyses.records.spec import RecordSpec
-from analyses.records.time_axis import TimeAxis
-from analyses.records.units import converter
+from analyses.records.spec import CsvFormat, RecordSpec
+from analyses.records.table_record import record_of_columns
 
 
 def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = None) -> Record:
     """Read vectors of a MATLAB file into a record; its scalars become ``constants``.
 
-    The columns of the spec are variable names. Rows with NaN and disorder in time are treated as in a CSV
-    file, and counted.
+    The columns of the spec are variable names (``group.field`` for those of a structure), or columns of
+    the matrix that ``spec.format.matrix`` names.
 
     Raises
     ------
@@ -30,34 +25,14 @@ def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = No
         Names the file, the variable and the reason.
     """
     path = Path(path)
-    variables, digest = _load(path)
-    vectors = {key: value for key, value in variables.items() if value.size > 1}
-    columns = [] if spec.time.column is None else [str(spec.time.column)]
-    columns += [str(signal.column) for signal in spec.signals]
-    table = _table([_vector(vectors, column, path) for column in columns], columns, path)
-    account = Account(rows_in=len(table))
-    axis = TimeAxis(spec, account, f"{path}, row")
-    time, values = axis.apply(Block(values=table, lines=np.arange(1, len(table) + 1)))
-    account.rows_out = len(time)
-    if len(time) < 2:
-        raise InputError(f"fewer than two usable rows ({account.frozen()})", where=str(path))
-    converters = [converter(signal) for signal in spec.signals]
-    signals = {
-        c.name: convert(values[:, k])
-        for k, (c, convert) in enumerate(zip(spec.signals, converters, strict=True))
-    }
-    return Record(
-        name=name or path.name,
-        time_s=time,
-        signals=MappingProxyType(signals),
-        units=MappingProxyType({s.name: c.si_unit for s, c in zip(spec.signals, converters, strict=True)}),
-        counts=account.frozen(),
-        sha256=digest,
-        constants=MappingProxyType({k: float(v.ravel()[0]) for k, v in variables.items() if v.size == 1}),
-    )
+    content, digest = load_mat(path)
+    vectors = columns_of(content, spec.format, path)
+    constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
+    return record_of_columns(vectors, spec, path, digest, name=name, constants=constants)
 
 
-def _load(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+def load_mat(path: Path) -> tuple[MatContent, str]:
+    """The content of a file, without its empty arrays, and its SHA-256."""
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
@@ -71,26 +46,35 @@ def _load(path: Path) -> tuple[Mapping[str, FloatArray], str]:
         content = read_mat5(data)
     except InputError as error:
         raise InputError(error.message, where=str(path)) from None
-    arrays = {key: value for key, value in content.arrays.items() if value.size}
-    return arrays, hashlib.sha256(data).hexdigest()
+    content.arrays = {key: value for key, value in content.arrays.items() if value.size}
+    return content, hashlib.sha256(data).hexdigest()
 
 
-def _vector(vectors: Mapping[str, FloatArray], column: str, path: Path) -> FloatArray:
-    if column not in vectors:
-        there = ", ".join(f'"{key}"' for key in list(vectors)[:20]) or "none"
-        raise InputError(f'no vector "{column}"; there are: {there}', where=str(path))
-    vector = vectors[column]
-    if max(vector.shape) != vector.size:
-        raise InputError(f'"{column}" has the shape {vector.shape}: a vector is wanted', where=str(path))
-    if np.isinf(vector).any():
-        row = int(np.isinf(vector.ravel()).argmax()) + 1
-        raise InputError(f'"{column}": not finite', where=f"{path}, row:{row}")
-    return vector.ravel()
+def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[str, FloatArray]:
+    """The vectors of a file by name; where the layout names a matrix, its columns.
+
+    The columns of a matrix are named by the layout's ``names``, or by the only list of texts in the file
+    that has as many entries.
+    """
+    if not layout.matrix:
+        return {key: value for key, value in content.arrays.items() if value.size > 1}
+    matrix = content.arrays.get(layout.matrix)
+    if matrix is None or matrix.ndim != 2:
+        there = ", ".join(f'"{k}" {"x".join(map(str, v.shape))}' for k, v in content.arrays.items())
+        raise InputError(
+            f'matrix = "{layout.matrix}": no such matrix; there are: {there or "none"}', where=str(path)
+        )
+    names = layout.names or names_in(content, matrix.shape[1])
+    if len(names) != matrix.shape[1]:
+        raise InputError(
+            f'matrix "{layout.matrix}" has {matrix.shape[1]} columns, {len(names)} names are given: '
+            "names = [...] must name each",
+            where=str(path),
+        )
+    return {name: matrix[:, k] for k, name in enumerate(names)}
 
 
-def _table(vectors: list[FloatArray], columns: list[str], path: Path) -> FloatArray:
-    lengths = {column: len(vector) for column, vector in zip(columns, vectors, strict=True)}
-    if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{column} {length}" for column, length in lengths.items())
-        raise InputError(f"the vectors differ in length: {told}", where=str(path))
-    return np.column_stack(vectors)
+def names_in(content: MatContent, count: int) -> tuple[str, ...]:
+    """The only list of so many texts in a file; empty where there is none or more than one."""
+    lists = [texts for texts in content.texts.values() if len(texts) == count]
+    return tuple(lists[0]) if len(lists) == 1 else ()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,42 +12,29 @@ from actuator_lti.errors import InputError
 from analyses.records.campaign_file import record_spec
 from analyses.records.campaign_import import read_record
 from analyses.records.csv_stream import MAX_ROWS
+from analyses.records.inputs import spec_of_names
+from analyses.records.mat5 import MatContent
+from analyses.records.mat_reader import columns_of, load_mat, names_in
 from analyses.records.record import Record
-from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
+from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.toml_tables import Table, read_toml
 
-BASES = {
-    "reference": "reference",
-    "position_reference": "position_reference",
-    "output_angle": "output_angle",
-    "motor_angle": "angle",
-    "angle": "angle",
-    "motor_speed": "speed",
-    "speed": "speed",
-    "current": "current",
-    "voltage": "voltage",
-    "torque": "torque",
-    "load": "torque",
-    "supply": "supply",
-    "force": "force",
-    "position": "position",
-    "velocity": "velocity",
-}
-SUFFIXES = {
-    "rad": "rad", "deg": "deg", "rev": "rev", "m": "m", "mm": "mm",
-    "A": "A", "mA": "mA", "V": "V", "N": "N", "Nm": "N*m",
-    "rad_s": "rad/s", "deg_s": "deg/s", "rpm": "rpm", "rev_s": "rev/s", "m_s": "m/s", "mm_s": "mm/s",
-}  # fmt: skip
-LINEAR = {"reference": "position_reference", "output_angle": "position", "speed": "velocity", "angle": ""}
-"""What a trajectory of a linear axis calls its signals; its motor angle is the position once more."""
+HEAD_BYTES = 1 << 16
+EMPS_COLUMNS = {"t", "qm", "qg", "vir", "gtau"}
+_DECIMAL_COMMA = re.compile(r"(?:^|[;\t])\s*[+-]?[0-9]+,[0-9]")
+UNKNOWN = (
+    "the layout is not known (columns such as time_s, reference_deg, Current [mA] are); "
+    "describe it in a record file (TOML), see actuator-lti correlate --help"
+)
 
 
 def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
-    """Read a record whose layout is told by a record file, or is one of those known.
+    """Read a record whose layout is told by a record file, or by its column names.
 
-    Known without a record file: a CSV file (comma, point) with column names such as ``time_s``,
-    ``reference_deg``, ``motor_speed_rad_s``, ``current_A``, ``load_Nm`` (what ``simulate`` writes); the
-    ODrive recorder's CSV; and the MATLAB file of the EMPS benchmark.
+    Known without a record file: CSV (comma, semicolon or tab; decimal point or comma), Parquet and MATLAB
+    files whose columns are named with their units, such as ``time_s``, ``reference_deg``,
+    ``Motor speed [rpm]``, ``current_A``, ``load_Nm`` (what ``simulate`` writes); a MATLAB matrix beside a
+    list of such names; the ODrive recorder's CSV; and the MATLAB file of the EMPS benchmark.
 
     A record file is TOML::
 
@@ -53,7 +43,8 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
         decimal = ","
         time = { column = "t", unit = "ms" }
         signals.reference = { column = "cmd", unit = "deg" }
-        signals.current = { column = "I", unit = "mA" }
+        signals.current = { column = "I", unit = "mA", value = "rms" }
+        resample_tolerance = "2 %"                     # of the range, where steps are missing or uneven
 
     Raises
     ------
@@ -64,11 +55,12 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return _described(path, max_rows)
-    if suffix == ".mat":
-        from analyses.identification.emps import EMPS_SPEC
-
-        return replace(_with_gain(read_record(path, EMPS_SPEC, max_rows)), name=path.name)
-    return read_record(path, _spec_of_csv(path), max_rows)
+    spec, why = _spec_of_file(path, suffix)
+    record = read_record(path, spec, max_rows)
+    inputs = tuple(
+        one if one.signal else replace(one, note=why.get(one.column, one.note)) for one in record.inputs
+    )
+    return replace(_with_gain(record), name=path.name, inputs=inputs)
 
 
 def _described(path: Path, max_rows: int) -> Record:
@@ -77,6 +69,54 @@ def _described(path: Path, max_rows: int) -> Record:
     file = path.parent / table.text("file")
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
     return replace(read_record(file, spec, max_rows), name=file.name)
+
+
+def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:
+    """The layout of a file from the names in it."""
+    if suffix == ".mat":
+        return _spec_of_mat(path)
+    if suffix in (".parquet", ".pq"):
+        from analyses.records.parquet_reader import parquet_columns
+
+        spec, why = spec_of_names(tuple(parquet_columns(path)))
+    else:
+        head = _head(path)
+        if head.startswith("%Motor characterization data"):
+            from analyses.correlation.voltage_motor import ODRIVE_SPEC
+
+            return ODRIVE_SPEC, {}
+        columns, layout = _columns_of_csv(head)
+        spec, why = spec_of_names(columns, layout)
+    if spec is None:
+        raise InputError(_told(UNKNOWN, why), where=str(path))
+    return spec, why
+
+
+def _told(message: str, why: Mapping[str, str]) -> str:
+    """A refusal with the first columns and why they are not understood."""
+    first = "; ".join(f'"{column}": {reason}' for column, reason in list(why.items())[:4])
+    return f"{message} ({first})" if first else message
+
+
+def _spec_of_mat(path: Path) -> tuple[RecordSpec, Mapping[str, str]]:
+    content, _ = load_mat(path)
+    if set(content.arrays) >= EMPS_COLUMNS:
+        from analyses.identification.emps import EMPS_SPEC
+
+        return EMPS_SPEC, {}
+    why: Mapping[str, str] = {}
+    for layout in _layouts(content):
+        spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
+        if spec is not None:
+            return spec, why
+    raise InputError(_told(UNKNOWN, why), where=str(path))
+
+
+def _layouts(content: MatContent) -> list[CsvFormat]:
+    """Vectors by name, then each matrix that has a list of names beside it."""
+    wide = [(name, values.shape) for name, values in content.arrays.items() if min(values.shape) > 1]
+    named = [(name, names_in(content, shape[1])) for name, shape in wide if len(shape) == 2]
+    return [CsvFormat(), *(CsvFormat(matrix=name, names=names) for name, names in named if names)]
 
 
 def _with_gain(record: Record) -> Record:
@@ -88,48 +128,24 @@ def _with_gain(record: Record) -> Record:
     return replace(record, signals=signals, units={**record.units, "force": "N"})
 
 
-def _spec_of_csv(path: Path) -> RecordSpec:
-    """The layout of a CSV file from its first lines."""
+def _head(path: Path) -> str:
     try:
         with path.open("rb") as stream:
-            head = stream.read(1 << 16).decode("utf-8", errors="replace")
+            return stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    if head.startswith("%Motor characterization data"):
-        from analyses.correlation.voltage_motor import ODRIVE_SPEC
-
-        return ODRIVE_SPEC
-    lines = (line.strip() for line in head.splitlines())
-    header = next((line for line in lines if line and not line.startswith("#")), "")
-    columns = [cell.strip().strip('"') for cell in header.split(",")]
-    signals: dict[str, SignalColumn] = {}
-    for column in columns:
-        found = _signal(column)
-        if found is not None:
-            signals.setdefault(found.name, found)
-    if "time_s" not in columns or not signals:
-        raise InputError(
-            "the layout is not known (columns such as time_s, reference_deg, current_A are); "
-            "describe it in a record file (TOML), see actuator-lti correlate --help",
-            where=str(path),
-        )
-    return RecordSpec(format=CsvFormat(), time=TimeColumn(column="time_s"), signals=tuple(signals.values()))
 
 
-def _signal(column: str) -> SignalColumn | None:
-    """The signal that a column name means, from its first words and the unit at its end.
-
-    Examples
-    --------
-    >>> _signal("motor_speed_rpm")
-    SignalColumn(name='speed', column='motor_speed_rpm', unit='rpm', scale=1.0, offset=0.0)
-    """
-    for base in sorted(BASES, key=len, reverse=True):
-        suffix = column.removeprefix(f"{base}_")
-        if suffix != column and suffix in SUFFIXES:
-            unit = SUFFIXES[suffix]
-            name = BASES[base]
-            if unit in ("m", "mm", "m/s", "mm/s"):
-                name = LINEAR.get(name, name)
-            return SignalColumn(name=name, column=column, unit=unit) if name else None
-    return None
+def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:
+    """Column names, separator and decimal mark from the first lines of a file."""
+    lines = [line for line in (row.strip("\r\n") for row in head.split("\n")) if line.strip()]
+    lines = [line for line in lines if not line.lstrip().startswith("#")]
+    header = lines[0] if lines else ""
+    separator = max(";\t,", key=lambda mark: (header.count(mark), mark == ","))
+    comma = separator != "," and any(_DECIMAL_COMMA.search(line) for line in lines[1:50])
+    try:
+        cells = next(csv.reader([header], delimiter=separator), [])
+    except csv.Error:
+        cells = []
+    columns = tuple(cell.strip() for cell in cells)
+    return columns, CsvFormat(separator=separator, decimal="," if comma else ".")

@@ -6,26 +6,17 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_lti.errors import InputError
+from analyses.records.record import RESAMPLE_TOLERANCE
 
 Policy = Literal["error", "drop"]
 
 MISSING_TEXTS = ("", "nan", "NaN", "NAN", "na", "NA", "N/A", "null", "NULL", "-")
-KNOWN_UNITS = {
-    "time": "s",
-    "current": "A",
-    "voltage": "V",
-    "supply": "V",
-    "speed": "rad/s",
-    "angle": "rad",
-    "torque": "N*m",
-    "output_angle": "rad",
-    "reference": "rad",
-    "position": "m",
-    "velocity": "m/s",
-    "position_reference": "m",
-    "force": "N",
+AC_FORMS = {
+    "A": {"dc": 1.0, "rms": 1.5**0.5, "peak": 0.75**0.5},
+    "V": {"dc": 1.0, "rms": 2.0**0.5, "peak": 1.0},
 }
-"""SI units of the signals that the analyses know by name; any other name is kept in its own SI unit."""
+"""Factors to the equivalent DC motor (`Design.effective_motor`): i from a line current, u from line-line."""
+TO_LINE = 3.0**0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +42,8 @@ class CsvFormat:
         Lines to pass over at the start.
     encoding : str
         Of the header only; the numbers are plain ASCII.
+    matrix : str
+        Of a MATLAB file: the matrix whose columns are ``names`` (or named by a list of texts in the file).
     """
 
     separator: str = ","
@@ -61,6 +54,7 @@ class CsvFormat:
     names: tuple[str, ...] = ()
     skip_lines: int = 0
     encoding: str = "utf-8"
+    matrix: str = ""
 
     def __post_init__(self) -> None:
         if self.separator != "whitespace" and (len(self.separator) != 1 or self.separator in "\r\n\"'"):
@@ -114,7 +108,9 @@ class TimeColumn:
 class SignalColumn:
     """One signal: its name in the analyses, its column (name, or number from 1), its unit.
 
-    The value in SI is ``(raw + offset) * scale`` converted from ``unit``.
+    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. The model has the equivalent DC
+    motor: of an AC motor ``value`` tells whether a line current or a voltage was written as ``rms`` or
+    ``peak``, and ``between = "phase"`` that a voltage is that of a phase to the star point.
     """
 
     name: str
@@ -122,6 +118,23 @@ class SignalColumn:
     unit: str = "1"
     scale: float = 1.0
     offset: float = 0.0
+    value: str = "dc"
+    between: str = "line-line"
+
+    def __post_init__(self) -> None:
+        for key, allowed in (("value", ("dc", "rms", "peak")), ("between", ("line-line", "phase"))):
+            if getattr(self, key) not in allowed:
+                told = " or ".join(f'"{choice}"' for choice in allowed)
+                raise InputError(f'signals.{self.name}.{key} = "{getattr(self, key)}": {told}')
+
+    @property
+    def note(self) -> str:
+        """What is done beside the conversion of the unit; empty for nothing."""
+        parts = [] if self.value == "dc" else [f"{self.value} of AC, as the equivalent DC motor has it"]
+        parts += ["of a phase, times root 3"] if self.between == "phase" else []
+        parts += [f"scale {self.scale:g}"] if self.scale != 1.0 else []
+        parts += [f"offset {self.offset:g}"] if self.offset != 0.0 else []
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +144,7 @@ class RecordSpec:
     ``bad_rows``: what to do with a row that is no row of numbers (default: refuse the file, with line,
     column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row).
     ``disorder``: what to do when the time does not increase (default: refuse). Dropped rows are counted
-    by reason.
+    by reason. ``resample_tolerance``: see `Record.resampled`.
     """
 
     time: TimeColumn
@@ -140,8 +153,11 @@ class RecordSpec:
     bad_rows: Policy = "error"
     missing: Policy = "drop"
     disorder: Policy = "error"
+    resample_tolerance: float = RESAMPLE_TOLERANCE
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.resample_tolerance <= 1.0:
+            raise InputError(f"resample_tolerance = {self.resample_tolerance}: above 0, up to 100 %")
         if not self.signals:
             raise InputError("signals: at least one is needed")
         names = [signal.name for signal in self.signals]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,18 +9,12 @@ from typing import Any
 
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_campaign_toml
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """The file as a dictionary, or one line that says where it is broken."""
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8: {error.reason} at byte {error.start}", where=str(path)) from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(f"is no TOML: {error}", where=str(path)) from None
+    return read_campaign_toml(path, "campaign or record file")
 
 
 class Table:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import FloatArray
-from analyses.records.spec import KNOWN_UNITS, SignalColumn
+from analyses.records.spec import AC_FORMS, TO_LINE, SignalColumn
 
 
 @dataclass(frozen=True)
@@ -46,4 +47,9 @@ def converter(signal: SignalColumn) -> Converter:
     """
     known = KNOWN_UNITS.get(signal.name)
     factor = unit_factor(signal.unit, known, f"signals.{signal.name}")
+    forms = AC_FORMS.get(known or "")
+    if forms is None and signal.value != "dc":
+        raise InputError(f'signals.{signal.name}.value = "{signal.value}": only of a current or a voltage')
+    factor *= 1.0 if forms is None else forms[signal.value]
+    factor *= TO_LINE if signal.between == "phase" else 1.0
     return Converter(signal.offset, signal.scale * factor, known or f"SI of {signal.unit}")

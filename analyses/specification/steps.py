@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_step, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import LIMITERS, Rows
 
 SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
 BAND = 0.02
@@ -55,21 +53,21 @@ def step_times(
     loads = design.validation.loads_Nm
     full, Ts = design.validation.full_deflection_rad, design.controller.period_s
     sizes = np.tile(np.array(fractions) * full, len(loads))
-    rows = repeat_row(design_row(design), len(sizes))
-    put_step(rows, at.COMMAND, sizes)
-    rows[:, at.LOAD] = np.repeat(loads, len(fractions))
-    rows[:, at.STEP_TARGET], rows[:, at.STEP_BAND] = sizes, BAND
-    rows[:, at.WITH_EXTREMES] = 1.0
+    rows = Rows.of(design, len(sizes))
+    rows.step("command", sizes)
+    rows["load"] = np.repeat(loads, len(fractions))
+    rows.step_figures(sizes, BAND)
+    rows.extremes()
     travel = sizes / rate_rad_s if 0.0 < rate_rad_s < math.inf else np.zeros(len(sizes))
     swing = np.sqrt(sizes / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else travel
     wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + 8.0 * settling_s) / Ts), LONGEST_TICKS)
-    rows[:, at.TICKS] = wait
-    result = run_rows(rows)
+    rows["ticks"] = wait
+    result = rows.run()
     speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
     electric = design.motor.has_electrical_dynamics
     return tuple(
         StepTime(
-            load_Nm=float(rows[k, at.LOAD]),
+            load_Nm=float(rows["load"][k]),
             fraction=fractions[k % len(fractions)],
             amplitude_rad=float(sizes[k]),
             rise_time_s=_number(result.step.rise_time_s[k]),
@@ -79,7 +77,7 @@ def step_times(
             peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
             limits={
                 name: float(result.limit_fraction(name)[k])
-                for name in at.LIMITERS
+                for name in LIMITERS
                 if result.limit_fraction(name)[k] > 0.0
             },
             waited_s=float(wait[k]) * Ts,

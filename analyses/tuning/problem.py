@@ -13,7 +13,7 @@ from actuator_lti.batch import Population, linear_figures
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
-from analyses.sampling import Factor
+from analyses.sampling import Factor, correlation_of, semidefinite_root
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -81,14 +81,23 @@ class Problem:
 
     @cached_property
     def all_corners(self) -> np.ndarray:
-        """Nominal point, then the corners of the tolerance box, shape (corners, factors)."""
+        """Nominal point, then the corners of the tolerance box, shape (corners, factors).
+
+        Of correlated parameters the corners are moved as they are correlated (the root of their correlation
+        matrix times the signs, within the box): two that are one go up and down together.
+        """
         nominal = np.array([[f.nominal for f in self.factors]])
         if not self.factors:
             return np.zeros((1, 0))
         lower, upper = np.array([f.box for f in self.factors]).T
         size = len(self.factors)
         bits = (np.arange(2**size)[:, None] >> np.arange(size)) & 1
-        return np.vstack([nominal, np.where(bits, upper, lower)])
+        matrix = correlation_of(self.design, [f.path for f in self.factors])
+        if np.array_equal(matrix, np.eye(size)):
+            return np.vstack([nominal, np.where(bits, upper, lower)])
+        moved = np.clip((2.0 * bits - 1.0) @ semidefinite_root(matrix).T, -1.0, 1.0)
+        reach = np.where(moved > 0.0, upper - nominal, nominal - lower)
+        return np.vstack([nominal, np.unique(nominal + moved * reach, axis=0)])
 
     def distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).

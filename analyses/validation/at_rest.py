@@ -16,9 +16,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.validation.coherent import coherent
 from analyses.validation.response import linear_response
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_sine, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
 
 if TYPE_CHECKING:
@@ -87,12 +85,12 @@ def sweep_from_rest(
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
     window = coherent(asked, tick_s, n, least_cycles=2)
     amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
-    rows = repeat_row(design_row(design), asked.size)
-    rows[:, at.LOAD] = load_Nm
-    rows[:, at.TICKS] = settle_ticks + 2 * window.ticks + np.ceil(4 * window.ticks / window.cycles)
-    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window.ticks, window.cycles, 1
-    put_sine(rows, at.COMMAND, amplitude, window.frequency_hz)
-    result = run_rows(rows)
+    rows = Rows.of(design, asked.size)
+    rows["load"] = load_Nm
+    rows["ticks"] = settle_ticks + 2 * window.ticks + np.ceil(4 * window.ticks / window.cycles)
+    rows.window(window.ticks, window.cycles)
+    rows.sine("command", amplitude, window.frequency_hz)
+    result = rows.run()
     measured = result.phasor("output_angle_rad") / amplitude
     speed = np.abs(result.phasor("motor_speed_rad_s"))
     moving = np.abs(measured) > NO_MOTION
@@ -115,7 +113,7 @@ def sweep_from_rest(
 
 def _acting(result: BatchResult, k: int) -> str:
     """Name of the limit that acted longest in the last window of a run."""
-    used = {name: float(result.window_limit_fraction(name)[k]) for name in at.LIMITERS}
+    used = {name: float(result.window_limit_fraction(name)[k]) for name in LIMITERS}
     name = max(used, key=lambda item: used[item])
     return name if used[name] > 0.0 else ""
 

@@ -18,8 +18,7 @@ import numpy.typing as npt
 
 from analyses.validation.coherent import coherent
 from analyses.validation.rig import Rig
-from nonlinear._kernels import layout as at
-from nonlinear.batch import injection_place, run_rows
+from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -74,24 +73,21 @@ class Search:
     close: float = CLOSE
     smooth: bool = True
 
-    def rows(self, values: Floats) -> Floats:
+    def rows(self, values: Floats) -> Rows:
         """One run a value."""
         window = coherent(
             self.frequency_hz, self.setup.design.controller.period_s, self.setup.base_ticks, self.cycles
         )
-        rows = np.array([self.row(float(value)) for value in values])
-        rows[:, at.TICKS] = self.settle_ticks + 2 * window.ticks[0]
-        rows[:, at.WINDOW], rows[:, at.CYCLES] = window.ticks[0], window.cycles[0]
-        rows[:, at.HARMONICS] = 1
+        rows = Rows.join([self.row(float(value)) for value in values])
+        rows["ticks"] = self.settle_ticks + 2 * window.ticks[0]
+        rows.window(window.ticks[0], window.cycles[0])
         return rows
 
-    def row(self, value: float) -> Floats:
+    def row(self, value: float) -> Rows:
         """The rig at one value, with a faint impulse at the point in its first sample."""
         setup = self.setup
         row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
-        place = injection_place(setup.point)
-        row[place], row[place + 1] = at.TABLE, self.kick
-        row[place + 3], row[place + 4] = 0, IMPULSE.size
+        row.series(setup.point, IMPULSE, self.kick)
         return row
 
     @property
@@ -109,7 +105,7 @@ class Search:
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.log(last / earlier)
         gone = (last <= NOTHING * self.kick) | ~np.isfinite(found)
-        limited = np.any([result.limit_fraction(name) > 0.0 for name in at.LIMITERS], axis=0)
+        limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.friction_on)
         return np.where(burst, inf, np.where(gone, -inf, found))
 
@@ -131,8 +127,8 @@ class Search:
         """Frequency of the oscillation, Hz, from the turn of the fundamental between the windows."""
         last, earlier = (result.phasor(self.setup.before, 1, k) for k in (0, 1))
         turn = np.angle(last * earlier.conj())
-        seconds = result.rows[:, at.WINDOW] * result.rows[:, at.PERIOD]
-        return (result.rows[:, at.CYCLES] + turn / (2.0 * np.pi)) / seconds
+        seconds = result.column("window") * result.column("period")
+        return (result.column("cycles") + turn / (2.0 * np.pi)) / seconds
 
 
 IMPULSE = np.array([1.0, 0.0])
@@ -241,13 +237,10 @@ def find_borders(
         if not waiting:
             break
         parts = [hunt.search.rows(hunt.values) for hunt in waiting]
-        result = run_rows(np.concatenate(parts), IMPULSE, threads=threads)
+        result = Rows.join(parts).run(threads=threads)
         ends = np.cumsum([len(part) for part in parts])
         for hunt, part, end in zip(waiting, parts, ends, strict=True):
-            piece = slice(end - len(part), end)
-            hunt.take(
-                BatchResult(rows=result.rows[piece], outs=result.outs[piece], status=result.status[piece])
-            )
+            hunt.take(result.part(slice(end - len(part), end)))
         if progress is not None:
             progress(k + 1, ROUNDS)
     return [hunt.border() for hunt in hunts]

@@ -25,9 +25,7 @@ from actuator_lti.design.model import Design
 from analyses.validation.confirm import oscillation_hz
 from analyses.validation.release import full_range, full_torque_Nm
 from analyses.validation.rig import points_of
-from nonlinear._kernels import layout as at
-from nonlinear.batch import put_step, repeat_row, run_rows
-from nonlinear.parameters import design_row
+from nonlinear import Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
@@ -237,7 +235,7 @@ def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, flo
 def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:
     """Which steps from rest settle: the error left is small, or at least still falls."""
     rows = step_rows(design, sizes_rad, settle_ticks)
-    result = run_rows(rows)
+    result = rows.run()
     errors = []
     for last in (0, 1):
         low, high = result.span("output_angle_rad", last)
@@ -259,16 +257,16 @@ def _standing(design: Design) -> float:
     return 2.0 * dry / (per_unit * gain) / design.total_ratio
 
 
-def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Floats:
+def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Rows:
     """Runs of steps from rest, long enough to travel and to settle."""
-    rows = repeat_row(design_row(design), sizes_rad.size)
+    rows = Rows.of(design, sizes_rad.size)
     way, tick_s = sizes_rad * design.total_ratio, design.controller.period_s
     travel = way / (full_range(design)["velocity"] * tick_s)
     swing = 4.0 * np.sqrt(2.0 * way * design.inertia_kgm2 / full_torque_Nm(design)) / tick_s
     window = np.ceil(np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
-    rows[:, at.TICKS] = np.ceil(2.0 * travel) + 4 * window
-    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window, 1, 0
-    put_step(rows, at.COMMAND, sizes_rad)
+    rows["ticks"] = np.ceil(2.0 * travel) + 4 * window
+    rows.window(window, 1, 0)
+    rows.step("command", sizes_rad)
     return rows
 
 
@@ -276,7 +274,7 @@ def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
     from nonlinear import commands, simulate
 
-    ticks = step_rows(design, np.array([size_rad]), settle_ticks)[0, at.TICKS]
+    ticks = step_rows(design, np.array([size_rad]), settle_ticks).value("ticks")
     run = simulate(
         design, commands.step(size_rad), ticks * design.controller.period_s, raise_on_failure=False
     )

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from analyses.validation.borders import Border, Kind, Search, find_borders
 from analyses.validation.rig import Rig
+from nonlinear import Rows
 from nonlinear.probe import fractional_delay
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ class Confirmation:
 class ComputingDelay(Search):
     """A search over the computing delay itself, exact at any fraction of a tick."""
 
-    def row(self, value: float) -> Floats:
+    def row(self, value: float) -> Rows:
         """The rig with the voltage acting ``value`` ticks later."""
         design = self.setup.design
         control = design.controller

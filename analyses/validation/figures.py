@@ -16,9 +16,6 @@ import numpy.typing as npt
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig
 from analyses.validation.sweep import stepped_sine
-from nonlinear._kernels import layout as at
-from nonlinear.batch import injection_place
-from nonlinear.simulation import run_row
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
@@ -228,10 +225,9 @@ def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, s
     """Run one step; times and response at the updates of the point."""
     row = setup.row()
     n = setup.hold_ticks
-    row[at.TICKS] = settle_ticks + 4 * n
-    place = injection_place(setup.point)
-    row[place], row[place + 1], row[place + 2] = at.STEP, size, 0.0
-    run = run_row(setup.design, row, np.zeros(1))
+    row["ticks"] = settle_ticks + 4 * n
+    row.step(setup.point, size)
+    run = row.trajectory()
     before = run.probes[setup.point].before[::n]
     steady = before[0]
     reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")

@@ -19,8 +19,7 @@ from analyses.validation.ledger import (
     Entry,
     not_judged,
 )
-from nonlinear._kernels import layout as at
-from nonlinear.batch import run_rows
+from nonlinear import LIMITERS
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -29,6 +28,9 @@ LIMIT_NAMES = {
     "acceleration": "acceleration limit",
     "current": "peak current",
     "voltage": "voltage limit",
+    "torque-command": "limit in front of the torque filters",
+    "overload": "overload protection",
+    "profile": "profile of the command",
 }
 
 
@@ -48,8 +50,8 @@ def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
     full = design.validation.full_deflection_rad
     amplitude = full * np.array(design.validation.amplitude_fractions)
     rows = step_rows(design, amplitude, settle_ticks)
-    rows[:, at.STEP_TARGET], rows[:, at.STEP_BAND] = amplitude, 0.02
-    result = run_rows(rows)
+    rows.step_figures(amplitude)
+    result = rows.run()
     step = result.step
     return RestSteps(
         amplitude,
@@ -62,7 +64,7 @@ def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
 
 def _reason(design: Design, result: BatchResult, k: int) -> str:
     """What took part in a run that the linear loop does not know of."""
-    shares = {name: 100.0 * float(result.limit_fraction(name)[k]) for name in at.LIMITERS}
+    shares = {name: 100.0 * float(result.limit_fraction(name)[k]) for name in LIMITERS}
     words = [f"{LIMIT_NAMES[name]} {share:.2g} %" for name, share in shares.items() if share > 0.0]
     if result.events[k] == 0 and result.stick_fraction[k] > 0.99:
         return "no motion: dry friction holds the rotor"

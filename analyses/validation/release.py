@@ -20,8 +20,7 @@ from analyses.validation.borders import Border, Search, find_borders
 from analyses.validation.confirm import Confirmation
 from analyses.validation.riding import Ride
 from analyses.validation.rig import Rig
-from nonlinear._kernels import layout as at
-from nonlinear.batch import run_rows
+from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -52,17 +51,17 @@ class Release(Search):
             [[1.0], np.geomspace(max(self.expected / 3.0, 1.05), 4.0 * self.expected, VALUES)]
         )
 
-    def row(self, value: float) -> Floats:
+    def row(self, value: float) -> Rows:
         """The rig standing, then let go."""
         setup = self.setup
         row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
         design, sizes = setup.design, full_range(setup.design)
         if setup.outer == "position":
-            row[at.ANGLE_START] = -self.part * sizes["position"] * design.total_ratio
+            row["angle_start"] = -self.part * sizes["position"] * design.total_ratio
         elif setup.outer == "velocity":
-            row[at.SPEED_START] = self.part * sizes["velocity"]
+            row["speed_start"] = self.part * sizes["velocity"]
         else:
-            row[at.CURRENT_START] = self.part * sizes["current"]
+            row["current_start"] = self.part * sizes["current"]
         return row
 
     def growth(self, result: BatchResult) -> Floats:
@@ -189,12 +188,12 @@ def _limiters(searches: Sequence[Release], borders: Sequence[Border], threads: i
     known = [k for k, border in enumerate(borders) if border.value is not None]
     if not known:
         return names
-    rows = np.concatenate([searches[k].rows(np.array([borders[k].bracket[1]])) for k in known])
-    result = run_rows(rows, threads=threads)
-    shares = np.array([result.window_limit_fraction(name) for name in at.LIMITERS])
+    rows = Rows.join([searches[k].rows(np.array([borders[k].bracket[1]])) for k in known])
+    result = rows.run(threads=threads)
+    shares = np.array([result.window_limit_fraction(name) for name in LIMITERS])
     for k, share in zip(known, shares.T, strict=True):
         if share.max() > 0.0:
-            names[k] = at.LIMITERS[int(np.argmax(share))]
+            names[k] = LIMITERS[int(np.argmax(share))]
     return names
 
 

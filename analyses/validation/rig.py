@@ -17,10 +17,8 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.validation.riding import Ride, ride
-from nonlinear._kernels import layout as at
-from nonlinear.batch import injection_place, probe_place
-from nonlinear.parameters import design_row
-from nonlinear.probe import Probe, write_probe
+from nonlinear import Rows
+from nonlinear.probe import Probe
 
 Floats = npt.NDArray[np.float64]
 STAGES = ("current", "velocity", "position")
@@ -90,7 +88,7 @@ class Rig:
     def _running(self) -> tuple[str, ...]:
         return self.stages[: self.stages.index(self.outer) + 1]
 
-    def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Floats:
+    def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
         """Parameters of a run that starts in the steady state of the ride.
 
         Parameters
@@ -101,60 +99,56 @@ class Rig:
             Extra delay at the point, in its own samples.
         """
         row = self._base.copy()
-        write_probe(Probe(point=self.point, delay_samples=delay_samples), row)  # type: ignore[arg-type]
+        row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
         for place in GAINS[producer(self.design, self.point)]:
             row[place] *= gain
         self._start(row)
         return row
 
     @cached_property
-    def _base(self) -> Floats:
+    def _base(self) -> Rows:
         """The row without instrument and state."""
-        row = design_row(self.design, friction_on=self.ride.friction_on, limits_on=self.limits_on)
-        if self.design.load.path == "back-drivable":
-            row[at.LOAD_SLOPE] = self.design.load.moment_slope_Nm_rad
-        row[at.FEEDFORWARD] = 0.0
+        row = Rows.of(self.design, friction_on=self.ride.friction_on, limits_on=self.limits_on)
+        for name in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
+            row[name] = 0.0
         if self.outer != "position":
-            row[at.POSITION_GAIN] = 0.0
+            for name in GAINS["position"]:
+                row[name] = 0.0
         if self.outer == "current":
-            row[at.VELOCITY_GAIN] = row[at.VELOCITY_INTEGRAL] = 0.0
+            row["velocity_gain"] = row["velocity_integral"] = 0.0
         return row
 
-    def _start(self, row: Floats) -> None:
+    def _start(self, row: Rows) -> None:
         """Write the steady state, from the motor outwards."""
-        row[at.SPEED_START], row[at.CURRENT_START] = self.ride.speed_rad_s, self.ride.current_A
+        row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
         wanted, point = self.ride.voltage_V, "u"
-        row[at.VOLTAGE_START] = wanted
+        row["voltage_start"] = wanted
         for stage in self._running:
             if stage == "position":
-                row[at.ANGLE_START] = -wanted / row[at.POSITION_GAIN]
+                row["angle_start"] = -wanted / row.value("position_gain")
                 if point == "w_ref":
-                    row[at.SPEED_COMMAND_START] = wanted
+                    row["speed_command_start"] = wanted
                 self._command(row)
                 return
             integral, step, kp = INTEGRALS[stage]
             base = self.ride.current_A if stage == "current" else self.ride.speed_rad_s
-            if row[step] != 0.0:
+            if row.value(step) != 0.0:
                 row[integral], wanted = wanted, base
             else:
-                wanted = base + wanted / row[kp]
+                wanted = base + wanted / row.value(kp)
             point = "i_ref" if stage == "current" else "w_ref"
             if point == "i_ref":
-                row[at.CURRENT_COMMAND_START] = wanted
+                row["current_command_start"] = wanted
         self._constant(row, point, wanted)
 
-    def _command(self, row: Floats) -> None:
+    def _command(self, row: Rows) -> None:
         """Let the command run with the motor."""
-        row[at.BIAS] = at.RAMP
-        row[at.BIAS + 1] = self.ride.speed_rad_s / self.design.total_ratio
-        row[at.BIAS + 2], row[at.BIAS + 3] = 0.0, inf
+        row.ramp("bias", self.ride.speed_rad_s / self.design.total_ratio)
 
     @staticmethod
-    def _constant(row: Floats, point: str, value: float) -> None:
+    def _constant(row: Rows, point: str, value: float) -> None:
         """Replace the outer controllers, which are out of action, by a constant command."""
-        row[probe_place(point) + at.PROBE_ON] = 1.0
-        place = injection_place(point)
-        row[place], row[place + 1], row[place + 2] = at.STEP, value, -1.0
+        row.step(point, value, -1.0)
 
     @cached_property
     def room(self) -> dict[str, float]:
@@ -162,8 +156,8 @@ class Rig:
         row, limits = self.row(), self.design.limits
         moving = abs(self.ride.speed_rad_s)
         room = {"motor_speed_rad_s": 0.7 * moving if moving else inf}
-        room["voltage_V"] = limits.voltage_V - abs(row[at.VOLTAGE_START])
-        room["current_command_A"] = limits.peak_current_A - abs(row[at.CURRENT_COMMAND_START])
+        room["voltage_V"] = limits.voltage_V - abs(row.value("voltage_start"))
+        room["current_command_A"] = limits.peak_current_A - abs(row.value("current_command_start"))
         room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.ride.speed_rad_s)
         if not self.limits_on:
             room = {name: value if name == "motor_speed_rad_s" else inf for name, value in room.items()}
@@ -171,14 +165,14 @@ class Rig:
 
 
 INTEGRALS = {
-    "current": (at.CURRENT_INTEGRATOR_START, at.CURRENT_INTEGRAL, at.CURRENT_GAIN),
-    "velocity": (at.VELOCITY_INTEGRATOR_START, at.VELOCITY_INTEGRAL, at.VELOCITY_GAIN),
+    "current": ("current_integrator_start", "current_integral", "current_gain"),
+    "velocity": ("velocity_integrator_start", "velocity_integral", "velocity_gain"),
 }
 
 GAINS = {
-    "current": (at.CURRENT_GAIN, at.CURRENT_INTEGRAL),
-    "velocity": (at.VELOCITY_GAIN, at.VELOCITY_INTEGRAL),
-    "position": (at.POSITION_GAIN,),
+    "current": ("current_gain", "current_integral"),
+    "velocity": ("velocity_gain", "velocity_integral"),
+    "position": ("position_gain", "position_integral", "derivative"),
 }
 
 

@@ -21,8 +21,7 @@ from actuator_lti.errors import InputError
 from analyses.validation.coherent import Coherent, coherent, hold_factor
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig, rig
-from nonlinear._kernels import layout as at
-from nonlinear.batch import injection_place, put_sine, repeat_row, run_rows
+from nonlinear import LIMITERS
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -106,7 +105,7 @@ def stepped_sine(
         settle_ticks = min(4 * settle_ticks, LONGEST_SETTLE_TICKS)
         part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
         again = _run(setup, part, amplitude[poor], settle_ticks, threads)
-        result.rows[poor], result.outs[poor], result.status[poor] = again.rows, again.outs, again.status
+        result = result.with_part(poor, again)
     return _sweep(setup, window, amplitude, result)
 
 
@@ -177,11 +176,11 @@ def _run(
     setup: Rig, window: Coherent, amplitude: Floats, settle_ticks: int, threads: int | None
 ) -> BatchResult:
     """Run one row a frequency."""
-    rows = repeat_row(setup.row(), window.ticks.size)
-    rows[:, at.TICKS] = settle_ticks + 2 * window.ticks
-    rows[:, at.WINDOW], rows[:, at.CYCLES], rows[:, at.HARMONICS] = window.ticks, window.cycles, 1
-    put_sine(rows, injection_place(setup.point), amplitude, window.frequency_hz)
-    return run_rows(rows, threads=threads)
+    rows = setup.row().repeat(window.ticks.size)
+    rows["ticks"] = settle_ticks + 2 * window.ticks
+    rows.window(window.ticks, window.cycles)
+    rows.sine(setup.point, amplitude, window.frequency_hz)
+    return rows.run(threads=threads)
 
 
 def _reasons(setup: Rig, result: BatchResult) -> list[str]:
@@ -189,7 +188,7 @@ def _reasons(setup: Rig, result: BatchResult) -> list[str]:
     reasons = [""] * result.status.size
     steady = unsteadiness(setup, result) <= STEADY
     for k in range(len(reasons)):
-        acting = [name for name in at.LIMITERS if result.window_limit_fraction(name)[k] > 0.0]
+        acting = [name for name in LIMITERS if result.window_limit_fraction(name)[k] > 0.0]
         if not result.ok[k]:
             reasons[k] = "run stopped"
         elif acting:
@@ -217,8 +216,8 @@ def phasor(setup: Rig, result: BatchResult, signal: str, last: int = 0) -> Compl
         return found
     from analyses.validation.coherent import ramp_phasor
 
-    ticks, length = result.rows[:, at.TICKS], result.rows[:, at.WINDOW]
-    window = Coherent(found.real, length.astype(np.int64), result.rows[:, at.CYCLES].astype(np.int64))
+    ticks, length = result.column("ticks"), result.column("window")
+    window = Coherent(found.real, length.astype(np.int64), result.column("cycles").astype(np.int64))
     slope = setup.ride.speed_rad_s / setup.design.total_ratio * setup.design.controller.period_s
     return found - ramp_phasor(slope, window, ticks - (last + 1) * length)
 

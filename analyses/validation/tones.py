@@ -12,9 +12,6 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.validation.rig import STAGES, Rig, rig
 from analyses.validation.sweep import settling_ticks, stepped_sine
-from nonlinear._kernels import layout as at
-from nonlinear.batch import injection_place
-from nonlinear.simulation import run_row
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -99,10 +96,10 @@ def _measure(
     signal = _signal(lines, samples, amplitude, seed)
     total = settle + PERIODS * samples
     table = np.repeat(np.tile(signal, total // samples), n)
-    row, place = setup.row(), injection_place(setup.point)
-    row[at.TICKS] = table.size
-    row[place], row[place + 1], row[place + 3], row[place + 4] = at.TABLE, 1.0, 0, table.size
-    run = run_row(setup.design, row, table)
+    row = setup.row()
+    row["ticks"] = table.size
+    row.series(setup.point, table)
+    run = row.trajectory()
     record = run.probes[setup.point]
     before, after, injected = (
         np.fft.rfft(x[::n][settle:].reshape(PERIODS, samples), axis=1)[:, lines] * 2.0 / samples

@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nonlinear._kernels import layout
+from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.prepare import prepare, prepare_sizes
 from nonlinear._kernels.run import run
+from nonlinear._kernels.smooth import prepare_tanh
 from nonlinear._kernels.tick import init
 
 Floats = npt.NDArray[np.float64]
@@ -23,6 +25,10 @@ def parameters(row: Floats) -> tuple[Floats, Floats]:
     prepare_sizes(p)
     s = np.zeros(int(p[layout.STATE_SIZE]))
     prepare(p, s)
+    if row[layout.WITH_ENERGY] > 0.0:
+        prepare_forms(p, s)
+    if row[layout.LAW] > 0.0:
+        prepare_tanh(p, s)
     init(p, s)
     return p, s
 
@@ -38,4 +44,5 @@ def call(
     """Run one row (see `run`); ``history`` is (columns, rows) or empty."""
     p, s = parameters(row)
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
-    return int(run(p, s, io, block, tables, history.reshape(-1), flags, out, shared))
+    rare = 1.0 if row[layout.LAW] > 0.0 or row[layout.ELASTIC_DRIVE] > 0.0 else None
+    return int(run(p, s, io, block, tables, history.reshape(-1), flags, out, shared, rare))

@@ -61,7 +61,7 @@ def average(p, s, x):  # type: ignore[no-untyped-def]
 
 @scalar
 def shape(p, s, wanted):  # type: ignore[no-untyped-def]
-    """The command behind profile and filter, at the period of the outermost stage; notes the profile's flag."""
+    """The command behind profile and filter, at the outermost stage's period; notes the profile's flag."""
     r = wanted
     s[layout.S_FLAGS_PROFILE] = 0.0
     if p[layout.PROFILED] > 0.0:

@@ -47,6 +47,11 @@ def inlined(function: Callable[..., Any]) -> Any:
     return _stamped(njit(**OPTIONS, _nrt=False, forceinline=True, no_cpython_wrapper=True)(function))
 
 
+def woven(function: Callable[..., Any]) -> Any:
+    """Copied into its callers before anything is compiled: for what the tick loop runs through once."""
+    return njit(inline="always")(function)
+
+
 def _stamped(dispatcher: Any) -> Any:
     cache_file: Any = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if hasattr(cache_file, "_source_stamp"):

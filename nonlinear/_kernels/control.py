@@ -6,10 +6,17 @@ It is a function of its own: with measurements written into ``io`` it runs witho
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, inlined, scalar
+from nonlinear._kernels.compiled import entry, inlined, scalar, woven
 from nonlinear._kernels.estimate import measured_speed
 from nonlinear._kernels.filters import chain
-from nonlinear._kernels.position import limited, outer_rare, probed_output, put_current, put_outer, put_voltage
+from nonlinear._kernels.position import (
+    limited,
+    outer_rare,
+    probed_output,
+    put_current,
+    put_outer,
+    put_voltage,
+)
 from nonlinear._kernels.probes import PROBE_Y
 from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
 
@@ -62,7 +69,7 @@ def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
 @inlined
 def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
     """Update the velocity stage."""
-    measured = measured_speed(p, s, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+    measured = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
     s[layout.S_MEASURED_SPEED] = measured
     e = s[layout.S_SPEED_REFERENCE] - measured
     cascaded = p[layout.HAS_CURRENT] > 0.0
@@ -81,11 +88,11 @@ def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def current_rare(p, s, i, w, th):  # type: ignore[no-untyped-def]
+def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     if p[layout.HAS_VELOCITY] <= 0.0 and p[layout.BACK_EMF_FEEDFORWARD] != 0.0:
-        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, w, th)
+        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th)
     extra = p[layout.BACK_EMF_FEEDFORWARD] * s[layout.S_MEASURED_SPEED]
     extra += p[layout.RESISTANCE_FEEDFORWARD] * wanted
     out, integral, hit = regulator(
@@ -103,7 +110,7 @@ def current_rare(p, s, i, w, th):  # type: ignore[no-untyped-def]
 def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """Update the current stage: every tick."""
     if p[layout.RARE_CURRENT] > 0.0:
-        out = current_rare(p, s, i, w, th)
+        out = current_rare(p, s, io, i, w, th)
     else:
         e, step = s[layout.S_CURRENT_REFERENCE] - i, p[layout.CURRENT_INTEGRAL]
         before = s[layout.S_CURRENT_INTEGRATOR]
@@ -113,7 +120,7 @@ def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     put_voltage(p, s, io, out)
 
 
-@inlined
+@woven
 def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:

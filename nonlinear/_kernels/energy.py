@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.modal import slip_at
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -63,7 +63,7 @@ def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untype
     add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
-@scalar
+@entry
 def prepare_forms(p, s):  # type: ignore[no-untyped-def]
     """Write the integrals over each whole segment as forms of (i, w, u, T), by the same quadrature."""
     for which in range(4):

@@ -41,13 +41,16 @@ def tracking(p, s, angle):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def measured_speed(p, s, w, th):  # type: ignore[no-untyped-def]
+def measured_speed(p, s, io, w, th):  # type: ignore[no-untyped-def]
     """Speed by the encoder's method, then its first-order filter, then the speed filters."""
-    x, source = w, int(p[layout.SPEED_SOURCE])
+    x, angle, source = w, th, int(p[layout.SPEED_SOURCE])
+    if p[layout.SPEED_SENSOR] > 0.0:
+        x = p[layout.RATIO] * io[layout.IN_OUTPUT_SPEED]
+        angle = p[layout.RATIO] * io[layout.IN_OUTPUT]
     if source == DIFFERENCE:
-        x = difference(p, s, counted(th, p[layout.COUNTS_PER_RAD]))
+        x = difference(p, s, counted(angle, p[layout.COUNTS_PER_RAD]))
     elif source == TRACKING:
-        x = tracking(p, s, counted(th, p[layout.COUNTS_PER_RAD]))
+        x = tracking(p, s, counted(angle, p[layout.COUNTS_PER_RAD]))
     filtered = s[layout.S_FILTERED_SPEED]
     filtered += p[layout.FILTER_COEFFICIENT] * (x - filtered)
     s[layout.S_FILTERED_SPEED] = filtered

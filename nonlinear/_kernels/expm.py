@@ -41,7 +41,7 @@ def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
 
 @scalar
 def exponential(work, at, n):  # type: ignore[no-untyped-def]
-    """exp of the n by n matrix at ``at`` (which is scaled), by Taylor series and squaring; at ``at + MATRIX``."""
+    """exp of the n by n matrix at ``at``, which is scaled, at ``at + MATRIX``: Taylor series and squaring."""
     result, term, product = at + MATRIX, at + 2 * MATRIX, at + 3 * MATRIX
     halvings, scale = halvings_of(work, at, n)
     size = n * n
@@ -86,8 +86,8 @@ def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
 @scalar
 def transition(p, reverse, dt, work, at, out):  # type: ignore[no-untyped-def]
     """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
-    plant(p, reverse, dt, work, at, int(5))
-    exponential(work, at, int(5))
+    plant(p, reverse, dt, work, at, layout.SLIP_ORDER)
+    exponential(work, at, layout.SLIP_ORDER)
     e = at + MATRIX
     p[out + layout.A11], p[out + layout.A12] = work[e], work[e + 1]
     p[out + layout.A21], p[out + layout.A22] = work[e + 5], work[e + 6]

@@ -84,6 +84,7 @@ from __future__ import annotations
     DERIVATIVE,  # Kv Td
     DERIVATIVE_COEFFICIENT,  # Tp/(TD + Tp)
     OUTPUT_SENSOR,  # 1: position from the output's sensor
+    SPEED_SENSOR,  # 1: speed from the output's sensor
     POSITION_COUNTS,  # counts per rad of the angle that the position loop reads; 0: not quantised
     ACCELERATION_FEEDFORWARD,  # k_aff J/(kM Tp^2), of the reference at the motor
     FRICTION_FEEDFORWARD,  # i_fr
@@ -122,7 +123,8 @@ from __future__ import annotations
     GRAVITY,  # m g l, N m
     GRAVITY_ANGLE,  # offset
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(109)
+) = range(110)
+COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
 SIGNAL_SIZE = 8
@@ -155,6 +157,8 @@ SIZE = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # what describes a run; what follo
 # --- derived: one transition x+ = A x + b u + c T with x = (i, w, th), and one direction of slip ----------
 A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
 TRANSITION = 12
+SLIP_ORDER, TANH_ORDER = 5, 7  # of the matrices: with held inputs, and with a torque quadratic in time
+FORWARD, REVERSE = 0, 1
 KIND, CLOSE, MEAN, ROOT, M11, M12, M21, M22 = range(8)
 MODAL = 8
 
@@ -166,7 +170,7 @@ LENGTH = DECAY + 2  # of the two segments, s
     RELAX,  # R/L
     LOCKED_GAIN,  # 1/R; 0 for a torque source
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
-    LOOK,  # 1: no short way over a segment: energies, tanh law, elastic, or w' may turn twice within
+    LOOK,  # 1: no short way over a segment: tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
     RARE_LOAD,  # 1: the load changes from tick to tick
     RARE_SENSE,  # 1: instruments or the supply are modelled
@@ -261,6 +265,7 @@ TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
     S_EVENTS,  # in all
     S_MAX_EVENTS,  # most in one tick
 ) = range(50)
+STATE_NAMES = frozenset(name for name in dir() if name.startswith("S_"))
 S_NOISE = S_MAX_EVENTS + 1  # four random streams of two numbers: current, angle, output angle, jitter
 NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)
 S_ENERGY = S_NOISE + 8
@@ -289,7 +294,7 @@ WORK_SIZE = 4 * 49 + 24  # four matrices of 7 by 7, and what is made of them
 WORK_MORE = 4 * 49
 
 # --- inputs of a block of ticks, worked out ahead: commands, loads, torques, injected signals ------------
-BLOCK = 256
+BLOCK, EVERY_TICK = 256, 1
 BLOCK_LOAD, BLOCK_TORQUE, BLOCK_PROBES = BLOCK, 2 * BLOCK, 3 * BLOCK
 BLOCK_SIZE = 7 * BLOCK
 
@@ -302,9 +307,10 @@ BLOCK_SIZE = 7 * BLOCK
     IN_SPEED,
     IN_ANGLE,
     IN_OUTPUT,  # output angle, or motor angle over N
+    IN_OUTPUT_SPEED,
     IN_BUS,  # voltage that the controller has
     IN_PROBE,  # four injected signals
-) = range(9)
+) = range(10)
 (
     IO_REFERENCE,  # from here on in the order of SIGNALS: what was at t_k
     IO_OUTPUT,

@@ -86,8 +86,8 @@ def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
 def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """The same for nearly double eigenvalues."""
     at = int(p[layout.AT_WORK])
-    plant(p, reverse, t, s, at, int(5))
-    exponential(s, at, int(5))
+    plant(p, reverse, t, s, at, layout.SLIP_ORDER)
+    exponential(s, at, layout.SLIP_ORDER)
     e = at + MATRIX
     return (
         s[e] * i + s[e + 1] * w + s[e + 3] * u + s[e + 4] * T,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
+from nonlinear._kernels.compiled import inlined, scalar, woven
+from nonlinear._kernels.energy import energy_stick, energy_whole
 from nonlinear._kernels.segment import segment, slip_step
 from nonlinear._kernels.sense import output_angle
 from nonlinear._kernels.smooth import tanh_segment
@@ -47,6 +48,8 @@ def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
         a0, a1 = d * (kM * i + drive - Cv * w), d * (kM * i1 + drive - Cv * w1)
         if not (d * w > 0.0 and d * w1 > 0.0) or (a0 < 0.0 and a1 > 0.0):
             return 0
+    if p[layout.WITH_ENERGY] > 0.0:
+        energy_whole(p, s, 2 * side + part, i, w, u, T, s[layout.S_TORQUE])
     s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i1, w1, th1
     return 1
 
@@ -61,6 +64,8 @@ def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
     d0, d1 = kM * i + Kg * u + Tb, kM * i1 + Kg * u + Tb
     up, down = s[layout.S_DRY] * p[layout.BREAKAWAY], -s[layout.S_DRY_REVERSE] * p[layout.BREAKAWAY]
     if down <= d0 <= up and down <= d1 <= up:
+        if p[layout.WITH_ENERGY] > 0.0:
+            energy_stick(p, s, p[layout.LENGTH + part], i, u)
         s[layout.S_CURRENT] = i1
         return 1
     return 0
@@ -78,9 +83,12 @@ def quick(p, s, part, u):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
-    """One segment by the general way; the number of events in this tick so far, -1 where there are too many."""
-    if p[layout.LAW] > 0.0:
+def closely(p, s, part, u, events, rare):  # type: ignore[no-untyped-def]
+    """One segment by the general way; the number of events in this tick so far, -1 where there are too many.
+
+    With ``None`` for ``rare``, what a rigid drive with dry friction does not need is not even compiled.
+    """
+    if rare is not None and p[layout.LAW] > 0.0:
         tanh_segment(p, s, part, u)
         return events
     return segment(p, s, part, u, events)
@@ -96,8 +104,8 @@ def count_events(s, events):  # type: ignore[no-untyped-def]
     s[layout.S_MAX_EVENTS] = max(s[layout.S_MAX_EVENTS], events)
 
 
-@inlined
-def motion(p, s, io):  # type: ignore[no-untyped-def]
+@woven
+def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
     """Advance the plant by one tick."""
     # the delay line holds u_k and the q + 1 before it, oldest first
     last = layout.S_QUEUE + int(p[layout.DELAY_LINE]) - 1
@@ -109,7 +117,7 @@ def motion(p, s, io):  # type: ignore[no-untyped-def]
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:
-            events = closely(p, s, part, s[layout.S_QUEUE + part], events)
+            events = closely(p, s, part, s[layout.S_QUEUE + part], events, rare)
     s[layout.S_HELD] = s[layout.S_QUEUE + 1]
     if events != 0.0:
         count_events(s, events)

@@ -9,6 +9,8 @@ from nonlinear._kernels.estimate import counted
 from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y, probe
 from nonlinear._kernels.regulator import clamp
 
+STANDING = 1e-13  # change of the reference, relative, below which it stands still but for rounding
+
 
 @inlined
 def limited(p, s, v):  # type: ignore[no-untyped-def]
@@ -87,9 +89,10 @@ def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
     change = reference - last
     s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE] = reference, last
     torque = p[layout.ACCELERATION_FEEDFORWARD] * (change - (last - before))
-    if change > 0.0:
+    rounding = STANDING * (abs(reference) + abs(last))
+    if change > rounding:
         torque += p[layout.FRICTION_FEEDFORWARD]
-    elif change < 0.0:
+    elif change < -rounding:
         torque -= p[layout.FRICTION_FEEDFORWARD]
     s[layout.S_TORQUE_FEEDFORWARD] = torque
     return p[layout.FEEDFORWARD] * change / p[layout.POSITION_PERIOD]

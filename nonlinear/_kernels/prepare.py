@@ -6,10 +6,8 @@ import math
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import entry, scalar
-from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.expm import transition
 from nonlinear._kernels.modal import COMPLEX, describe
-from nonlinear._kernels.smooth import prepare_tanh
 
 
 @entry
@@ -45,11 +43,11 @@ def prepare_periods(p):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def any_of(p, first, count):  # type: ignore[no-untyped-def]
-    """1 where one of some numbers is not zero."""
+def any_of(p, first, behind):  # type: ignore[no-untyped-def]
+    """1 where one of the numbers from ``first`` up to ``behind`` is not zero."""
     found = 0.0
-    for j in range(count):
-        if p[first + j] != 0.0:
+    for j in range(first, behind):
+        if p[j] != 0.0:
             found = 1.0
     return found
 
@@ -57,18 +55,21 @@ def any_of(p, first, count):  # type: ignore[no-untyped-def]
 @scalar
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
-    more = max(any_of(p, layout.POSITION_INTEGRAL, int(2)), any_of(p, layout.OUTPUT_SENSOR, int(4)))
+    more = max(any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED), p[layout.PROFILED])
+    more = max(more, any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT))
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, int(1))))
+    p[layout.RARE_COMMAND] = max(more, any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
     p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
-    forward = max(any_of(p, layout.ACCELERATION_FEEDFORWARD, int(2)), any_of(p, layout.TORQUE_FILTERS, int(1)))
-    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, int(1)))
-    extra = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, int(2)), any_of(p, layout.CURRENT_WINDUP, int(1)))
-    p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
-    more = max(p[layout.SUPPLY], p[layout.OUTPUT_SENSOR])
-    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, int(5)))
+    p[layout.RARE_SPEED] = max(p[layout.RARE_SPEED], p[layout.SPEED_SENSOR])
+    more = any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED)
+    more = max(more, any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE))
+    p[layout.RARE_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
+    more = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY), p[layout.OVERLOAD])
+    p[layout.RARE_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
+    more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
+    p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
     tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
     varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
     p[layout.RARE_LOAD] = 1.0 if varying else 0.0
@@ -97,16 +98,15 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
     same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
     p[layout.SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
-    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
+    p[layout.LOOK] = max(ringing, max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
 @entry
 def prepare(p, s):  # type: ignore[no-untyped-def]
-    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space."""
+    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space.
+
+    With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`.
+    """
     prepare_periods(p)
     prepare_gates(p)
     prepare_plant(p, s)
-    if p[layout.WITH_ENERGY] > 0.0:
-        prepare_forms(p, s)
-    if p[layout.LAW] > 0.0:
-        prepare_tanh(p, s)

@@ -1,6 +1,7 @@
 """Seeded noise whose whole state is two numbers a stream: the same in every language.
 
-L'Ecuyer's combined multiplicative generator (1988): all products stay below 2^53, so floats hold them exactly.
+L'Ecuyer's combined multiplicative generator (1988): all products stay below 2^53, so floats hold them
+exactly.
 """
 
 from __future__ import annotations

@@ -1,17 +1,17 @@
-"""One whole run: inputs of a block of ticks worked out ahead, then tick after tick, and what is kept of them."""
+"""One whole run: the inputs of a block of ticks worked out ahead, then tick after tick."""
 
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, scalar
+from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.record import record
 from nonlinear._kernels.reduce import clear, note_limits, reduce
 from nonlinear._kernels.signals import feed, fill_block
 from nonlinear._kernels.tick import step
 
 
-@scalar
-def run_block(p, s, io, block, first, count, history, flag_history, out):  # type: ignore[no-untyped-def]
+@woven
+def run_block(p, s, io, block, first, count, history, flag_history, out, rare):  # type: ignore[no-untyped-def]
     """Run ``count`` ticks from tick ``first`` on; returns the tick behind the last one done."""
     every, rows = int(p[layout.RECORD_EVERY]), flag_history.shape[0]
     row = int((first + every - 1) / every)
@@ -23,7 +23,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):  # typ
         io[layout.IN_COMMAND] = block[k - first]
         if feeding:
             feed(block, k - first, io)
-        step(p, s, io)
+        step(p, s, io, rare)
         if io[layout.IO_FLAGS] != flags:
             note_limits(p, flags, since, k, out)
             flags, since = io[layout.IO_FLAGS], k
@@ -57,12 +57,12 @@ def finish(s, k, out):  # type: ignore[no-untyped-def]
 
 
 @entry
-def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
+def run(p, s, io, block, tables, history, flag_history, out, shared, rare):  # type: ignore[no-untyped-def]
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 
     ``history`` is flat, columns one after the other, or empty; ``flag_history`` one number a row; ``out`` a
     row of results; ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops
-    the run.
+    the run.  ``rare``: see `closely`.
     """
     clear(p, out)
     ticks, k = int(p[layout.TICKS]), int(s[layout.S_TICK])
@@ -72,7 +72,7 @@ def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: i
     while k < ticks and s[layout.S_STATUS] == 0.0:
         count = min(layout.BLOCK, ticks - k)
         fill_block(p, tables, k, count, stride, block)
-        k = run_block(p, s, io, block, k, count, history, flag_history, out)
+        k = run_block(p, s, io, block, k, count, history, flag_history, out, rare)
         shared[0] = k
         if shared[1] != 0.0 and s[layout.S_STATUS] == 0.0:
             s[layout.S_STATUS] = float(layout.CANCELLED)

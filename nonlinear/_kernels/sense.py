@@ -1,4 +1,4 @@
-"""What lies between the plant and the controller's eyes: noise, resolution, jitter, and the supply's voltage."""
+"""What lies between plant and controller: noise, resolution, jitter, and the supply's voltage."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def slopes(p, s):  # type: ignore[no-untyped-def]
 
 @scalar
 def supply(p, s):  # type: ignore[no-untyped-def]
-    """Bus voltage of this tick (model.md section 6), from voltage and current of the motor; also its energies."""
+    """Bus voltage of this tick from voltage and current of the motor (model.md section 6)."""
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
     power, Ts = s[layout.S_VOLTAGE] * s[layout.S_CURRENT], p[layout.PERIOD]
     i_b = power / U if U > 0.0 else 0.0
@@ -42,7 +42,10 @@ def supply(p, s):  # type: ignore[no-untyped-def]
     if i_b >= 0.0 or p[layout.REGENERATIVE] > 0.0:
         s[layout.S_VOLTAGE_LIMIT] = max(Us - Rs * i_b, 0.0)
         s[ledger + layout.ENERGY_SUPPLY] += Us * i_b * Ts
-        s[ledger + layout.ENERGY_SUPPLY_LOSS] += Rs * i_b * i_b * Ts
+        # the drop that the current of the last tick met; a bus above the source gives from its capacitor
+        charged = Us < U and p[layout.REGENERATIVE] <= 0.0
+        line = layout.ENERGY_CAPACITOR if charged else layout.ENERGY_SUPPLY_LOSS
+        s[ledger + line] += (Us - U) * i_b * Ts
         return
     C = p[layout.CAPACITANCE]
     free = math.sqrt(max(U * U - 2.0 * power * Ts / C, 0.0))
@@ -60,10 +63,10 @@ def sense(p, s, io):  # type: ignore[no-untyped-def]
         if s[layout.S_TICK] > 0.0:
             supply(p, s)
         io[layout.IN_BUS] = s[layout.S_VOLTAGE_LIMIT]
+    rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
     if p[layout.JITTER] > 0.0:
         late = clamp(p[layout.JITTER] * normal(s, layout.NOISE_INSTANT), 0.5 * p[layout.PERIOD])
         di, dw = slopes(p, s)
-        rate = s[layout.S_OUTPUT_SPEED] if p[layout.ELASTIC_DRIVE] > 0.0 else w / p[layout.RATIO]
         i, th, y = i + late * di, th + late * (w + 0.5 * late * dw), y + late * rate
         w += late * dw
     if p[layout.CURRENT_NOISE] > 0.0:
@@ -74,4 +77,5 @@ def sense(p, s, io):  # type: ignore[no-untyped-def]
         th += p[layout.ANGLE_NOISE] * normal(s, layout.NOISE_ANGLE)
     if p[layout.OUTPUT_NOISE] > 0.0:
         y += p[layout.OUTPUT_NOISE] * normal(s, layout.NOISE_OUTPUT)
+    io[layout.IN_OUTPUT_SPEED] = rate
     io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE], io[layout.IN_OUTPUT] = i, w, th, y

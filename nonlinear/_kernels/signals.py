@@ -94,7 +94,7 @@ def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyp
         at = layout.PROBES + point * layout.PROBE_SIZE
         if p[at] > 0.0:
             to = layout.BLOCK_PROBES + point * layout.BLOCK
-            fill(p, at + layout.PROBE_SIGNAL, tables, first, count, int(1), period, block, to)
+            fill(p, at + layout.PROBE_SIGNAL, tables, first, count, layout.EVERY_TICK, period, block, to)
     length = int(p[layout.LOAD_TABLE_LENGTH])
     if length > 0:
         add_table(tables, int(p[layout.LOAD_TABLE]), length, first, count, block, layout.BLOCK_LOAD)

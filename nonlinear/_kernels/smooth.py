@@ -7,9 +7,9 @@ rate |w'|/w_s at which the tanh is run through, so that the tolerance bounds the
 that a tick adds, in smoothing speeds; steps are a segment divided by a power of two.  Beyond
 SATURATED smoothing speeds tanh is 1 to the last bit but one and a whole segment is exact.
 
-Such a step is exactly the motion of the linear plant under a friction torque that is quadratic in time, through
-N(u) at its beginning, (N(a) + N(b))/2 in its middle and N(c) at its end.  The energies are those of that motion,
-so they balance to rounding whatever the step.
+Such a step is exactly the motion of the linear plant under a friction torque that is quadratic in time,
+through N(u) at its beginning, (N(a) + N(b))/2 in its middle and N(c) at its end.  The energies are those of
+that motion, so they balance to rounding whatever the step.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
 from nonlinear._kernels.expm import MATRIX, exponential, plant, transition
 from nonlinear._kernels.segment import slip_step
@@ -36,13 +36,13 @@ def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
 
     Column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2.
     """
-    plant(p, int(0), t, work, at, int(7))
+    plant(p, layout.FORWARD, t, work, at, layout.TANH_ORDER)
     work[at + 4 * 7 + 5] = t / h
     work[at + 5 * 7 + 6] = t / h
-    exponential(work, at, int(7))
+    exponential(work, at, layout.TANH_ORDER)
 
 
-@scalar
+@entry
 def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
     """Fill the coefficients of every level for both segments."""
     for part in range(2):
@@ -60,8 +60,8 @@ def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
 def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
     """Fill the coefficients of one step length at ``p[o]``."""
     at = int(p[layout.AT_WORK])
-    transition(p, int(0), 0.5 * h, s, at, o + HALF)
-    transition(p, int(0), h, s, at, o + FULL)
+    transition(p, layout.FORWARD, 0.5 * h, s, at, o + HALF)
+    transition(p, layout.FORWARD, h, s, at, o + FULL)
     e = at + MATRIX
     phi_columns(p, 0.5 * h, 0.5 * h, s, at)
     for r in range(3):
@@ -127,7 +127,8 @@ def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
     return (
         a * (p[at] * a + p[at + 1] * b + p[at + 2] * c + p[at + 3] * d
              + p[at + 4] * e + p[at + 5] * f + p[at + 6] * g)
-        + b * (p[at + 7] * b + p[at + 8] * c + p[at + 9] * d + p[at + 10] * e + p[at + 11] * f + p[at + 12] * g)
+        + b * (p[at + 7] * b + p[at + 8] * c + p[at + 9] * d
+             + p[at + 10] * e + p[at + 11] * f + p[at + 12] * g)
         + c * (p[at + 13] * c + p[at + 14] * d + p[at + 15] * e + p[at + 16] * f + p[at + 17] * g)
         + d * (p[at + 18] * d + p[at + 19] * e + p[at + 20] * f + p[at + 21] * g)
         + e * (p[at + 22] * e + p[at + 23] * f + p[at + 24] * g)
@@ -145,7 +146,7 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-
     sum_iw = form_of_seven(p, form + FORM_IW, i, w, u, Tb, n0, nm, nc)
     sum_ww = form_of_seven(p, form + FORM_WW, i, w, u, Tb, n0, nm, nc)
     sum_nw = form_of_seven(p, form + FORM_NW, i, w, u, Tb, n0, nm, nc)
-    add_slip(p, s, int(0), u, Tb, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
+    add_slip(p, s, layout.FORWARD, u, Tb, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
     s[layout.S_ENERGY + layout.ENERGY_DRY] -= sum_nw
 
 

@@ -6,7 +6,7 @@ All rows are flat.  A state copied out and set again elsewhere goes on with the 
 from __future__ import annotations
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, inlined, scalar
+from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.control import control
 from nonlinear._kernels.estimate import TRACKING, counted
 from nonlinear._kernels.filters import settle
@@ -49,7 +49,7 @@ def init_estimate(p, s):  # type: ignore[no-untyped-def]
 
 @scalar
 def init_command(p, s):  # type: ignore[no-untyped-def]
-    """Start values of profile and command filter: at the start angle, or at the start of the outermost stage."""
+    """Start values of profile and command filter: those of the outermost stage."""
     r = p[layout.ANGLE_START] / p[layout.RATIO]
     if p[layout.HAS_POSITION] <= 0.0:
         r = p[layout.VOLTAGE_START]
@@ -97,7 +97,7 @@ def init(p, s):  # type: ignore[no-untyped-def]
     seed_streams(s, p[layout.SEED])
 
 
-@inlined
+@woven
 def decide(p, s, io):  # type: ignore[no-untyped-def]
     """Sense and control at t_k, and note what there is to record."""
     i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
@@ -130,18 +130,18 @@ def note_more(p, s, io):  # type: ignore[no-untyped-def]
     io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
 
 
-@inlined
-def step(p, s, io):  # type: ignore[no-untyped-def]
-    """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well."""
+@woven
+def step(p, s, io, rare):  # type: ignore[no-untyped-def]
+    """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well; ``rare``: see `closely`."""
     decide(p, s, io)
-    motion(p, s, io)
+    motion(p, s, io, rare)
     s[layout.S_TICK] += 1.0
 
 
 @entry
 def tick(p, s, io):  # type: ignore[no-untyped-def]
     """`step` to be called from outside; returns the status."""
-    step(p, s, io)
+    step(p, s, io, 1.0)
     return int(s[layout.S_STATUS])
 
 

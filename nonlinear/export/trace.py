@@ -57,6 +57,8 @@ def _number(value: Any) -> float:
 
 def _binary(sign: str, function: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
     def forward(self: Traced, other: Any) -> Traced:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # numpy goes over its elements
         return self.tape.value(f"{self.name} {sign} {_text(other)}", function(self.number, _number(other)))
 
     def backward(self: Traced, other: Any) -> Traced:
@@ -76,6 +78,13 @@ def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
     return compare
 
 
+def _function(name: str) -> Any:
+    def function(self: Traced) -> Traced:
+        return self.tape.value(f"{name}({self.name})", getattr(math, name)(self.number))
+
+    return function
+
+
 def _rounded(name: str) -> Any:
     def rounded(self: Traced) -> int:
         found = int(getattr(math, name)(self.number))
@@ -88,7 +97,6 @@ def _rounded(name: str) -> Any:
 class Traced:
     """A number that remembers how it was made."""
 
-    __array_ufunc__ = None
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, tape: Tape, name: str, number: float) -> None:
@@ -101,7 +109,9 @@ class Traced:
     __lt__, __le__ = _compared("<", operator.lt), _compared("<=", operator.le)
     __gt__, __ge__ = _compared(">", operator.gt), _compared(">=", operator.ge)
     __eq__, __ne__ = _compared("==", operator.eq), _compared("!=", operator.ne)
-    __floor__, __ceil__ = _rounded("floor"), _rounded("ceil")
+    floor, ceil = _rounded("floor"), _rounded("ceil")  # numpy asks by these names
+    __floor__, __ceil__ = floor, ceil
+    tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
 
     def __pow__(self, power: Any) -> Traced:
         return self.tape.value(f"pow({self.name}, {_text(power)})", self.number ** _number(power))

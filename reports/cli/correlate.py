@@ -13,6 +13,17 @@ from reports.cli.targets import folder_for_results
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
 
+KEYS = (
+    "unit",
+    "samples",
+    "relative_error",
+    "fit_percent",
+    "mean_error",
+    "rms_error",
+    "max_error",
+    "max_error_time_s",
+    "delay_s",
+)
 DesignPlace = Annotated[
     str, typer.Argument(metavar="DESIGN", help="Name of a shipped design, or path of a design file.")
 ]
@@ -47,12 +58,16 @@ def correlate(
     """Run the model with each record's own command, load and supply, and say how
     far off it is.
 
-    For every signal that both have: relative error, fit, largest error,
-    delay; with --out also pictures of both and the difference.
+    For every signal that both have: relative error, fit, mean, rms and largest
+    error, delay; over several records also all together, and the worst; with
+    --out pictures of both and the difference. Where a record contradicts
+    itself or the design's limits (a wrong unit, swapped columns, a clock that
+    is off) the status is 1.
 
-    A CSV file with columns such as time_s, reference_deg, output_angle_deg,
-    motor_speed_rpm, current_A, load_Nm is read as it is; so is what simulate
-    writes, and the EMPS benchmark's file. Any other layout is told by a
+    A CSV, Parquet or MATLAB file with columns such as time_s, reference_deg,
+    Output angle [deg], motor_speed_rpm, current_A, load_Nm is read as it is,
+    with commas, semicolons or tabs; so is what simulate writes, and the EMPS
+    benchmark's file. Any other layout is told by a
     record file in TOML, a line for each: file = "log.csv", separator = ";",
     decimal = ",", time = { column = "t", unit = "ms" }, signals.reference = {
     column = "cmd", unit = "deg" }.
@@ -69,16 +84,20 @@ def correlate(
     from actuator_lti.design import load_design
     from analyses.correlation import correlate_record
     from analyses.records import open_record
+    from reports.cli.errors import leave_with
+    from reports.cli.identify_records import named_apart
     from reports.cli.output import print_json
     from reports.cli.progress import progress
     from reports.sections import correlation as pages
 
     drive = load_design(design)
     results = []
-    for path in records:
-        with progress(f"simulating {path.name}", quiet=quiet) as bar:
-            results.append(correlate_record(drive, open_record(path), progress=bar))
+    for record in named_apart([open_record(path) for path in records]):
+        with progress(f"simulating {record.name}", quiet=quiet) as bar:
+            results.append(correlate_record(drive, record, progress=bar))
     sections = [pages.section(result, k) for k, result in enumerate(results, 1)]
+    if len(results) > 1:
+        sections.insert(0, pages.summary_section(results))
     if out is not None:
         from reports.study_pages import study_document, write_pages
 
@@ -88,9 +107,10 @@ def correlate(
         with progress("drawing figures", quiet=quiet) as bar:
             write_pages(document, out, "correlation", progress=bar)
     if as_json:
-        print_json([_plain(result) for result in results])
+        print_json(_data(results))
     else:
         _show(sections)
+    leave_with(all(finding.passed is not False for result in results for finding in result.findings))
 
 
 def _show(sections: list[dict[str, Any]]) -> None:
@@ -102,8 +122,24 @@ def _show(sections: list[dict[str, Any]]) -> None:
         print_blocks([block for block in made["blocks"] if block["kind"] in ("table", "text")])
 
 
+def _data(results: list[CorrelationResult]) -> dict[str, Any]:
+    """Every record, and all of them together."""
+    from dataclasses import asdict
+
+    from analyses.correlation import summarise, worst_of
+
+    return {
+        "records": [_plain(result) for result in results],
+        "summary": {one.name: asdict(one) for one in summarise(results)},
+        "worst": worst_of(results)[0].record,
+    }
+
+
 def _plain(result: CorrelationResult) -> dict[str, Any]:
-    keys = ("unit", "samples", "relative_error", "fit_percent", "max_error", "max_error_time_s", "delay_s")
+    from dataclasses import asdict
+
+    from reports.identification_json import inputs_json
+
     return {
         "record": result.record,
         "sha256": result.sha256,
@@ -111,7 +147,9 @@ def _plain(result: CorrelationResult) -> dict[str, Any]:
         "rows": result.counts,
         "limits": result.limits,
         "notes": result.notes,
-        "signals": {s.name: {key: getattr(s, key) for key in keys} for s in result.signals},
+        "inputs": inputs_json(result.source, result.used),
+        "findings": [asdict(finding) for finding in result.findings],
+        "signals": {s.name: {key: getattr(s, key) for key in KEYS} for s in result.signals},
     }
 
 

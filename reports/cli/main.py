@@ -5,22 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-LINEAR_ALGEBRA_THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from reports.certain import same_order
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and give the exit status.
 
-    Linear algebra gets one thread unless the environment says otherwise: the matrices here are small, and
-    threads that wait for each other cost several times what they save.
+    Linear algebra gets one thread and one kernel (`same_order`) unless the environment says otherwise.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Without the program's name; those of the process where left out.
     """
-    for name in LINEAR_ALGEBRA_THREADS:
-        os.environ.setdefault(name, "1")
+    for name, value in same_order().items():
+        os.environ.setdefault(name, value)
     from reports.cli.app import build
     from reports.cli.errors import run
 

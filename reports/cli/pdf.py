@@ -15,8 +15,16 @@ FileOption = Annotated[
 
 def pdf(report: ReportArgument, out: FileOption = None) -> None:
     """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
+    from actuator_lti.errors import InputError
+    from analyses.isolation import drain
     from reports.cli.output import print_line
     from reports.document import load
     from reports.pdf import write_pdf
 
-    print_line(str(write_pdf(load(report), out or report.with_suffix(".pdf"))))
+    path = write_pdf(load(report), out or report.with_suffix(".pdf"))
+    print_line(str(path))
+    damaged = drain()
+    if damaged:
+        raise InputError(
+            f"{damaged[0].part}: cannot be drawn from its data; {path} says so", where=str(report)
+        )

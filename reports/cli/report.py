@@ -20,9 +20,6 @@ from reports.cli.options import (
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
-ProcessesOption = Annotated[
-    int, typer.Option("--processes", min=1, max=64, metavar="N", help="Processes that draw the figures.")
-]
 IncludeOption = Annotated[
     list[Path] | None,
     typer.Option(
@@ -41,7 +38,6 @@ def report(
     changes: SetOption = None,
     out: OutOption = DEFAULT_OUT,
     validation: ValidationOption = True,
-    processes: ProcessesOption = 2,
     pdf: PdfOption = False,
     include: IncludeOption = None,
     as_json: JsonOption = False,
@@ -66,7 +62,7 @@ def report(
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
         made = design_report(drive, added, progress=computing)
     with progress("drawing figures", quiet=quiet) as drawing:
-        written: tuple[Path, ...] = write_report(made, out, processes=processes, progress=drawing)
+        written: tuple[Path, ...] = write_report(made, out, progress=drawing)
     if pdf:
         from reports.pdf import write_pdf
 

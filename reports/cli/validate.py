@@ -89,7 +89,7 @@ def _write(made: dict[str, Any], folder: Path, quiet: bool) -> tuple[Path, ...]:
 
     content = dumps(made)
     with progress("drawing figures", quiet=quiet) as drawing:
-        html = page(loads(content), processes=2, progress=drawing)
+        html = page(loads(content), progress=drawing)
     paths = (folder / "validation.html", folder / "validation.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths

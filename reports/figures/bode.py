@@ -9,88 +9,83 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (5.2, 4.9)
 LABELLED = 3
+RED, GREEN = style.RED, style.GREEN
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the two panels and the margins."""
-    top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=(1.15, 1.0))
+    small = bool(data.get("small"))
+    chart = Chart(
+        width=style.SMALL if small else style.HALF,
+        height=280.0 if small else 410.0,
+        loop=data.get("loop", ""),
+    )
+    top, bottom = chart.column(1.15, 1.0)
     curves(data, top, bottom)
-    top.axhline(0.0, color=style.INK, linewidth=0.9)
+    top.rule_y(0.0, colour=style.INK)
     style.bound(top, [y for s in data["series"] for y in s["magnitude_db"]], span=100.0, top_room=0.06)
-    _gain_margins(data, top)
-    _phase_margins(data, top, bottom)
-    if len(data["series"]) > 1:
-        top.legend(loc="lower left")
+    shown = 1 if small else LABELLED
+    _gain_margins(data, top, shown)
+    _phase_margins(data, top, bottom, shown)
+    return chart
 
 
-def curves(data: dict[str, Any], top: Axes, bottom: Axes) -> None:
+def curves(data: dict[str, Any], top: Panel, bottom: Panel) -> None:
     """Draw magnitude and phase of every series, with axes and the Nyquist line."""
+    f = data["frequency_hz"]
     for k, series in enumerate(data["series"]):
-        look = {"color": style.SERIES[k % 7], "linestyle": style.DASHES[k % 7], "label": series["label"]}
-        top.plot(data["frequency_hz"], style.gaps(series["magnitude_db"]), **look)
-        bottom.plot(data["frequency_hz"], style.gaps(series["phase_deg"]), **look)
-    top.set_ylabel("magnitude, dB")
-    bottom.set_ylabel("phase, deg")
-    style.log_frequency(top, "")
-    style.log_frequency(bottom)
-    top.tick_params(labelbottom=False)
-    style.bound(bottom, [y for s in data["series"] for y in s["phase_deg"]], span=900.0, top_room=0.08)
-    style.phase_ticks(bottom, *bottom.get_ylim())
-    top.set_xlim(data["frequency_hz"][0], data["frequency_hz"][-1])
+        top.curve(f, series["magnitude_db"], series["label"], **style.series(k))
+        bottom.curve(f, series["phase_deg"], series["label"], **style.series(k))
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    style.frequency(bottom, f)
+    style.phase_axis(bottom, [y for s in data["series"] for y in s["phase_deg"]])
     if data.get("nyquist_hz"):
-        for ax in (top, bottom):
-            ax.axvline(data["nyquist_hz"], color=style.MUTED, linewidth=0.9, linestyle=(0, (2, 2)))
+        for panel in (top, bottom):
+            panel.rule_x(data["nyquist_hz"], dash=2)
 
 
-def _gain_margins(data: dict[str, Any], top: Axes) -> None:
+def _gain_margins(data: dict[str, Any], top: Panel, shown: int) -> None:
     """Draw each gain margin as the distance to 0 dB at its phase crossover."""
-    low, high = top.get_ylim()
+    low, high = top.y.span()
     for k, margin in enumerate(data.get("gain_margins", ())):
         f, db = margin["frequency_hz"], margin["db"]
         if not _inside(f, data):
             continue
         seen = min(max(-db, low), high)
-        top.plot([f, f], [0.0, seen], color=style.RED, linewidth=2.2, solid_capstyle="butt")
-        top.plot([f], [seen], marker="s", markersize=4.5, color=style.RED, linestyle="none")
-        if k < LABELLED:
-            beyond = "" if low < -db < high else " (beyond)"
-            words = f"GM {_signed(db)} dB{beyond}\n{style.hertz(f)}"
-            style.tag(top, words, (f, seen), data, below=db > 0 if not beyond else db < 0)
+        top.curve([f, f], [0.0, seen], colour=RED, width=2.6, read=False)
+        top.points([f], [seen], marker="s", colour=RED, size=6.0, read=False)
+        if k < shown and (k == 0 or low < -db < high):
+            off = "" if low < -db < high else " (off scale)"
+            top.note(f"GM {_signed(db)} dB{off}\n{style.hertz(f)}", (f, seen))
 
 
-def _phase_margins(data: dict[str, Any], top: Axes, bottom: Axes) -> None:
+def _phase_margins(data: dict[str, Any], top: Panel, bottom: Panel, shown: int) -> None:
     """Draw each phase margin as the distance to the odd multiple of 180 deg at its gain crossover."""
-    low, high = bottom.get_ylim()
+    (top_low, _), (low, high) = top.y.span(), bottom.y.span()
     for level in range(math.ceil((low / 180.0 - 1) / 2), math.floor((high / 180.0 - 1) / 2) + 1):
-        bottom.axhline(180.0 * (2 * level + 1), color=style.INK, linewidth=0.9)
+        bottom.rule_y(180.0 * (2 * level + 1), colour=style.INK)
     for k, margin in enumerate(data.get("phase_margins", ())):
         f, deg = margin["frequency_hz"], margin["deg"]
         if not _inside(f, data):
             continue
         phase = _at(f, data["frequency_hz"], data["series"][0]["phase_deg"])
         border = 180.0 * (2 * round(((phase - deg) / 180.0 - 1) / 2) + 1)
-        top.plot([f], [0.0], marker="o", markersize=5, color=style.GREEN, linestyle="none")
-        top.plot([f, f], [0.0, top.get_ylim()[0]], color=style.GREEN, linewidth=0.8, linestyle=(0, (1, 2)))
-        bottom.plot(
-            [f, f], [bottom.get_ylim()[1], phase], color=style.GREEN, linewidth=0.8, linestyle=(0, (1, 2))
-        )
-        bottom.plot([f, f], [border, border + deg], color=style.GREEN, linewidth=2.2, solid_capstyle="butt")
-        bottom.plot([f], [border + deg], marker="o", markersize=5, color=style.GREEN, linestyle="none")
-        if k < LABELLED:
-            style.tag(
-                bottom, f"PM {_signed(deg)}°\n{style.hertz(f)}", (f, border + deg / 2), data, below=None
-            )
+        thin: dict[str, Any] = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
+        top.points([f], [0.0], colour=GREEN, size=6.5, read=False)
+        top.curve([f, f], [0.0, top_low], **thin)
+        bottom.curve([f, f], [high, phase], **thin)
+        bottom.curve([f, f], [border, border + deg], colour=GREEN, width=2.6, read=False)
+        bottom.points([f], [border + deg], colour=GREEN, size=6.5, read=False)
+        if k < shown:
+            bottom.note(f"PM {_signed(deg)}°\n{style.hertz(f)}", (f, border + deg / 2))
 
 
 def _inside(frequency_hz: float, data: dict[str, Any]) -> bool:
-    return data["frequency_hz"][0] <= frequency_hz <= data["frequency_hz"][-1] * 1.001
+    return bool(data["frequency_hz"][0] <= frequency_hz <= data["frequency_hz"][-1] * 1.001)
 
 
 def _at(x: float, xs: list[float], ys: list[float | None]) -> float:
@@ -104,4 +99,4 @@ def _at(x: float, xs: list[float], ys: list[float | None]) -> float:
 
 
 def _signed(value: float) -> str:
-    return f"{value:.1f}".replace("-", "−")
+    return style.to_minus(f"{value:.1f}")

@@ -8,66 +8,51 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (8.4, 4.4)
 LEAST = 1e-9
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the differences on the left, the borders by amplitude on the right."""
-    if not data["released"]:
-        _differences(fig.add_subplot(), data)
-        return
-    left, right = fig.subplots(1, 2, width_ratios=(1, 1.15))
-    _differences(left, data)
-    _released(right, data)
+    chart = Chart(width=style.WIDE, height=max(330.0, 70.0 + 19.0 * len(data["margins"])))
+    _differences(chart.panel(), data)
+    if data["released"]:
+        _released(chart.panel(width=1.15), data)
+    return chart
 
 
-def _differences(ax: Axes, data: dict[str, Any]) -> None:
+def _differences(panel: Panel, data: dict[str, Any]) -> None:
     """One dot a margin."""
     labels = [item["label"] for item in data["margins"]]
     values = [max(item["difference"], LEAST) for item in data["margins"]]
-    places = list(range(len(labels)))[::-1]
-    ax.plot(values, places, marker="o", linestyle="none", color=style.BLUE, markersize=5)
-    ax.axvline(data["tolerance"], color=style.RED, linestyle=(0, (5, 2)), linewidth=1.2)
-    ax.text(
-        data["tolerance"], len(labels) - 0.4, "allowed ", ha="right", va="bottom", color=style.RED, fontsize=8
-    )
-    ax.set_xscale("log")
-    ax.set_xlim(LEAST / 2.0, 1e-1)
-    ax.set_ylim(-0.6, len(labels) + 0.1)
-    ax.set_yticks(places, labels)
-    ax.set_xticks([1e-9, 1e-7, 1e-5, 1e-3, 1e-1])
-    ax.xaxis.set_major_formatter(FuncFormatter(style.powers))
-    ax.minorticks_off()
-    ax.set_xlabel("difference from the linear margin, relative")
-    ax.set_title("On a constant speed, no limit acting")
+    places = [float(k) for k in range(len(labels))][::-1]
+    panel.points(values, places, size=7.0)
+    panel.rule_x(data["tolerance"], "allowed", colour=style.RED, dash=1, width=1.3)
+    panel.x.log, panel.by_point = True, True
+    panel.x.limits(LEAST / 2.0, 1e-1)
+    panel.y.limits(-0.6, len(labels) + 0.1)
+    panel.y.ticks = list(zip(places, labels, strict=True))
+    panel.x.ticks = style.powers(range(-9, 0, 2))
+    panel.x.label = "relative difference from the linear margin"
+    panel.title = "At constant speed, no limit acting"
 
 
-def _released(ax: Axes, data: dict[str, Any]) -> None:
+def _released(panel: Panel, data: dict[str, Any]) -> None:
     """Border over linear border for small, medium and large deviations."""
     for k, item in enumerate(data["released"]):
         x = [j + 0.06 * (k - len(data["released"]) / 2) for j in range(len(item["sizes"]))]
-        look: dict[str, Any] = {"color": style.SERIES[k % 7], "markersize": 5.5}
-        ax.plot(x, style.gaps(item["without"]), marker="o", label=item["label"], linewidth=1.2, **look)
-        ax.plot(
-            x, style.gaps(item["with_friction"]), marker="s", markerfacecolor="none", linewidth=1.2,
-            linestyle=(0, (3, 2)), **look,
-        )  # fmt: skip
-    ax.axhline(1.0, color=style.MUTED, linewidth=0.9)
-    ax.set_xticks(range(len(data["released"][0]["sizes"])), data["released"][0]["sizes"])
-    ax.set_yscale("log")
+        look: dict[str, Any] = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
+        panel.curve(x, item["without"], item["label"], marker="o", **look)
+        panel.curve(x, item["with_friction"], item["label"], marker="s", hollow=True, dash=1, **look)
+    panel.rule_y(1.0)
+    sizes = data["released"][0]["sizes"]
+    panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
+    panel.x.limits(-0.4, len(sizes) - 0.6)
     values = [x for item in data["released"] for key in ("without", "with_friction") for x in item[key] if x]
-    ax.set_ylim(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
-    ticks = [t for t in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0) if ax.get_ylim()[0] <= t <= ax.get_ylim()[1]]
-    ax.set_yticks(ticks, [f"{t:g}" for t in ticks])
-    ax.minorticks_off()
-    ax.set_xlabel("deviation that the drive is let go from")
-    ax.set_ylabel("border over linear border")
-    ax.set_title("From rest (dashed: dry friction)")
-    ax.figure.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=3, fontsize=7.5)
+    panel.y.log, panel.by_point = True, True
+    panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
+    panel.y.ticks = [(t, f"{t:g}") for t in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)]
+    panel.x.label, panel.y.label = "initial deviation", "margin over linear margin"
+    panel.title = "Released from rest (dashed: with dry friction)"

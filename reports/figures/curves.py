@@ -8,31 +8,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (8.4, 3.4)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the curves."""
-    ax = fig.add_subplot()
+    chart = Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel()
+    panel.x.label, panel.y.label = data["x_label"], data["y_label"]
+    panel.x.log, panel.y.log = bool(data.get("x_log")), bool(data.get("y_log"))
     for k, series in enumerate(data["series"]):
-        points = series.get("style") == "points"
-        look: dict[str, Any] = {"color": style.SERIES[k % 7], "label": series["label"]}
-        look |= {"linestyle": "none", "marker": "osD^v"[k % 5], "markersize": 4} if points else {}
-        look |= {} if points else {"linestyle": style.DASHES[k % 7]}
-        ax.plot(style.gaps(series["x"]), style.gaps(series["y"]), **look)
+        if series.get("style") == "points":
+            look = {"colour": style.SERIES[k % 7], "marker": "osD^v"[k % 5]}
+            panel.points(series["x"], series["y"], series["label"], **look)
+        else:
+            panel.curve(series["x"], series["y"], series["label"], **style.series(k))
     for level in data.get("levels", ()):
-        ax.axhline(level["y"], color=style.RED, linewidth=1.1, linestyle=(0, (5, 2)), label=level["label"])
-    ax.set_xlabel(data["x_label"])
-    ax.set_ylabel(data["y_label"])
-    if data.get("x_log"):
-        style.log_frequency(ax, data["x_label"])
-    if data.get("y_log"):
-        ax.set_yscale("log")
-        ax.yaxis.set_major_formatter(FuncFormatter(style.plain_decade))
-    if len(data["series"]) > 1 or data.get("levels"):
-        ax.legend()
+        panel.y.see([level["y"]])
+        panel.rule_y(level["y"], label=level["label"], colour=style.RED, width=1.2, dash=1)
+    return chart

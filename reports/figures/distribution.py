@@ -8,58 +8,51 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (8.4, 2.9)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw one histogram a panel."""
-    panels = data["panels"]
-    for ax, panel in zip(fig.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-        _histogram(ax, panel)
-        _marks(ax, panel)
-        ax.set_title(panel["label"])
-        ax.set_xlabel(panel["unit"])
-        ax.set_yticks([])
-        ax.grid(visible=False)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=3, columnspacing=0.9)
+    chart = Chart(width=style.WIDE * len(data["panels"]) / 3.0, height=250.0, legend=True)
+    for part in data["panels"]:
+        panel = chart.panel(title=part["label"])
+        _histogram(panel, part)
+        _marks(panel, part)
+        panel.x.label = part["unit"]
+        panel.y.ticks, panel.x.grid = [], False
+    return chart
 
 
-def _histogram(ax: Axes, panel: dict[str, Any]) -> None:
+def _histogram(panel: Panel, data: dict[str, Any]) -> None:
     """Fill the counts under a line."""
-    edges, counts = panel["edges"], panel["counts"]
+    edges, counts = data["edges"], data["counts"]
     if counts:
-        ax.stairs(counts, edges, fill=True, color=style.SKY, alpha=0.45, linewidth=0)
-        ax.stairs(counts, edges, color=style.BLUE, linewidth=1.2)
-        ax.set_ylim(0, 1.15 * max(counts))
-    ax.xaxis.set_major_locator(MaxNLocator(4))
+        x = [edges[0], *(e for edge in edges[1:-1] for e in (edge, edge)), edges[-1]]
+        y = [float(c) for count in counts for c in (count, count)]
+        panel.shape([([x[0], *x, x[-1]], [0.0, *y, 0.0])], colour=style.SKY, opacity=0.45)
+        panel.curve(x, y, colour=style.BLUE, width=1.3, read=False)
+        panel.y.limits(0.0, 1.35 * max(counts))
 
 
-def _marks(ax: Axes, panel: dict[str, Any]) -> None:
+def _marks(panel: Panel, data: dict[str, Any]) -> None:
     """Mark limits, the nominal design and the worst case, each with its own dash."""
-    known = [v for v in (panel["nominal"], panel["worst"]) if v is not None]
-    low, high = min([*panel["edges"], *known], default=0.0), max([*panel["edges"], *known], default=1.0)
+    known = style.known((data["nominal"], data["worst"]))
+    low, high = min([*data["edges"], *known], default=0.0), max([*data["edges"], *known], default=1.0)
     reach = max(high - low, 1e-3 * max(abs(high), 1e-9))
-    lines = [
-        ("nominal", style.INK, "-"),
-        ("worst", style.ORANGE, (0, (4, 2))),
-        ("minimum", style.RED, (0, (1, 1.2))),
-        ("maximum", style.RED, (0, (1, 1.2))),
-    ]
+    lines = (
+        ("nominal", style.INK, 0),
+        ("worst", style.ORANGE, 1),
+        ("minimum", style.RED, 2),
+        ("maximum", style.RED, 2),
+    )
     for name, colour, dash in lines:
-        value = panel[name]
+        value = data[name]
         if value is None:
             continue
         if name in ("minimum", "maximum") and not low - 2 * reach <= value <= high + 2 * reach:
-            words = f"{name} {value:g} {panel['unit']}: off the scale"
-            ax.text(
-                0.03, 0.95, words, transform=ax.transAxes, va="top", color=style.RED, bbox=style.label_box()
-            )
+            panel.note(f"{name} {value:g} {data['unit']}: off scale", corner="top left", colour=style.RED)
             continue
+        panel.x.see([value])
         label = "limit" if name in ("minimum", "maximum") else name
-        ax.axvline(value, color=colour, linestyle=dash, linewidth=1.5, label=label)
+        panel.rule_x(value, label=label, colour=colour, dash=dash, width=1.7)

@@ -7,27 +7,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
 from reports.figures.bode import curves
+from reports.figures.style import Chart
 
-SIZE = (10.6, 4.8)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw a column a loop."""
-    panels = data["panels"]
-    axes = fig.subplots(2, len(panels), sharex="col", squeeze=False)
-    for k, panel in enumerate(panels):
-        top, bottom = axes[0][k], axes[1][k]
+    chart = Chart(width=style.WIDE, height=400.0)
+    for panel in data["panels"]:
+        top, bottom = chart.column(1.0, 1.0, title=panel["title"])
         curves(panel, top, bottom)
-        top.axhline(0.0, color=style.INK, linewidth=0.9)
-        bottom.axhline(-180.0, color=style.INK, linewidth=0.9)
+        top.rule_y(0.0, colour=style.INK)
+        bottom.rule_y(-180.0, colour=style.INK)
         style.bound(top, [y for s in panel["series"] for y in s["magnitude_db"]], span=120.0, top_room=0.06)
-        top.set_title(panel["title"])
-        if k:
-            top.set_ylabel("")
-            bottom.set_ylabel("")
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return chart

@@ -8,36 +8,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (8.4, 3.2)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the pairs side by side."""
-    axes = fig.subplots(1, len(data["pairs"]), squeeze=False)[0]
-    for ax, pair in zip(axes, data["pairs"], strict=True):
+    chart = Chart(width=style.WIDE, height=300.0)
+    for pair in data["pairs"]:
+        panel = chart.panel()
+        panel.by_point = True
         whole, random = pair["whole"], pair["random"]
-        ax.fill(whole["x"], whole["y"], color=style.BLUE, alpha=0.15, linewidth=0)
-        ax.plot(whole["x"], whole["y"], color=style.BLUE, label="95 % region, all errors")
-        ax.plot(
-            random["x"],
-            random["y"],
-            color=style.ORANGE,
-            linestyle=style.DASHES[1],
-            label="scatter of the runs only",
-        )
+        panel.shape([(whole["x"], whole["y"])], colour=style.BLUE, opacity=0.15)
+        panel.curve(whole["x"], whole["y"], "95 % region, all errors", colour=style.BLUE)
+        panel.curve(random["x"], random["y"], "scatter of the runs only", colour=style.ORANGE, dash=1)
         for sign in (-1.0, 1.0):
-            ax.axvline(
-                sign * pair["interval"][0], color=style.MUTED, linewidth=0.9, linestyle=style.DASHES[2]
-            )
-            ax.axhline(
-                sign * pair["interval"][1], color=style.MUTED, linewidth=0.9, linestyle=style.DASHES[2]
-            )
-        ax.plot([0.0], [0.0], marker="+", markersize=9, color=style.INK, linestyle="none")
-        ax.set_xlabel(pair["x_label"])
-        ax.set_ylabel(pair["y_label"])
-    handles, labels = axes[0].get_legend_handles_labels()
-    fig.legend(handles, labels, loc="outside upper left", ncols=2)
+            panel.rule_x(sign * pair["interval"][0], dash=2)
+            panel.rule_y(sign * pair["interval"][1], dash=2)
+        panel.points([0.0], [0.0], marker="+", size=10.0, colour=style.INK, read=False)
+        panel.x.label, panel.y.label = pair["x_label"], pair["y_label"]
+    return chart

@@ -7,40 +7,27 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (8.4, 3.4)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw both views side by side."""
-    left, right = fig.subplots(1, 2, sharey=True)
-    _view(left, data, "speed_rad_s", "motor speed, rad/s")
-    _view(right, data, "load_Nm", "hinge moment, N m")
-    left.set_ylabel("residual, µN m")
+    chart = Chart(width=style.WIDE, height=310.0)
+    _view(chart.panel(), data, "speed_rad_s", "motor speed, rad/s")
+    _view(chart.panel(), data, "load_Nm", "load torque, N m")
+    return chart
 
 
-def _view(ax: Axes, data: dict[str, Any], key: str, label: str) -> None:
-    ax.axhline(0.0, color=style.MUTED, linewidth=0.9)
-    ends = [2.0 * std for std in data["std_uNm"]]
-    ax.errorbar(
-        data[key],
-        data["residual_uNm"],
-        yerr=ends,
-        color=style.BLUE,
-        ecolor=style.MUTED,
-        elinewidth=0.7,
-        marker="o",
-        markersize=3.5,
-        linestyle="none",
-        label="runs, with 2 standard deviations",
-    )
+def _view(panel: Panel, data: dict[str, Any], key: str, label: str) -> None:
+    panel.rule_y(0.0)
+    for x, y, std in zip(data[key], data["residual_uNm"], data["std_uNm"], strict=True):
+        ends = [y - 2.0 * std, y + 2.0 * std]
+        panel.curve([x, x], ends, colour=style.MUTED, width=0.9, read=False)
+    panel.points(data[key], data["residual_uNm"], "runs, with 2 standard deviations", size=5.0)
     for k, bad in enumerate(data["outlier"]):
         if bad:
             at = (data[key][k], data["residual_uNm"][k])
-            ax.plot(*at, marker="o", markersize=10, markerfacecolor="none", color=style.RED, linestyle="none")
-            ax.annotate(data["run"][k], at, xytext=(7, 5), textcoords="offset points", bbox=style.label_box())
-    ax.set_xlabel(label)
+            panel.points([at[0]], [at[1]], size=13.0, hollow=True, colour=style.RED, read=False)
+            panel.note(data["run"][k], at)
+    panel.x.label, panel.y.label = label, "residual, µN m"

@@ -8,33 +8,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (8.4, 4.2)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw points and lines."""
-    ax = fig.add_subplot()
+    chart = Chart(width=style.WIDE, height=380.0, legend=True)
+    panel = chart.panel()
     for k, level in enumerate(data["levels"]):
-        colour = style.SERIES[k % 7]
-        ax.plot(
-            level["line_speed_rad_s"], level["line_torque_mNm"], color=colour, linestyle=style.DASHES[k % 7]
-        )
-        look: dict[str, Any] = {
-            "color": colour,
-            "marker": "osD^vPX"[k % 7],
-            "markersize": 4.5,
-            "linestyle": "none",
-        }
-        ax.plot(level["speed_rad_s"], level["torque_mNm"], label=level["label"], **look)
+        panel.curve(level["line_speed_rad_s"], level["line_torque_mNm"], level["label"], **style.series(k))
+        look = {"colour": style.SERIES[k % 7], "marker": "osD^v+x"[k % 7], "size": 6.0}
+        panel.points(level["speed_rad_s"], level["torque_mNm"], level["label"], **look)
     for point in data["outliers"]:
         at = (point["speed_rad_s"], point["torque_mNm"])
-        ax.plot(*at, marker="o", markersize=11, markerfacecolor="none", color=style.RED, linestyle="none")
-        ax.annotate(point["run"], at, xytext=(8, 6), textcoords="offset points", bbox=style.label_box())
-    ax.set_xlabel("motor speed, rad/s")
-    ax.set_ylabel("friction torque at the motor, mN m")
-    ax.set_ylim(bottom=0.0)
-    ax.legend(loc="upper left", ncols=3)
+        panel.points([at[0]], [at[1]], size=14.0, hollow=True, colour=style.RED, read=False)
+        panel.note(point["run"], at)
+    panel.x.label, panel.y.label = "motor speed, rad/s", "friction torque at the motor, mN m"
+    panel.y.limits(low=0.0)
+    return chart

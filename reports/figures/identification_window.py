@@ -7,24 +7,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (8.4, 4.4)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw each signal in a panel of its own, the steady part shaded."""
-    panels = data["panels"]
-    axes = fig.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    parts = data["panels"]
+    chart = Chart(width=style.WIDE, height=60.0 + 120.0 * len(parts))
+    panels = chart.column(*(1.0 for _ in parts))
     start, stop = data["window"]
-    for k, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
-        ax.plot(data["time_s"], style.gaps(panel["values"]), color=style.SERIES[k % 7], linewidth=0.9)
-        ax.axvspan(start, stop, color=style.RED, alpha=0.10, linewidth=0)
+    for k, (panel, part) in enumerate(zip(panels, parts, strict=True)):
+        panel.curve(data["time_s"], part["values"], colour=style.SERIES[k % 7], width=1.1)
+        panel.band_x(start, stop, colour=style.RED, opacity=0.1)
         for edge in (start, stop):
-            ax.axvline(edge, color=style.RED, linewidth=1.1, linestyle=(0, (5, 2)))
-        ax.set_ylabel(panel["label"])
-    axes[-1].set_xlabel("time, s")
-    axes[0].set_xlim(data["time_s"][0], data["time_s"][-1])
-    fig.align_ylabels(list(axes))
+            panel.rule_x(edge, colour=style.RED, width=1.2, dash=1)
+        panel.y.label = part["label"]
+    panels[-1].x.label = "time, s"
+    panels[-1].x.limits(data["time_s"][0], data["time_s"][-1])
+    return chart

@@ -13,15 +13,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
 
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (10.6, 5.6)
 COLOURS = {
     "friction": style.BROWN,
     "stiction": style.PURPLE,
@@ -29,59 +24,56 @@ COLOURS = {
     "acceleration": style.ORANGE,
     "current": style.GREEN,
     "voltage": style.RED,
+    "torque-command": style.SKY,
+    "overload": style.INK,
+    "profile": style.MUTED,
 }
-LINES = dict(zip(("speed", "acceleration", "current", "voltage"), style.DASHES, strict=False))
+LIMITERS = [name for name in COLOURS if name not in ("friction", "stiction")]
+LINES = {name: k for k, name in enumerate(LIMITERS)}
 WORDS = {
-    "friction": "friction bends it",
+    "friction": "dry friction",
     "stiction": "stiction",
     "speed": "speed limit",
     "acceleration": "acceleration limit",
     "current": "current limit",
     "voltage": "voltage limit",
+    "torque-command": "limit in front of the torque filters",
+    "overload": "overload protection",
+    "profile": "profile of the command",
     "none": "linear",
 }
 GLYPHS: dict[str, dict[str, Any]] = {
-    "triangle": {"marker": "^", "markersize": 4.6, "markerfacecolor": style.INK},
-    "parabola": {"marker": "o", "markersize": 4.2, "markerfacecolor": "none"},
-    "distorted": {"marker": ".", "markersize": 3.0, "markerfacecolor": style.INK},
-    "stick-slip": {"marker": "s", "markersize": 4.0, "markerfacecolor": "none"},
-    "no motion": {"marker": "x", "markersize": 4.2, "markerfacecolor": style.INK},
-    "not steady": {"marker": "2", "markersize": 5.2, "markerfacecolor": style.INK},
+    "triangle": {"marker": "^", "size": 5.0},
+    "parabola": {"marker": "o", "size": 4.8, "hollow": True},
+    "distorted": {"marker": ".", "size": 4.2},
+    "stick-slip": {"marker": "s", "size": 4.6, "hollow": True},
+    "no motion": {"marker": "x", "size": 4.8},
+    "not steady": {"marker": "2", "size": 6.0},
 }
 EVERY = 2  # a glyph in every second column
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw regions, glyphs and lines."""
-    ax = fig.add_subplot()
+    chart = Chart(
+        width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
+    )
+    panel = chart.panel()
     x, y = np.array(data["frequency_hz"]), np.array(data["amplitude"])
-    ax.set_xscale("log")
-    ax.set_yscale("log")
     xe, ye = _edges(x), _edges(y)
+    panel.x.log = panel.y.log = True
+    panel.x.limits(xe[0], xe[-1])
+    panel.y.limits(ye[0], ye[-1])
+    panel.x.grid = panel.y.grid = False
+    panel.x.label, panel.y.label = "command frequency, Hz", f"command amplitude, {data['unit']}"
     cause, waveform = np.array(data["cause"]), np.array(data["waveform"])
-    _regions(ax, data["causes"], cause, xe, ye)
-    handles = _glyphs(ax, data["waveforms"], waveform, x, y)
-    lines = _lines(ax, data)
+    _regions(panel, data["causes"], cause, xe, ye)
+    _glyphs(panel, data["waveforms"], waveform, x, y)
+    _lines(panel, data)
     for mark in data["marks"]:
-        place: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "left", "va": "center"}
-        ax.annotate("", (-0.008, mark["amplitude"]), (0.0, mark["amplitude"]), xycoords=place["transform"])
-        ax.axhline(mark["amplitude"], color=style.MUTED, linewidth=0.6, linestyle=(0, (1, 3)))
-        ax.text(1.006, mark["amplitude"], mark["label"], fontsize=8.0, color=style.MUTED, **place)
-    _names(ax, data["causes"], cause, x, y)
-    style.log_frequency(ax, "command frequency, Hz")
-    ax.yaxis.set_major_formatter(FuncFormatter(style.plain_decade))
-    ax.set_ylabel(f"command amplitude, {data['unit']}")
-    ax.set_title("What limits a sine command, by amplitude and frequency")
-    ax.grid(visible=False)
-    ax.set_xlim(xe[0], xe[-1])
-    ax.set_ylim(ye[0], ye[-1])
-    words: dict[str, Any] = {"title": "first reached, linear loop", "alignment": "left"}
-    fig.legend(handles=lines, loc="outside right upper", **words)
-    if handles:
-        ax.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.11), ncols=len(handles),
-            columnspacing=1.3, handletextpad=0.2, borderaxespad=0.0,
-        )  # fmt: skip
+        panel.rule_y(mark["amplitude"], mark["label"], dash=4, width=0.8)
+    _names(panel, data["causes"], cause, x, y)
+    return chart
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
@@ -98,22 +90,20 @@ def _runs(row: np.ndarray) -> Iterator[tuple[int, int, int]]:
         yield int(row[a]), a, b
 
 
-def _regions(ax: Axes, names: list[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
+def _regions(panel: Panel, names: list[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
     """Fill the cells of each cause."""
-    boxes: dict[str, list[list[tuple[float, float]]]] = {}
+    boxes: dict[str, list[Any]] = {}
     for k, row in enumerate(cause):
         for value, a, b in _runs(row):
-            corners = [(xe[a], ye[k]), (xe[b], ye[k]), (xe[b], ye[k + 1]), (xe[a], ye[k + 1])]
-            boxes.setdefault(names[value], []).append(corners)
-    for name, polygons in boxes.items():
+            ring = ([xe[a], xe[b], xe[b], xe[a]], [ye[k], ye[k], ye[k + 1], ye[k + 1]])
+            boxes.setdefault(names[value], []).append(ring)
+    for name, rings in boxes.items():
         if name in COLOURS:
-            look: dict[str, Any] = {"facecolor": COLOURS[name], "alpha": 0.28, "linewidth": 0.0}
-            ax.add_collection(PolyCollection(polygons, antialiased=False, **look))
+            panel.shape(rings, colour=COLOURS[name], opacity=0.28)
 
 
-def _glyphs(ax: Axes, names: list[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> list[Line2D]:
+def _glyphs(panel: Panel, names: list[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
     """Mark the waveform in every second column; a sine has no mark."""
-    handles = []
     shown = np.zeros_like(waveform, dtype=bool)
     shown[:, ::EVERY] = True
     for name, look in GLYPHS.items():
@@ -121,46 +111,34 @@ def _glyphs(ax: Axes, names: list[str], waveform: np.ndarray, x: np.ndarray, y: 
             continue
         rows, columns = np.nonzero((waveform == names.index(name)) & shown)
         if len(rows):
-            all_look: dict[str, Any] = {
-                "linestyle": "none", "markeredgewidth": 0.7, "markeredgecolor": style.INK, "color": style.INK
-            }  # fmt: skip
-            ax.plot(x[columns], y[rows], alpha=0.75, **all_look, **look)
-            handles.append(Line2D([], [], label=name, **all_look, **look))
-    handles.append(Line2D([], [], linestyle="none", label="(no mark: sine)"))
-    return handles
+            panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
 
 
-def _lines(ax: Axes, data: dict[str, Any]) -> list[Line2D]:
+def _lines(panel: Panel, data: dict[str, Any]) -> None:
     """Draw A_k(w) of every limiter, and the amplitudes at which the simulator first limits."""
-    handles = []
     for line in data["onset"]:
-        look = {"color": COLOURS[line["name"]], "linestyle": LINES[line["name"]], "linewidth": 2.0}
-        ax.plot(data["frequency_hz"], style.gaps(line["amplitude"]), **look)
-        handles.append(Line2D([], [], label=line["label"], **look))
+        look: dict[str, Any] = {"colour": COLOURS[line["name"]], "dash": LINES[line["name"]], "width": 2.3}
+        panel.curve(data["frequency_hz"], line["amplitude"], line["label"], **look)
     for k, points in enumerate(data["points"]):
-        look = {
-            "linestyle": "none", "marker": "Dv"[k % 2], "markersize": 5.5, "markeredgewidth": 1.2,
-            "markerfacecolor": style.PAPER, "markeredgecolor": style.INK,
-        }  # fmt: skip
-        ax.plot(points["frequency_hz"], style.gaps(points["amplitude"]), zorder=6, **look)
-        handles.append(Line2D([], [], label=points["label"], **look))
-    return handles
+        look = {"colour": style.INK, "marker": "Dv"[k % 2], "size": 7.0, "hollow": True}
+        panel.points(points["frequency_hz"], points["amplitude"], points["label"], **look)
 
 
-def _names(ax: Axes, names: list[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+def _names(panel: Panel, names: list[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
     """Write the name of each region into its middle."""
     for k, name in enumerate(names):
-        rows, columns = np.nonzero(cause == k)
-        if len(rows) < 8:
+        mask = cause == k
+        if mask.sum() < 8:
             continue
-        depth = np.array([_depth(cause == k, int(r), int(c)) for r, c in zip(rows, columns, strict=True)])
-        best = int(np.argmax(depth))
-        words: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 7, "fontweight": "bold"}
-        ax.text(x[columns[best]], y[rows[best]], WORDS.get(name, name), bbox=style.label_box(), **words)
+        row, column = _deepest(mask)
+        panel.note(WORDS.get(name, name), (x[column], y[row]), bold=True, over=True)
 
 
-def _depth(mask: np.ndarray, row: int, column: int) -> float:
-    """How far a cell lies inside its region, weighing rows as two columns."""
+def _deepest(mask: np.ndarray) -> tuple[int, int]:
+    """Give the cell furthest inside a region, weighing rows as two columns."""
     outside = np.argwhere(~np.pad(mask, 1)) - 1
-    gaps = outside - (row, column)
-    return float(np.min(np.hypot(1.6 * gaps[:, 0], 0.6 * gaps[:, 1])))
+    inside = np.argwhere(mask)
+    gaps = inside[:, None, :] - outside[None, :, :]
+    depth = np.hypot(1.6 * gaps[..., 0], 0.6 * gaps[..., 1]).min(axis=1)
+    row, column = inside[int(np.argmax(depth))]
+    return int(row), int(column)

@@ -9,56 +9,52 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (5.2, 5.0)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the curve, its mirror image and the circles."""
-    ax = fig.add_subplot()
-    real, imag = style.gaps(data["real"]), style.gaps(data["imag"])
-    ax.axhline(0.0, color=style.MUTED, linewidth=0.8)
-    ax.axvline(0.0, color=style.MUTED, linewidth=0.8)
-    ax.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=style.MUTED, linestyle=(0, (3, 2)), linewidth=0.9))
-    ax.plot(real, imag, color=style.BLUE, label="L(jω), ω > 0")
-    ax.plot(real, [-y for y in imag], color=style.BLUE, linewidth=1.0, linestyle=(0, (4, 2)), label="ω < 0")
-    _modulus(data, ax)
+    chart = Chart(width=style.HALF, height=430.0, loop=data.get("loop", ""))
+    panel = chart.panel()
+    panel.equal = panel.by_point = True
+    real, imag = data["real"], data["imag"]
+    panel.rule_y(0.0)
+    panel.rule_x(0.0)
+    circle = _circle((0.0, 0.0), 1.0)
+    panel.curve(*circle, colour=style.MUTED, dash=2, width=1.0, read=False)
+    mirrored = [None if y is None else -y for y in imag]
+    panel.curve(real, imag, "L(jω), ω > 0", parameter=data.get("frequency_hz"))
+    panel.curve(real, mirrored, "ω < 0", dash=1, width=1.1, read=False)
+    _modulus(data, panel)
     for x in data.get("gain_points", ()):
-        ax.plot([x], [0.0], marker="s", markersize=5, color=style.RED, linestyle="none")
+        panel.points([x], [0.0], marker="s", colour=style.RED, size=6.0, read=False)
     for x, y in data.get("phase_points", ()):
-        ax.plot([x], [y], marker="o", markersize=5, color=style.GREEN, linestyle="none")
-    ax.plot([-1], [0], marker="+", markersize=11, markeredgewidth=2, color=style.INK, linestyle="none")
-    ax.annotate("−1", (-1, 0), xytext=(-6, -11), textcoords="offset points", ha="right", fontsize=9)
-    _frame(data, ax, fig)
+        panel.points([x], [y], colour=style.GREEN, size=6.5, read=False)
+    panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
+    panel.note("−1", (-1.0, 0.0))
+    reach = data.get("reach", 1.6)
+    panel.x.limits(-1.0 - reach, reach - 0.35)
+    panel.y.limits(-reach, reach)
+    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
+    return chart
 
 
-def _modulus(data: dict[str, Any], ax: Axes) -> None:
+def _circle(centre: tuple[float, float], radius: float) -> tuple[list[float], list[float]]:
+    angles = [2.0 * math.pi * k / 72 for k in range(73)]
+    return [centre[0] + radius * math.cos(a) for a in angles], [
+        centre[1] + radius * math.sin(a) for a in angles
+    ]
+
+
+def _modulus(data: dict[str, Any], panel: Panel) -> None:
     """Draw the circle about -1 that the curve just touches."""
     distance, point = data.get("modulus"), data.get("modulus_point")
     if distance is None or distance <= 0:
         return
-    label = f"modulus circle, {distance:.3f}"
-    ax.add_patch(Circle((-1, 0), distance, facecolor=style.ORANGE, alpha=0.10, edgecolor="none"))
-    ax.add_patch(Circle((-1, 0), distance, fill=False, edgecolor=style.ORANGE, linewidth=1.3, label=label))
+    x, y = _circle((-1.0, 0.0), distance)
+    panel.shape([(x, y)], colour=style.ORANGE, opacity=0.1)
+    panel.curve(x, y, f"modulus margin {distance:.3f}", colour=style.ORANGE, width=1.4, read=False)
     if point is not None:
-        ax.plot([-1, point[0]], [0, point[1]], color=style.ORANGE, linewidth=1.2)
-        ax.plot([point[0]], [point[1]], marker="D", markersize=4.5, color=style.ORANGE, linestyle="none")
-
-
-def _frame(data: dict[str, Any], ax: Axes, fig: Figure) -> None:
-    """Keep -1 and the unit circle in view, whatever the curve does far away."""
-    reach = data.get("reach", 1.6)
-    ax.set_aspect("equal")
-    ax.set_xlim(-1.0 - reach, reach - 0.35)
-    ax.set_ylim(-reach, reach)
-    ax.set_xlabel("real part of L")
-    ax.set_ylabel("imaginary part of L")
-    fig.legend(loc="outside lower center", ncols=3, fontsize=8)
-    step = 0.5 if reach < 3 else 2.0 ** math.ceil(math.log2(reach / 4))
-    ax.xaxis.set_major_locator(style.multiples(step))
-    ax.yaxis.set_major_locator(style.multiples(step))
+        panel.curve([-1.0, point[0]], [0.0, point[1]], colour=style.ORANGE, width=1.3, read=False)
+        panel.points([point[0]], [point[1]], marker="D", colour=style.ORANGE, size=6.0, read=False)

@@ -7,43 +7,32 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (10.6, 4.0)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw every limiter's line; below the lowest the linear model holds."""
-    ax = fig.add_subplot()
+    chart = Chart(width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude")
+    panel = chart.panel()
     f = data["frequency_hz"]
-    for k, series in enumerate(data["series"]):
-        look = {"color": style.SERIES[k % 7], "linestyle": style.DASHES[k % 7], "label": series["label"]}
-        ax.plot(f, style.gaps(series["amplitude"]), **look)
-    lowest = [
-        min(values, default=None)
-        for values in ([v for v in column if v is not None] for column in _columns(data))
-    ]
-    known = [v for v in lowest if v is not None]
-    style.log_frequency(ax)
-    ax.set_yscale("log")
-    ax.yaxis.set_major_formatter(FuncFormatter(style.plain_decade))
-    ax.set_xlim(f[0], f[-1])
-    top = max([data.get("full_deflection") or 0.0, *known[:1]]) * 4 if known else 1.0
-    bottom = max(min(known, default=0.1) * 0.6, top / 1e6)
-    ax.set_ylim(bottom, top)
-    ax.fill_between(f, bottom, style.gaps(lowest), color=style.GREEN, alpha=0.10, linewidth=0)
-    ax.text(0.02, 0.06, "linear below the lowest line", transform=ax.transAxes, color=style.MUTED)
+    columns = zip(*(series["amplitude"] for series in data["series"]), strict=True)
+    lowest = [min(style.known(column), default=None) for column in columns]
+    known = style.known(lowest)
     full = data.get("full_deflection")
+    top = max([full or 0.0, *known[:1]]) * 4 if known else 1.0
+    bottom = max(min(known, default=0.1) * 0.6, top / 1e6)
+    panel.y.log, panel.y.label = True, f"command amplitude, {data['unit']}"
+    panel.y.limits(bottom, top)
+    style.frequency(panel, f)
+    there = [(x, y) for x, y in zip(f, lowest, strict=True) if y is not None]
+    if there:
+        x, y = [p[0] for p in there], [p[1] for p in there]
+        floor = bottom * 1e-3
+        panel.shape([([*x, x[-1], x[0]], [*y, floor, floor])], colour=style.GREEN, opacity=0.1)
+    for k, series in enumerate(data["series"]):
+        panel.curve(f, series["amplitude"], series["label"], **style.series(k))
+    panel.note("linear below the lowest line", corner="bottom left", colour=style.MUTED)
     if full:
-        ax.axhline(full, color=style.INK, linewidth=1.0, linestyle=(0, (2, 2)))
-        place: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "bottom"}
-        ax.text(0.995, full, f"full deflection {full:g} {data['unit']}", **place)
-    ax.set_ylabel(f"command amplitude, {data['unit']}")
-    fig.legend(loc="outside right upper", title="reached at this amplitude")
-
-
-def _columns(data: dict[str, Any]) -> list[tuple[float | None, ...]]:
-    return list(zip(*(series["amplitude"] for series in data["series"]), strict=True))
+        panel.rule_y(full, f"full deflection {full:g} {data['unit']}", colour=style.INK, dash=2)
+    return chart

@@ -8,54 +8,47 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
-from reports.numbers import time_unit
-
-SIZE = (8.4, 4.6)
+from reports.figures.style import Chart
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the curves; the first series is the base and stands out."""
+    chart = Chart(width=style.WIDE, height=410.0, title=data["title"])
     if data["kind"] == "step":
-        _step(data, fig)
+        _step(data, chart)
     else:
-        _bode(data, fig)
+        _bode(data, chart)
+    return chart
 
 
 def _look(k: int) -> dict[str, Any]:
     colour = style.INK if k == 0 else style.SERIES[(k - 1) % 7]
-    return {"color": colour, "linestyle": style.DASHES[k % 7], "linewidth": 2.2 if k == 0 else 1.5}
+    return {"colour": colour, "dash": k % 7, "width": 2.4 if k == 0 else 1.7}
 
 
-def _bode(data: dict[str, Any], fig: Figure) -> None:
+def _bode(data: dict[str, Any], chart: Chart) -> None:
     """Draw magnitude and phase."""
-    top, bottom = fig.subplots(2, 1, sharex=True)
+    top, bottom = chart.column(1.0, 1.0)
     for k, series in enumerate(data["series"]):
-        top.plot(
-            series["frequency_hz"], style.gaps(series["magnitude_db"]), label=series["label"], **_look(k)
-        )
-        bottom.plot(series["frequency_hz"], style.gaps(series["phase_deg"]), **_look(k))
+        top.curve(series["frequency_hz"], series["magnitude_db"], series["label"], **_look(k))
+        bottom.curve(series["frequency_hz"], series["phase_deg"], series["label"], **_look(k))
     style.bound(top, [y for s in data["series"] for y in s["magnitude_db"]], span=70.0, top_room=0.1)
-    phases = [y for s in data["series"] for y in s["phase_deg"] if y is not None]
-    style.bound(bottom, phases, span=450.0, top_room=0.05)
-    style.phase_ticks(bottom, *bottom.get_ylim())
-    style.log_frequency(bottom)
-    top.set_ylabel("magnitude, dB")
-    bottom.set_ylabel("phase, deg")
-    top.set_title(data["title"])
-    top.legend(loc="lower left")
+    style.phase_axis(bottom, [y for s in data["series"] for y in s["phase_deg"]], span=450.0, room=0.05)
+    style.frequency(bottom)
+    bottom.x.limits(*_ends(data, "frequency_hz"))
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
 
 
-def _step(data: dict[str, Any], fig: Figure) -> None:
+def _step(data: dict[str, Any], chart: Chart) -> None:
     """Draw the step responses."""
-    ax = fig.add_subplot()
-    longest = max(series["time_s"][-1] for series in data["series"])
-    scale, unit = time_unit(longest)
+    panel = chart.panel()
+    scale = style.time_axis(panel, max(series["time_s"][-1] for series in data["series"]))
     for k, series in enumerate(data["series"]):
-        ax.plot([t * scale for t in series["time_s"]], series["response"], label=series["label"], **_look(k))
-    ax.set_xlabel(f"time, {unit}")
-    ax.set_ylabel("response to a unit step")
-    ax.set_title(data["title"])
-    ax.legend(loc="lower right")
+        panel.curve([t * scale for t in series["time_s"]], series["response"], series["label"], **_look(k))
+    panel.x.limits(0.0)
+    panel.y.label = "response to a unit step"
+
+
+def _ends(data: dict[str, Any], key: str) -> tuple[float, float]:
+    return min(s[key][0] for s in data["series"]), max(s[key][-1] for s in data["series"])

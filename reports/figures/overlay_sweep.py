@@ -9,61 +9,48 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (8.4, 6.2)
 LEAST = 1e-12  # errors below this are drawn there
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw one column a response: magnitude, phase, differences."""
-    columns = len(data["panels"])
-    axes = fig.subplots(3, columns, sharex=True, squeeze=False, height_ratios=(3, 3, 2))
-    for j, panel in enumerate(data["panels"]):
-        magnitude, phase, error = axes[0][j], axes[1][j], axes[2][j]
-        _overlay(magnitude, data, panel, "db")
-        _overlay(phase, data, panel, "deg")
-        _errors(error, data, panel)
-        magnitude.set_title(panel["title"])
-        style.bound(magnitude, panel["linear_db"], span=90.0, top_room=0.1)
-        style.phase_ticks(phase, *phase.get_ylim())
-        for ax in (magnitude, phase, error):
-            ax.axvline(data["valid_to_hz"], color=style.MUTED, linewidth=0.9, linestyle=(0, (2, 2)))
-        style.log_frequency(error)
-    axes[0][0].set_ylabel("magnitude, dB")
-    axes[1][0].set_ylabel("phase, deg")
-    axes[2][0].set_ylabel("difference, dB and deg")
-    axes[0][0].legend(loc="lower left", fontsize=8)
-    fig.legend(*axes[2][0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    chart = Chart(width=style.WIDE, height=520.0)
+    for part in data["panels"]:
+        panels = chart.column(3, 3, 2, title=part["title"])
+        _overlay(panels[0], data, part, "db")
+        _overlay(panels[1], data, part, "deg")
+        _errors(panels[2], data, part)
+        style.bound(panels[0], part["linear_db"], span=90.0, top_room=0.1)
+        style.phase_axis(panels[1], part["linear_deg"])
+        for panel in panels:
+            panel.rule_x(data["valid_to_hz"], dash=2)
+        style.frequency(panels[2])
+        labels = ("magnitude, dB", "phase, deg", "difference, dB and deg")
+        for panel, label in zip(panels, labels, strict=True):
+            panel.y.label = label
+    return chart
 
 
-def _overlay(ax: Axes, data: dict[str, Any], panel: dict[str, Any], unit: str) -> None:
+def _overlay(panel: Panel, data: dict[str, Any], part: dict[str, Any], unit: str) -> None:
     """Draw the linear line and the measured points."""
     f = data["frequency_hz"]
-    ax.plot(f, style.gaps(panel[f"linear_{unit}"]), color=style.BLUE, label="linear loop")
-    look: dict[str, Any] = {"marker": "o", "markersize": 3.6, "linestyle": "none", "markerfacecolor": "none"}
-    ax.plot(
-        f, style.gaps(panel[f"measured_{unit}"]), color=style.ORANGE, label="measured by injection", **look
-    )
+    panel.curve(f, part[f"linear_{unit}"], "linear loop", colour=style.BLUE)
+    look: dict[str, Any] = {"size": 5.0, "hollow": True, "colour": style.ORANGE}
+    panel.points(f, part[f"measured_{unit}"], "measured by injection", **look)
 
 
-def _errors(ax: Axes, data: dict[str, Any], panel: dict[str, Any]) -> None:
+def _errors(panel: Panel, data: dict[str, Any], part: dict[str, Any]) -> None:
     """Draw the magnitudes of the differences and their tolerances on a logarithmic scale."""
     f = data["frequency_hz"]
-    for unit, colour, dash in (("dB", style.PURPLE, "-"), ("deg", style.GREEN, (0, (5, 2)))):
+    for unit, colour, dash in (("dB", style.PURPLE, 0), ("deg", style.GREEN, 1)):
         key = unit.lower()
-        values = [max(x, LEAST) if x == x else x for x in style.gaps(panel[f"error_{key}"])]
-        ax.plot(f, values, color=colour, linestyle=dash, linewidth=1.3, label=f"{unit}: linear and measured")
-        ax.axhline(
-            data[f"tolerance_{key}"], color=colour, linestyle=(0, (1, 1.5)), linewidth=1.1,
-            label=f"allowed: {data[f'tolerance_{key}']:g} {unit}",
-        )  # fmt: skip
-    ax.set_yscale("log")
-    ax.set_ylim(1e-12, 10.0)
-    ax.set_yticks([1e-12, 1e-9, 1e-6, 1e-3, 1.0])
-    ax.yaxis.set_major_formatter(FuncFormatter(style.powers))
-    ax.minorticks_off()
+        values = [None if x is None else max(x, LEAST) for x in part[f"error_{key}"]]
+        panel.curve(f, values, f"difference, {unit}", colour=colour, dash=dash, width=1.5)
+        allowed = data[f"tolerance_{key}"]
+        panel.rule_y(allowed, label=f"allowed: {allowed:g} {unit}", colour=colour, dash=4, width=1.3)
+    panel.y.log = True
+    panel.y.limits(1e-12, 10.0)
+    panel.y.ticks = style.powers((-12, -9, -6, -3, 0))

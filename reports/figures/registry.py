@@ -1,6 +1,6 @@
 """Every figure by its name; the module that draws it is imported when it is first drawn.
 
-A figure module has ``SIZE`` (width and height in inches) and ``draw(data, fig) -> None``.
+A figure module has ``draw(data) -> Chart``, a chart as data; how it is written is the same for all.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def figure_module(name: str) -> ModuleType:
     return import_module(MODULES[name])
 
 
-def draw_svg(name: str, data: dict[str, Any], *, prefix: str = "f", page: bool = True) -> str:
+def draw_svg(name: str, data: dict[str, Any], *, prefix: str = "f", page: bool = True, alt: str = "") -> str:
     """Draw a figure as SVG.
 
     Parameters
@@ -63,9 +63,12 @@ def draw_svg(name: str, data: dict[str, Any], *, prefix: str = "f", page: bool =
     prefix : str
         Put in front of the ids inside, so that several figures can stand in one page.
     page : bool
-        For a page, colours are CSS variables with the light ones as fallback; otherwise plain colours.
+        For a page: a picture a column, colours as CSS variables with the light ones as fallback, the
+        legend as a list.  Otherwise one picture with plain colours.
+    alt : str
+        What stands for it where it cannot be seen.
     """
-    from reports.figures.style import render
+    from reports.charts.svg import page_svg, paper_svg
 
-    module = figure_module(name)
-    return render(module.draw, data, size=module.SIZE, prefix=prefix, page=page)
+    chart = figure_module(name).draw(data)
+    return page_svg(chart, prefix, alt) if page else paper_svg(chart, prefix)

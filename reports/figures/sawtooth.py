@@ -8,57 +8,44 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (10.6, 6.0)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the columns on common scales."""
     columns = data["columns"]
     rows = 3 if columns[0]["current"] is not None else 2
-    axes = fig.subplots(rows, len(columns), sharex=True, sharey="row", squeeze=False)
-    for k, column in enumerate(columns):
-        _column(axes[:, k], column, data, first=k == 0)
-    reach = max(abs(v) for column in columns for v in column["reference"])
-    axes[0, 0].set_ylim(-1.6 * reach, 1.95 * reach)
-    fig.suptitle(
-        "Sawtooth: a sine faster than the rate limit", x=0.01, ha="left", fontsize=9.5, weight="bold"
+    chart = Chart(
+        width=style.WIDE, height=160.0 + 130.0 * rows, title="Sawtooth: a sine faster than the rate limit"
     )
-    words: dict[str, Any] = {"loc": "lower right", "ncols": 2, "columnspacing": 1.2}
-    axes[0, 0].legend(**words)
-    axes[1, 0].legend(**words)
-    top = data["rate_limit"] * 1.75
-    axes[1, 0].set_ylim(-top, 1.25 * data["rate_limit"])
+    reach = 1.15 * max(abs(v) for column in columns for v in column["reference"])
+    currents = [abs(v) for column in columns for v in style.known(column["current"] or ())]
+    ends = (reach, 1.5 * data["rate_limit"], 1.08 * max(currents, default=1.0))
+    for k, column in enumerate(columns):
+        panels = chart.column(1.5, *(1.0,) * (rows - 1), title=column["title"])
+        _column(panels, column, data, named=k == 0)
+        for panel, end in zip(panels, ends, strict=False):
+            panel.y.limits(-end, end)
+        panels[0].y.limits(high=2.6 * reach)  # room for the words
+    return chart
 
 
-def _column(axes: Any, column: dict[str, Any], data: dict[str, Any], *, first: bool) -> None:
+def _column(panels: list[Panel], column: dict[str, Any], data: dict[str, Any], *, named: bool) -> None:
     """Draw one load."""
     time = column["time_s"]
-    position: Axes = axes[0]
-    position.plot(time, column["reference"], color=style.MUTED, linestyle=style.DASHES[1], label="command")
-    position.plot(time, column["output"], color=style.BLUE, label="output")
-    position.set_title(column["title"])
-    place: dict[str, Any] = {"transform": position.transAxes, "va": "top", "ha": "left", "fontsize": 8.5}
-    position.text(0.015, 0.985, column["note"], linespacing=1.35, bbox=style.label_box(), **place)
-    rate: Axes = axes[1]
-    rate.plot(
-        time, column["command_rate"], color=style.MUTED, linestyle=style.DASHES[1], label="speed command"
-    )
-    rate.plot(time, column["rate"], color=style.GREEN, label="output rate")
+    panels[0].curve(time, column["reference"], "command", colour=style.MUTED, dash=1)
+    panels[0].curve(time, column["output"], "output", colour=style.BLUE)
+    panels[0].y.label = f"position, {data['unit']}"
+    panels[0].note(column["note"], corner="top left")
+    panels[1].curve(time, column["command_rate"], "speed command", colour=style.MUTED, dash=1)
+    panels[1].curve(time, column["rate"], "output rate", colour=style.GREEN)
+    panels[1].y.label = f"rate, {data['rate_unit']}"
     for sign in (1.0, -1.0):
-        rate.axhline(sign * data["rate_limit"], color=style.RED, linewidth=1.0, linestyle=(0, (5, 2)))
-    if first:
-        position.set_ylabel(f"position, {data['unit']}")
-        rate.set_ylabel(f"rate, {data['rate_unit']}")
-        low = -1.06 * data["rate_limit"]
-        rate.text(time[0], low, "rate limit", color=style.RED, fontsize=8.5, va="top")
-    if len(axes) > 2:
-        axes[2].plot(time, column["current"], color=style.ORANGE)
-        if first:
-            axes[2].set_ylabel("motor current, A")
-    axes[-1].set_xlabel("time, s")
-    axes[-1].set_xlim(time[0], time[-1])
+        words = "rate limit" if sign < 0 and named else ""
+        panels[1].rule_y(sign * data["rate_limit"], words, colour=style.RED, width=1.1, dash=1)
+    if len(panels) > 2:
+        panels[2].curve(time, column["current"], "motor current", colour=style.ORANGE)
+        panels[2].y.label = "motor current, A"
+    panels[-1].x.label = "time, s"
+    panels[-1].x.limits(time[0], time[-1])

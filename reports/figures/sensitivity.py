@@ -8,32 +8,28 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (5.2, 2.75)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw both magnitudes, the peaks and the limit."""
-    ax = fig.add_subplot()
+    chart = Chart(width=style.HALF, height=225.0, loop=data.get("loop", ""))
+    panel = chart.panel()
     f = data["frequency_hz"]
     for k, (name, values, peak) in enumerate((("S", "s_db", "s_peak"), ("T", "t_db", "t_peak"))):
-        look = {"color": (style.ORANGE, style.BLUE)[k], "linestyle": style.DASHES[k]}
-        ax.plot(f, style.gaps(data[values]), label=_words(name, data.get(peak)), **look)
+        colour = (style.ORANGE, style.BLUE)[k]
+        panel.curve(f, data[values], _words(name, data.get(peak)), colour=colour, dash=k)
         at = (data.get(peak) or {}).get("frequency_hz")
         if at and f[0] <= at <= f[-1] * 1.001:
-            ax.plot([at], [data[peak]["db"]], marker="^", markersize=6, color=look["color"], linestyle="none")
-    ax.axhline(0.0, color=style.INK, linewidth=0.9)
-    style.log_frequency(ax)
-    ax.set_xlim(f[0], f[-1])
-    ax.set_ylabel("magnitude, dB")
-    style.bound(ax, [*data["s_db"], *data["t_db"]], span=45.0, top_room=0.12)
+            panel.points([at], [data[peak]["db"]], marker="^", colour=colour, size=7.0, read=False)
+    panel.rule_y(0.0, colour=style.INK)
+    style.frequency(panel, f)
+    panel.y.label = "magnitude, dB"
+    style.bound(panel, [*data["s_db"], *data["t_db"]], span=45.0, top_room=0.12)
     if data.get("limit_db") is not None:
-        _limit(ax, data["limit_db"])
-    fig.legend(loc="outside lower center", ncols=2)
+        _limit(panel, data["limit_db"])
+    return chart
 
 
 def _words(name: str, peak: dict[str, Any] | None) -> str:
@@ -43,9 +39,8 @@ def _words(name: str, peak: dict[str, Any] | None) -> str:
     return f"|{name}|, peak {peak['db']:.2f} dB at {style.hertz(peak['frequency_hz'])}"
 
 
-def _limit(ax: Axes, limit_db: float) -> None:
+def _limit(panel: Panel, limit_db: float) -> None:
     """Draw the limit of a requirement."""
-    ax.set_ylim(top=max(ax.get_ylim()[1], limit_db + 0.12 * (limit_db - ax.get_ylim()[0])))
-    ax.axhline(limit_db, color=style.RED, linewidth=1.1, linestyle=(0, (5, 2)))
-    place: dict[str, Any] = {"transform": ax.get_yaxis_transform(), "ha": "left", "va": "bottom"}
-    ax.text(0.01, limit_db, f"limit of S: {limit_db:g} dB", **place)
+    low, high = panel.y.span()
+    panel.y.limits(high=max(high, limit_db + 0.2 * (limit_db - low)))
+    panel.rule_y(limit_db, f"limit of |S|: {limit_db:g} dB", colour=style.RED, width=1.2, dash=1)

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart, Panel
 
-SIZE = (10.6, 4.8)
 BOUND_COLOURS = {
     "voltage limit": style.RED,
     "drive signal at its limit": style.RED,
@@ -24,57 +21,43 @@ BOUND_COLOURS = {
 }
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw bounds with their names on them, then demands and paths."""
-    ax = fig.add_subplot()
-    ax.set_xlim(-0.02 * data["fast"], data["fast"])
-    ax.set_ylim(-1.12 * data["top"], 1.25 * data["top"])
-    ax.axhline(0.0, color=style.MUTED, linewidth=0.8)
+    chart = Chart(width=style.WIDE, height=400.0, title=data["title"], legend=True)
+    panel = chart.panel()
+    panel.by_point = True
+    panel.x.limits(-0.02 * data["fast"], data["fast"])
+    panel.y.limits(-1.12 * data["top"], 1.25 * data["top"])
+    panel.rule_y(0.0)
     for k, path in enumerate(data["paths"]):
-        look: dict[str, Any] = {"color": style.SERIES[(k + 2) % 7], "linestyle": style.DASHES[k % 7]}
-        look |= {"linewidth": 1.3}
-        ax.plot(path["speed"], path["torque"], label=path["label"], **look)
+        look: dict[str, Any] = {"colour": style.SERIES[(k + 2) % 7], "dash": k % 7, "width": 1.5}
+        panel.curve(path["speed"], path["torque"], path["label"], **look)
     for bound in data["bounds"]:
-        _bound(ax, bound, data)
+        _bound(panel, bound, data)
     for k, demand in enumerate(data["demands"]):
-        ax.plot(
-            demand["speed"], demand["torque"], color=style.INK, linewidth=1.4, linestyle=(0, (2, 1.5)),
-            marker="os^D"[k % 4], markersize=4.0, markevery=8, label=demand["label"],
+        panel.curve(
+            demand["speed"], demand["torque"], demand["label"], colour=style.INK, width=1.5, dash=2,
+            marker="os^D"[k % 4], size=5.0, every=8,
         )  # fmt: skip
-    ax.set_title(data["title"])
-    ax.set_xlabel(data["speed_label"])
-    ax.set_ylabel(data["torque_label"])
-    fig.legend(loc="outside right upper")
+    panel.x.label, panel.y.label = data["speed_label"], data["torque_label"]
+    return chart
 
 
-def _bound(ax: Axes, bound: dict[str, Any], data: dict[str, Any]) -> None:
+def _bound(panel: Panel, bound: dict[str, Any], data: dict[str, Any]) -> None:
     """Draw one bound in both halves, named once."""
-    colour = BOUND_COLOURS.get(bound["label"], style.INK)
-    upright = bound["speed"][0] == bound["speed"][-1]
-    low = [-t for t in bound["torque"]]
-    look: dict[str, Any] = {"color": colour, "linewidth": 1.2, "linestyle": (0, (7, 2))}
-    ax.plot(bound["speed"], bound["torque"], **look)
-    if upright or bound["torque"][0] == bound["torque"][-1]:
-        ax.plot(bound["speed"], low, **look)
-    words: dict[str, Any] = {"color": colour, "fontsize": 8.5, "bbox": style.label_box(), "clip_on": True}
+    colour, speed, torque = BOUND_COLOURS.get(bound["label"], style.INK), bound["speed"], bound["torque"]
+    upright = speed[0] == speed[-1]
+    look: dict[str, Any] = {"colour": colour, "width": 1.3, "dash": 1}
     if upright:
-        ax.text(
-            bound["speed"][0],
-            -0.75 * data["top"],
-            bound["label"],
-            ha="center",
-            va="center",
-            rotation=90,
-            **words,
-        )
+        panel.rule_x(speed[0], bound["label"], **look)
         return
-    if bound["torque"][0] == bound["torque"][-1]:
-        ax.text(0.02 * data["fast"], bound["torque"][0], bound["label"], ha="left", va="bottom", **words)
-        return
+    panel.curve(speed, torque, read=False, **look)
+    if torque[0] == torque[-1]:
+        panel.curve(speed, [-t for t in torque], read=False, **look)
     inside = [
         (s, t)
-        for s, t in zip(bound["speed"], bound["torque"], strict=True)
+        for s, t in zip(speed, torque, strict=True)
         if s < 0.97 * data["fast"] and t < 1.2 * data["top"]
     ]
     if inside:
-        ax.text(*inside[len(inside) // 2], bound["label"], ha="right", va="bottom", **words)
+        panel.note(bound["label"], inside[len(inside) // 2], colour=colour)

@@ -8,37 +8,37 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from reports.figures import style
+from reports.figures.style import Chart
 
-SIZE = (8.4, 3.8)
 
-
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the curve, the required corner and the chosen point."""
-    ax = fig.add_subplot()
+    chart = Chart(width=style.WIDE, height=350.0, title=data["title"])
+    panel = chart.panel()
     points = data["points"]
-    x = [p["bandwidth_hz"] for p in points]
-    y = [p["phase_margin_deg"] for p in points]
-    ax.plot(x, y, color=style.BLUE, label="best smallest phase margin, worst corner")
-    for ok, marker, colour, label in (
+    x, y = [p["bandwidth_hz"] for p in points], [p["phase_margin_deg"] for p in points]
+    panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
+    kinds = (
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
-    ):
+    )
+    for ok, marker, colour, label in kinds:
         chosen = [(a, b) for a, b, p in zip(x, y, points, strict=True) if p["feasible"] is ok]
         if chosen:
-            ax.plot(*zip(*chosen, strict=True), marker=marker, color=colour, linestyle="none", label=label)
+            xs, ys = zip(*chosen, strict=True)
+            panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
+    required: dict[str, Any] = {"label": "required", "colour": style.RED, "width": 1.2, "dash": 1}
     if data.get("bandwidth_min_hz") is not None:
-        ax.axvline(data["bandwidth_min_hz"], color=style.RED, linewidth=1.1, linestyle=(0, (5, 2)),
-                   label="required")  # fmt: skip
+        panel.x.see([data["bandwidth_min_hz"]])
+        panel.rule_x(data["bandwidth_min_hz"], **required)
     if data.get("phase_margin_min_deg") is not None:
-        ax.axhline(data["phase_margin_min_deg"], color=style.RED, linewidth=1.1, linestyle=(0, (5, 2)))
+        panel.y.see([data["phase_margin_min_deg"]])
+        panel.rule_y(data["phase_margin_min_deg"], **required)
     if data.get("chosen"):
         at = data["chosen"]
-        ax.plot([at["bandwidth_hz"]], [at["phase_margin_deg"]], marker="D", markersize=8, color=style.ORANGE,
-                linestyle="none", label="tuned")  # fmt: skip
-    ax.set_xlabel("bandwidth of the position loop, Hz")
-    ax.set_ylabel("smallest phase margin of all loops, deg")
-    ax.set_title(data["title"])
-    ax.legend()
+        look: dict[str, Any] = {"marker": "D", "size": 9.0, "colour": style.ORANGE}
+        panel.points([at["bandwidth_hz"]], [at["phase_margin_deg"]], "tuned", **look)
+    panel.x.label = "bandwidth of the position loop, Hz"
+    panel.y.label = "smallest phase margin of all loops, deg"
+    return chart

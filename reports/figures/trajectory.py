@@ -8,52 +8,43 @@ from __future__ import annotations
 
 from typing import Any
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from reports.figures import style
-from reports.numbers import time_unit
-
-SIZE = (7.2, 7.2)
+from reports.figures.style import Chart, Panel
 
 
-def draw(data: dict[str, Any], fig: Figure) -> None:
+def draw(data: dict[str, Any]) -> Chart:
     """Draw the panels one below the other on one time axis."""
-    scale, unit = time_unit(data["time_s"][-1])
-    axes = fig.subplots(len(data["panels"]), 1, sharex=True, squeeze=False)[:, 0]
+    scale, _ = style.time_unit(data["time_s"][-1])
+    chart = Chart(width=style.WIDE, height=60.0 + 150.0 * len(data["panels"]), legend=True)
+    panels = chart.column(*(1.0 for _ in data["panels"]))
     time = [t * scale for t in data["time_s"]]
-    for ax, panel in zip(axes, data["panels"], strict=True):
-        _panel(ax, panel, time, scale)
-    axes[-1].set_xlabel(f"time, {unit}")
-    axes[-1].set_xlim(time[0], time[-1])
+    for panel, part in zip(panels, data["panels"], strict=True):
+        _panel(panel, part, time, scale)
+    style.time_axis(panels[-1], data["time_s"][-1])
+    panels[-1].x.limits(time[0], time[-1])
+    return chart
 
 
-def _panel(ax: Axes, panel: dict[str, Any], time: list[float], scale: float) -> None:
+def _panel(panel: Panel, data: dict[str, Any], time: list[float], scale: float) -> None:
     """Draw the signals of one panel, its limit and the spans in which the limit acts."""
-    for k, (start, stop) in enumerate(panel["active"]):
-        words = f"{panel['limit_label']} limit acts" if k == 0 else None
-        ax.axvspan(start * scale, stop * scale, color=style.RED, alpha=0.13, linewidth=0, label=words)
+    for start, stop in data["active"]:
+        words = f"{data['limit_label']} limit acts"
+        panel.band_x(start * scale, stop * scale, words, colour=style.RED)
     # the command lies under the response: drawn last in the list, first on the paper
-    for k, series in reversed(list(enumerate(panel["series"]))):
-        look = {"color": style.SERIES[k], "linestyle": style.DASHES[k], "label": series["label"]}
-        ax.plot(time, style.gaps(series["values"]), linewidth=1.8 if k == 0 else 1.3, **look)
-    _limit(ax, panel)
-    ax.set_ylabel(panel["label"])
-    handles, labels = ax.get_legend_handles_labels()
-    if len(labels) > 1:
-        place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "borderaxespad": 0.0}
-        ax.legend(handles[::-1], labels[::-1], ncols=len(labels), **place)
+    for k, series in reversed(list(enumerate(data["series"]))):
+        panel.curve(time, series["values"], series["label"], width=2.0 if k == 0 else 1.5, **style.series(k))
+    _limit(panel, data)
+    panel.y.label = data["label"]
 
 
-def _limit(ax: Axes, panel: dict[str, Any]) -> None:
+def _limit(panel: Panel, data: dict[str, Any]) -> None:
     """Draw both signs of the limit where it lies within reach of the signals."""
-    if panel["limit"] is None:
+    if data["limit"] is None:
         return
-    values = [abs(v) for series in panel["series"] for v in series["values"] if v is not None]
-    peak = max(values, default=0.0)
-    if panel["limit"] > 4.0 * peak:
-        words = f"limit ±{panel['limit']:.4g}"
-        ax.text(0.01, 0.95, words, transform=ax.transAxes, va="top", fontsize=8.5, bbox=style.label_box())
+    peak = max((abs(v) for series in data["series"] for v in style.known(series["values"])), default=0.0)
+    if data["limit"] > 4.0 * peak:
+        panel.note(f"limit ±{data['limit']:.4g}, off scale", corner="top left", colour=style.MUTED)
         return
+    panel.y.see([-data["limit"], data["limit"]])
     for sign in (1.0, -1.0):
-        ax.axhline(sign * panel["limit"], color=style.RED, linewidth=1.1, linestyle=(0, (7, 3)))
+        panel.rule_y(sign * data["limit"], colour=style.RED, width=1.2, dash=1)

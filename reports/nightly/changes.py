@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from reports.nightly.figures import Figure
 from reports.nightly.records import Run
@@ -68,35 +70,50 @@ class Comparison:
         return tuple(c for c in self.changes if c.worse)
 
 
-def compare_figures(
-    before: Mapping[str, Figure], after: Mapping[str, Figure], tolerances: Tolerances
-) -> tuple[Change, ...]:
-    """List every figure that moved beyond its tolerance, appeared or vanished; the worst first."""
-    changes = []
-    for name in [*after, *(n for n in before if n not in after)]:
-        change = _change(name, before.get(name), after.get(name), tolerances)
-        if change is not None:
-            changes.append(change)
-    return tuple(sorted(changes, key=lambda c: (not c.worse, c.kind != "verdict", -c.size, c.figure)))
+class Columns:
+    """The figures of a history as columns: what each is, and how far it may move."""
 
+    def __init__(self, figures: Sequence[Figure], tolerances: Tolerances) -> None:
+        self.figures = tuple(figures)
+        pairs = [tolerances.pair(figure) for figure in figures]
+        self.absolute, self.relative = np.array(pairs).reshape(-1, 2).T
+        self.better = np.array([figure.better for figure in figures])
+        self.verdict = np.array([figure.kind == "verdict" for figure in figures], dtype=bool)
+        names = np.array([figure.name for figure in figures])
+        self.order = np.empty(len(figures), dtype=int)
+        self.order[np.argsort(names, kind="stable")] = np.arange(len(figures))
 
-def _change(name: str, old: Figure | None, new: Figure | None, tolerances: Tolerances) -> Change | None:
-    figure = new or old
-    assert figure is not None
-    a, b = old.value if old else None, new.value if new else None
-    if a is None and b is None:
-        return None
-    tolerance = tolerances.of(figure, max(abs(a or 0.0), abs(b or 0.0)))
-    if a is not None and b is not None and abs(b - a) <= tolerance:
-        return None
-    worse: bool | None = None
-    if figure.kind == "verdict":
-        worse = b == 0.0 or (b is None and a == 1.0)
-    elif a is not None and b is not None and figure.better:
-        worse = (b - a) * figure.better < 0.0
-    return Change(
-        figure=name, unit=figure.unit, kind=figure.kind, before=a, after=b, tolerance=tolerance, worse=worse
-    )
+    def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
+        """List every figure that moved beyond its tolerance, appeared or vanished; the worst first.
+
+        Parameters
+        ----------
+        before, after : ndarray, shape (figures,)
+            NaN where a result has no such value.
+        """
+        old, new = np.isfinite(before), np.isfinite(after)
+        size = np.fmax(np.abs(before), np.abs(after))
+        tolerance = np.where(self.verdict, 0.5, np.maximum(self.absolute, self.relative * size))
+        delta = after - before
+        moved = np.flatnonzero((old | new) & ~(np.abs(delta) <= tolerance))
+        worse = np.where(old & new, delta * self.better < 0.0, False)
+        worse = np.where(self.verdict, (after == 0.0) | (~new & (before == 1.0)), worse)
+        known = self.verdict | (old & new & (self.better != 0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.nan_to_num(np.abs(delta) / tolerance, nan=np.inf, posinf=np.inf)
+        keys = (self.order[moved], -far[moved], ~self.verdict[moved], ~(worse & known)[moved])
+        rows = (before.tolist(), after.tolist(), tolerance.tolist(), worse.tolist(), known.tolist())
+        return tuple(self._change(k, *rows) for k in moved[np.lexsort(keys)].tolist())
+
+    def _change(
+        self, k: int, before: list[float], after: list[float], tolerance: list[float], worse: list[bool],
+        known: list[bool],
+    ) -> Change:  # fmt: skip
+        figure, old, new = self.figures[k], before[k], after[k]
+        return Change(
+            figure=figure.name, unit=figure.unit, kind=figure.kind, before=None if old != old else old,
+            after=None if new != new else new, tolerance=tolerance[k], worse=worse[k] if known[k] else None,
+        )  # fmt: skip
 
 
 def cause_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History
 from reports.nightly.records import Result
 from reports.nightly.tolerance import Tolerances
-from reports.nightly.trend import ChangePoint, change_points, flaps
+from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview
 
 MAX_CHARTS = 60
@@ -68,7 +68,7 @@ class _Writer:
         if not len(finite):
             return
         tolerance = self.tolerances.of(figure, float(np.max(np.abs(finite))))
-        points = change_points(values, tolerance)
+        points = _recent(values, tolerance)
         to_and_fro = flaps(values, tolerance)
         moved = bool(points) or to_and_fro
         if figure.kind != "requirement" and (not moved or len(self.course.charts) >= MAX_CHARTS):
@@ -97,6 +97,13 @@ class _Writer:
             "svg": Markup(line_chart(chart)),
             "points": [(self.days[p.index], p) for p in points],
         }
+
+
+def _recent(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:
+    """Find the changes of level of the last nights."""
+    start = max(len(values) - LOOK_BACK, 0)
+    found = change_points(values[start:], tolerance)
+    return tuple(replace(point, index=start + point.index) for point in found) if start else found
 
 
 def _moved(

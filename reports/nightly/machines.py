@@ -210,7 +210,7 @@ def markdown(night: Overview) -> str:
     sign = "✓" if night.exit_status == 0 else "✗"
     lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {counts}", ""]
     lines += [
-        f"Run {night.run.id}, {night.run.started}, commit {night.run.code_commit[:12] or 'unknown'}.",
+        f"Run {night.run.id}, {night.run.started}, study commit {night.run.study_commit[:12] or 'unknown'}.",
         "",
     ]
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]

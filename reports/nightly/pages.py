@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from markupsafe import Markup
 
 from reports.html import asset, environment, security_policy
 from reports.nightly.course import Course, course_of
+from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
 from reports.nightly.machines import STATE_WORDS, cause_lines
 from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line, visible
-from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, report_folder
+from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
 
 MAX_NIGHTS = 400
+MAX_HEADLINES = 12
 STATES = {
     "broken": ("⚠", STATE_WORDS["broken"]),
     "fail": ("✗", STATE_WORDS["fail"]),
@@ -25,6 +27,7 @@ STATES = {
 }
 NIGHT_SIGNS = {
     "pass": ("✓", "passed"),
+    "regressed": ("▼", "passed, closer to its limit"),
     "fail": ("✗", "failed"),
     "error": ("⚠", "raised an error"),
     "timeout": ("⚠", "did not end in time"),
@@ -35,7 +38,13 @@ NIGHT_SIGNS = {
 
 def index(night: Overview, folder: str) -> str:
     """Make the page that stands at the root of the site; its links lead into ``folder``."""
-    return _render("nightly/index.html", night=night, folder=folder, STATE_ORDER=tuple(STATES))
+    return _render(
+        "nightly/index.html",
+        night=night,
+        folder=folder,
+        STATE_ORDER=tuple(STATES),
+        headlines=headlines(night.designs)[:MAX_HEADLINES],
+    )
 
 
 def of_night(
@@ -86,6 +95,9 @@ def _render(template: str, **context: Any) -> str:
             states=STATES,
             night_signs=NIGHT_SIGNS,
             cause_lines=cause_lines,
+            cause_words=cause_words,
+            change_words=change_words,
+            main_changes=main_changes,
             visible=visible,
             one_line=one_line,
             number=_number,
@@ -100,6 +112,7 @@ def _nights(
 ) -> list[dict[str, Any]]:
     """Rows of the table of nights, the last first, with rows for nights that are missing."""
     known = {r.run: r for r in past}
+    outcomes = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
     gaps = {night.runs[i].id: count for i, count in night.missing}
     first = past[0].run if past else 0
     rows: list[dict[str, Any]] = []
@@ -108,19 +121,24 @@ def _nights(
             break
         if run.id in gaps and run.id != night.run.id:
             rows.append({"gap": gaps[run.id]})
-        rows.append(_night(run, known.get(run.id), design, course, available))
+        rows.append(_night(run, known.get(run.id), outcomes, design, course, available))
     return rows
 
 
 def _night(
-    run: Run, result: Result | None, design: DesignView, course: Course, available: set[str]
+    run: Run,
+    result: Result | None,
+    outcomes: Mapping[int, str],
+    design: DesignView,
+    course: Course,
+    available: set[str],
 ) -> dict[str, Any]:
     folder = report_folder(design.name, result.key) if result is not None and result.key else ""
     return {
         "gap": 0,
         "run": run,
         "result": result,
-        "status": "absent" if result is None else result.status,
+        "status": outcomes.get(run.id, "absent"),
         "report": folder if folder in available else "",
         "moved": course.moved.get(run.id, 0),
         "marks": course.marks.get(run.id, []),

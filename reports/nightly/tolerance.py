@@ -25,10 +25,6 @@ class Rule:
     absolute: float
     relative: float
 
-    def value(self, size: float) -> float:
-        """Tolerance of a figure of this size, in its own unit."""
-        return max(self.absolute, self.relative * abs(size))
-
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -38,12 +34,17 @@ class Tolerances:
 
     def of(self, figure: Figure, size: float) -> float:
         """Tolerance of a figure whose larger value has this size."""
+        absolute, relative = self.pair(figure)
+        return max(absolute, relative * abs(size))
+
+    def pair(self, figure: Figure) -> tuple[float, float]:
+        """Absolute and relative tolerance of a figure; the larger one counts."""
         if figure.kind == "verdict":
-            return 0.5
+            return 0.5, 0.0
         for rule in self.rules:
             if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
-                return rule.value(size)
-        return max(ABSOLUTE.get(figure.unit, FLOOR), RELATIVE * abs(size))
+                return rule.absolute, rule.relative
+        return ABSOLUTE.get(figure.unit, FLOOR), RELATIVE
 
 
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.changes import Cause, Change, Comparison, cause_of, compare_figures
+from reports.nightly.changes import Cause, Change, Columns, Comparison, cause_of
 from reports.nightly.code_version import commits_between
 from reports.nightly.figures import Figure, Verdict
 from reports.nightly.history import History
@@ -20,12 +20,13 @@ from reports.nightly.job import BROKEN
 from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.text import slug
-from reports.nightly.trend import WINDOW, flaps, missing_nights
+from reports.nightly.trend import WINDOW, flaps, may_flap, missing_nights
 
 if TYPE_CHECKING:
     from reports.nightly.night import Study
 
 STRIP = 30
+CLOSER = 1e-3  # of the limit; a smaller step of the distance is none
 SHOWN_CHANGES = 100
 _RANK = {"timeout": 0, "crash": 0, "error": 0, "fail": 1, "pass": 3}
 
@@ -129,9 +130,14 @@ class Overview:
     tolerances: Any
     memory: Memory
 
+    @property
+    def alone(self) -> tuple[DesignView, ...]:
+        """The designs and variants, without the page of the whole study."""
+        return tuple(d for d in self.designs if d.result.kind == "design")
+
     def count(self, state: str) -> int:
         """How many designs are in a state (see `DesignView.state`)."""
-        return sum(d.state == state for d in self.designs)
+        return sum(d.state == state for d in self.alone)
 
     @property
     def exit_status(self) -> int:
@@ -183,6 +189,8 @@ class _Reader:
         self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
         self._table = history.figure_table()
         self._number = {f.name: i for i, f in self._table.items()}
+        self._numbers = list(self._table)
+        self._columns = Columns(list(self._table.values()), study.tolerances)
 
     def design(self, result: Result) -> DesignView:
         past = self.history.results(name=result.name, last=2 * STRIP)
@@ -209,7 +217,7 @@ class _Reader:
         return entry.meta if entry else {}
 
     def _strip(self, past: list[Result]) -> tuple[tuple[Run, str], ...]:
-        known = {r.run: r.status for r in past}
+        known = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
         shown = list(self.runs.values())[-STRIP:]
         return tuple((run, known.get(run.id, "absent")) for run in shown)
 
@@ -252,8 +260,8 @@ class _Reader:
             return Comparison(run=run, note=note or "no result tonight")
         if new.snapshot == old.snapshot:
             return Comparison(run=run, note=note)
-        before, after = self.history.figures(old.snapshot), self.history.figures(new.snapshot)
-        changes = compare_figures(before, after, self.study.tolerances)
+        before, after = self.history.matrix((old, new), self._numbers)
+        changes = self._columns.compare(before, after)
         inputs = (self.history.inputs(old.snapshot or 0), self.history.inputs(new.snapshot))
         cause = cause_of(run, self.runs[new.run], inputs, self._commits_between(run, self.runs[new.run]))
         return Comparison(run=run, changes=changes, cause=cause, note=note)
@@ -264,7 +272,8 @@ class _Reader:
         if not shown or len(past) < 4:
             return changes
         values = self.history.matrix(past[-WINDOW:], [self._number[c.figure] for c in shown])
-        to_and_fro = {c.figure for j, c in enumerate(shown) if flaps(values[:, j], c.tolerance)}
+        maybe = may_flap(values, np.array([c.tolerance for c in shown]))
+        to_and_fro = {c.figure for j, c in enumerate(shown) if maybe[j] and flaps(values[:, j], c.tolerance)}
         return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)
 
     def _commits_between(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
@@ -282,6 +291,13 @@ class _Reader:
                 ]
             self._commits[key] = tuple(found)
         return self._commits[key]
+
+
+def outcome(result: Result, before: Result | None) -> str:
+    """Give the state of a night; it regressed where its nearest limit came closer than the night before."""
+    if result.status != "pass" or before is None or result.worst is None or before.worst is None:
+        return result.status
+    return "regressed" if result.worst < before.worst - CLOSER else "pass"
 
 
 def _toggles(statuses: list[str]) -> int:

@@ -97,7 +97,7 @@ def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:
 def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
     return {
         "title": clean(part["title"], MAX_TITLE),
-        "intro": clean(part.get("intro"), MAX_TEXT),
+        "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
         "status": part["status"],
         "blocks": [_block(block, drawings) for block in part["blocks"]],
     }
@@ -114,10 +114,31 @@ def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, A
         return {"kind": kind, "items": items}
     if kind == "verdicts":
         return {"kind": kind, "items": [_verdict(item) for item in block["items"]]}
+    if kind == "glance":
+        return _glance(block)
     if kind == "details":
         inner = [_block(b, drawings) for b in block["blocks"]]
         return {"kind": kind, "title": clean(block["title"], MAX_TITLE), "blocks": inner}
     return {"kind": "text", "paragraphs": [clean(p, MAX_TEXT) for p in str(block["text"]).split("\n\n")]}
+
+
+def _glance(block: Mapping[str, Any]) -> dict[str, Any]:
+    """Print the first screen as the table of its loops, with the weakest point and the findings as note."""
+    cells = block["loops"][0]["figures"] if block["loops"] else []
+    columns = [{"label": "Loop", "unit": "", "align": "left"}]
+    columns += [{"label": cell["label"], "unit": cell["unit"], "align": "right"} for cell in cells]
+    rows = [
+        {
+            "status": "",
+            "cells": [_cell(row["loop"], "text"), *(_cell(c["value"], c["format"]) for c in row["figures"])],
+        }
+        for row in block["loops"]
+    ]
+    weakest = block["weakest"]
+    words = [f"Weakest point: {weakest['label']}, {weakest['words']}."] if weakest else []
+    words += [item["text"] for item in block["findings"]]
+    note = clean(" ".join(words), 2000)
+    return {"kind": "table", "caption": "Each loop", "note": note, "columns": columns, "rows": rows}
 
 
 def _figure(block: Mapping[str, Any], svg: str) -> dict[str, Any]:

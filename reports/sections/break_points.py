@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyses.loop_figures import LoopFigures
@@ -39,17 +39,32 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
     exact = [_exact_row(name, point) for name, point in points.items() if point.exact is not None]
     if exact:
         words = (
-            "Where a fast loop is cut inside slower ones, the loop is periodically time-varying; the lines "
-            "above are those of its fundamental. The true borders of stability, from the eigenvalues over "
-            "one whole period, are these."
+            "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
+            "fundamental. "
+            "The exact borders of stability follow from the eigenvalues over one period."
         )
         blocks += [doc.text(words), doc.table("Exact borders of periodic loops", EXACT_COLUMNS, exact)]
     intro = (
-        "A gain error or a delay sits at one place in the finished drive, with every other loop running. "
-        "The matrix shows what the drive tolerates at each place."
+        "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
+        "The matrix "
+        "shows what the drive tolerates at each point."
     )
     status = worst_status([point.stable for point in points.values()])
-    return doc.section("break-points", "Break-point matrix", blocks, intro=intro, status=status)
+    return doc.section(
+        "break-points", "Break-point matrix", blocks, result=_result(rows), intro=intro, status=status
+    )
+
+
+def _result(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Say where the finished drive tolerates least."""
+    closed = [row for row in rows if row["others"] == "all closed" and row.get("s_peak_db") is not None]
+    if not closed:
+        return "No margin of the finished drive is known."
+    row = max(closed, key=lambda row: float(row["s_peak_db"]))
+    return (
+        f"With all loops closed the drive is most sensitive at the {row['point']}: peak of S "
+        f"{row['s_peak_db']:.2f} dB."
+    )
 
 
 def _row(name: str, others: str, found: LoopFigures | None) -> dict[str, Any]:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
 from reports.numbers import significant
-from reports.sections import compare_figures, compare_ledger
+from reports.sections import compare_best, compare_figures, compare_ledger
+from reports.sections.compare_best import limit_words, number
 from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label
 
@@ -18,30 +19,39 @@ if TYPE_CHECKING:
     from analyses.variants import Compared, Comparison
 
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
+COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
 def sections(comparison: Comparison) -> list[dict[str, Any]]:
     """Make all sections of a comparison."""
-    made = [verdicts(comparison), figures(comparison), differences(comparison)]
+    made = [
+        compare_best.section(comparison),
+        verdicts(comparison),
+        figures(comparison),
+        differences(comparison),
+    ]
     made += compare_ledger.sections(comparison)
     made += compare_figures.sections(comparison)
     return made
 
 
 def verdicts(comparison: Comparison) -> dict[str, Any]:
-    """Verdicts of every design, side by side."""
+    """Verdicts of every design: a row a requirement, a column a design."""
     wanted = comparison.base.verdicts
     blocks: list[dict[str, Any]] = []
     if wanted:
-        columns = [doc.column("design", "Design")]
-        columns += [
-            doc.column(f"r{k}", f"{label(v)} {_limit(v)}", align="right") for k, v in enumerate(wanted)
-        ]
-        rows = [_verdict_row(one, comparison) for one in comparison.all]
-        note = "In brackets the difference to the base, in the unit of the requirement."
-        blocks.append(doc.table("Requirements, side by side", columns, rows, note))
+        note = "In brackets the difference from the base, in the unit of the requirement."
+        for k, designs in enumerate(batches(comparison)):
+            columns = [
+                doc.column("what", "Requirement"),
+                doc.column("limit", "Limit"),
+                *design_columns(designs),
+            ]
+            rows = [_verdict_row(verdict, designs) for verdict in wanted]
+            title = "Requirements of every design" + ("" if k == 0 else f", part {k + 1}")
+            blocks.append(doc.table(title, columns, rows, note if k == 0 else ""))
     blocks += [
         doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts([_named(one, v) for v in one.verdicts])])
         for one in comparison.all
@@ -49,11 +59,23 @@ def verdicts(comparison: Comparison) -> dict[str, Any]:
     ]
     for variant in comparison.refused:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
-    failed = comparison.refused or any(v.passed is False for one in comparison.all for v in one.verdicts)
-    count = len(comparison.variants)
-    intro = f"The base {comparison.base.variant.name} and {count} variant{'s' * (count != 1)}."
-    status = "fail" if failed else "pass"
-    return doc.section("verdicts", "Verdicts side by side", blocks, intro=intro, status=status)
+    failed = sum(v.passed is False for one in comparison.all for v in one.verdicts)
+    count = sum(len(one.verdicts) for one in comparison.all)
+    result = f"{failed} of {count} verdicts fail." if failed else f"All {count} verdicts pass."
+    status = "fail" if failed or comparison.refused else "pass"
+    return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
+
+
+def batches(comparison: Comparison, designs: Sequence[Compared] | None = None) -> list[list[Compared]]:
+    """Divide the designs into tables that fit a page, each with the base first."""
+    others = [one for one in (comparison.all if designs is None else designs) if one is not comparison.base]
+    stretches = [others[k : k + COLUMNS] for k in range(0, len(others), COLUMNS)] or [[]]
+    return [[comparison.base, *stretch] for stretch in stretches]
+
+
+def design_columns(designs: Sequence[Compared]) -> list[dict[str, Any]]:
+    """Make a column a design."""
+    return [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(designs)]
 
 
 def overview(comparison: Comparison) -> dict[str, Any]:
@@ -75,29 +97,19 @@ def _named(one: Compared, verdict: RequirementVerdict) -> dict[str, Any]:
     return {**made, "id": f"{one.variant.slug}/{made['id']}"}
 
 
-def _limit(verdict: RequirementVerdict) -> str:
-    r = verdict.requirement
-    parts = [f"≥ {r.minimum:g}"] if r.minimum is not None else []
-    parts += [f"≤ {r.maximum:g}"] if r.maximum is not None else []
-    return f"{' and '.join(parts)} {'' if r.unit == '1' else r.unit}".rstrip()
-
-
-def _verdict_row(one: Compared, comparison: Comparison) -> dict[str, Any]:
-    by_id = {v.id: v for v in one.verdicts}
-    row: dict[str, Any] = {"design": one.variant.name}
-    for k, wanted in enumerate(comparison.base.verdicts):
-        verdict = by_id.get(wanted.id)
+def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> dict[str, Any]:
+    row: dict[str, Any] = {"what": label(wanted), "limit": limit_words(wanted)}
+    for k, one in enumerate(designs):
+        verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
         if verdict is None or verdict.value is None:
-            row[f"r{k}"] = {
-                "text": "none",
-                "status": "fail" if verdict and verdict.passed is False else "info",
-            }
+            status = "fail" if verdict and verdict.passed is False else "info"
+            row[f"d{k}"] = {"text": "none", "status": status}
             continue
-        words = _number(verdict.value)
+        words = number(verdict.value) or ""
         change = 0.0 if wanted.value is None else verdict.value - wanted.value
         if abs(change) > _SEEN * abs(verdict.value):
             words += f" ({_signed(change)})"
-        row[f"r{k}"] = {"text": words, "status": "pass" if verdict.passed else "fail"}
+        row[f"d{k}"] = {"text": words, "status": "pass" if verdict.passed else "fail"}
     return row
 
 
@@ -106,21 +118,24 @@ def figures(comparison: Comparison) -> dict[str, Any]:
     blocks = []
     for group, title in GROUPS.items():
         names = [name for name in comparison.names if name.group == group]
-        if names:
-            blocks.append(_group_table(title, names, comparison))
-    intro = "In brackets the difference to the base. ▲ best and ▽ worst of a column."
-    return doc.section("figures", "Figures side by side", blocks, intro=intro)
+        for k, designs in enumerate(batches(comparison) if names else []):
+            heading = title if k == 0 else f"{title}, part {k + 1}"
+            blocks.append(_group_table(heading, names, comparison, designs))
+    moved = sum(bool(one.differences) for one in comparison.variants)
+    result = f"{moved} of {len(comparison.variants)} variants change a figure of the base."
+    intro = "In brackets the difference from the base. ▲ best and ▽ worst of all designs."
+    return doc.section("figures", "Figures side by side", blocks, result=result, intro=intro)
 
 
-def _group_table(title: str, names: Sequence[FigureName], comparison: Comparison) -> dict[str, Any]:
-    columns = [doc.column("design", "Design")]
-    columns += [doc.column(name.key, _title(name.label), name.unit, align="right") for name in names]
+def _group_table(
+    title: str, names: Sequence[FigureName], comparison: Comparison, designs: Sequence[Compared]
+) -> dict[str, Any]:
+    columns = [doc.column("figure", "Figure"), doc.column("unit", "Unit"), *design_columns(designs)]
     rows = []
-    for one in comparison.all:
-        row: dict[str, Any] = {"design": one.variant.name}
-        for name in names:
-            row[name.key] = _cell(one, name, comparison)
-        rows.append(row)
+    for name in names:
+        unit = "ms" if name.unit == "s" else name.unit.replace("^2", "²")
+        row: dict[str, Any] = {"figure": _title(name.label), "unit": unit}
+        rows.append(row | {f"d{k}": _cell(one, name, comparison) for k, one in enumerate(designs)})
     return doc.table(title, columns, rows)
 
 
@@ -132,9 +147,10 @@ def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None
     value = one.figures.get(name.key)
     if value is None:
         return None
-    words = _number(value)
+    scale = 1e3 if name.unit == "s" else 1.0
+    words = number(scale * value) or ""
     if abs(one.differences.get(name.key, 0.0)) > _SEEN * abs(value):
-        words += f" ({_signed(one.differences[name.key])})"
+        words += f" ({_signed(scale * one.differences[name.key])})"
     ends = comparison.ends(name)
     if ends is not None and value in ends:
         words += " ▲" if value == ends[0] else " ▽"
@@ -146,15 +162,18 @@ def differences(comparison: Comparison) -> dict[str, Any]:
     blocks: list[dict[str, Any]] = []
     for one in comparison.variants:
         if not one.changed and not one.differences:
-            blocks.append(doc.text(f"{one.variant.name}: differs in nothing from the base."))
+            blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
             continue
         keys = "; ".join(f"{c.path}: {c.base} → {c.text}" for c in one.changed)
         blocks.append(doc.details(f"{one.variant.name}: {keys}"[:400], [_moved_table(one, comparison)]))
     intro = (
-        "For each difference the changed keys one at a time, starting from the base, over the exact sampled "
-        "loops; what they do not explain is their interaction. Large-signal figures are not taken apart."
+        "Each changed key is applied alone to the base, over the exact sampled loops. What the keys do not "
+        "explain "
+        "is their interaction. Large-signal figures are not taken apart."
     )
-    return doc.section("differences", "What moved what", blocks, intro=intro)
+    changed = sum(bool(one.changed) for one in comparison.variants)
+    result = f"{changed} of {len(comparison.variants)} variants change a key of the base."
+    return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
 def _moved_table(one: Compared, comparison: Comparison) -> dict[str, Any]:
@@ -164,8 +183,8 @@ def _moved_table(one: Compared, comparison: Comparison) -> dict[str, Any]:
         doc.column("base", "Base", format="sig:4"),
         doc.column("value", "Variant", format="sig:4"),
         doc.column("difference", "Difference", format="sig:3"),
-        doc.column("moved", "Moved by"),
-        doc.column("rest", "Together", format="sig:2"),
+        doc.column("moved", "Cause"),
+        doc.column("rest", "Interaction", format="sig:2"),
     ]
     rows = []
     for name in comparison.names:
@@ -181,10 +200,6 @@ def _moved_table(one: Compared, comparison: Comparison) -> dict[str, Any]:
             "moved": shown, "rest": rest if parts and abs(rest) > 1e-3 * abs(total) else None,
         })  # fmt: skip
     return doc.table(f"{one.variant.name} against the base", columns, rows)
-
-
-def _number(value: float) -> str:
-    return significant(value, 4) if math.isfinite(value) else "unlimited"
 
 
 def _signed(value: float) -> str:

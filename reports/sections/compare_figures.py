@@ -34,8 +34,11 @@ def overlays(comparison: Comparison) -> dict[str, Any]:
         blocks += [_bode(name, title, drawn, closed) for closed in (False, True)]
         blocks += _step(name, title, drawn)
     left_out = len(comparison.all) - len(drawn)
-    intro = f"The first {MOST_CURVES} designs; {left_out} more are in the tables." if left_out else ""
-    return doc.section("overlays", "Responses over one another", [b for b in blocks if b], intro=intro)
+    intro = f"{left_out} more designs are in the tables only." if left_out else ""
+    result = f"Open loop, closed loop and step of {len(drawn)} designs; the base is black."
+    return doc.section(
+        "overlays", "Responses of all designs", [b for b in blocks if b], result=result, intro=intro
+    )
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> dict[str, Any]:
@@ -102,11 +105,23 @@ def tornadoes(comparison: Comparison) -> dict[str, Any]:
     blocks = blocks[:MOST_CHARTS]
     blocks.append(doc.details("Every sensitivity", [_slopes(comparison)]))
     intro = (
-        "Which parameter of the base moves a figure, and how far: each parameter alone at both ends of its "
-        "tolerance, or 10 % off where it has none. Slopes are central differences of 0.1 % over the exact "
-        "sampled loops."
+        "Each parameter alone at both ends of its tolerance, or ±10 % where it has none. Slopes are central "
+        "differences of 0.1 % over the exact sampled loops."
     )
-    return doc.section("sensitivities", "Sensitivities", blocks, intro=intro)
+    return doc.section(
+        "sensitivities", "Sensitivities", blocks, result=_strongest(comparison, wanted), intro=intro
+    )
+
+
+def _strongest(comparison: Comparison, wanted: dict[str, float | None]) -> str:
+    """Say which parameter changes the first required figure most."""
+    for key in wanted:
+        bars = comparison.sensitivities.tornado(key)
+        if bars:
+            name = next((n.label for n in comparison.names if n.key == key), key)
+            place = LOOPS.get(key.partition(".")[0], "drive").lower()
+            return f"The {name} of the {place} depends most on {bars[0].path}."
+    return "No figure depends on a parameter with a tolerance."
 
 
 def _wanted(comparison: Comparison) -> dict[str, float | None]:
@@ -169,4 +184,4 @@ def _slopes(comparison: Comparison) -> dict[str, Any]:
         for key in known.base
         for e in known.tornado(key)[:MOST_BARS]
     ]  # fmt: skip
-    return doc.table("Slopes and swings, the ten strongest parameters of each figure", columns, rows)
+    return doc.table("Slopes and ranges, the ten strongest parameters of each figure", columns, rows)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from analyses.variants import Compared, Comparison
 
 Key = tuple[str, str, str]
+COLUMNS = 5  # designs in one table: what reads on one screen
 
 
 def sections(comparison: Comparison) -> list[dict[str, Any]]:
@@ -26,15 +27,21 @@ def sections(comparison: Comparison) -> list[dict[str, Any]]:
     blocks: list[dict[str, Any]] = []
     for loop, condition in conditions:
         wanted = [key for key in keys if key[0] == loop and key[2] == condition]
-        blocks.append(_table(loop, condition, wanted, tested))
+        batches = (tested[k : k + COLUMNS] for k in range(0, len(tested), COLUMNS))
+        blocks += [_table(loop, condition, wanted, batch) for batch in batches]
     blocks += [doc.text(f"{one.variant.name}: not tested. {one.untested}") for one in tested if one.untested]
-    failed = sum(entry.passed is False for one in tested for entry in one.ledger)
+    judged = [entry.passed for one in tested for entry in one.ledger if entry.passed is not None]
+    failed = judged.count(False)
+    result = f"{len(judged) - failed} of {len(judged)} linear predictions agree with the simulation."
     intro = (
-        "What the nonlinear simulator shows, in brackets the difference to the linear prediction. Marked: "
-        "within the tolerance, outside, or not judged because the prediction need not hold there."
+        "Simulated values; in brackets the difference from the linear prediction. Marked: within the "
+        "tolerance, "
+        "outside, or not judged because the prediction need not hold there."
     )
-    title = "Predictions checked" if not failed else f"Predictions checked: {failed} do not hold"
-    return [doc.section("ledger", title, blocks, intro=intro, status="fail" if failed else "pass")]
+    status = "fail" if failed else "pass"
+    return [
+        doc.section("ledger", "Predictions and simulation", blocks, result=result, intro=intro, status=status)
+    ]
 
 
 def _key(entry: Entry) -> Key:
@@ -43,15 +50,17 @@ def _key(entry: Entry) -> Key:
 
 def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -> dict[str, Any]:
     units = {_key(entry): entry.unit for one in tested for entry in one.ledger}
-    columns = [doc.column("design", "Design")]
-    for k, key in enumerate(keys):
-        unit = "" if units[key] == "1" else units[key]
-        columns.append(doc.column(f"e{k}", _title(QUANTITIES.get(key[1], key[1])), unit, align="right"))
+    columns = [doc.column("what", "Prediction"), doc.column("unit", "Unit")]
+    columns += [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(tested)]
+    known = [{_key(entry): entry for entry in one.ledger} for one in tested]
     rows = []
-    for one in tested:
-        known = {_key(entry): entry for entry in one.ledger}
-        cells = {f"e{k}": _cell(known.get(key)) for k, key in enumerate(keys)}
-        rows.append({"design": one.variant.name, **cells})
+    for key in keys:
+        unit = units.get(key, "")
+        row: dict[str, Any] = {
+            "what": _title(QUANTITIES.get(key[1], key[1])),
+            "unit": "" if unit == "1" else unit,
+        }
+        rows.append(row | {f"d{k}": _cell(found.get(key)) for k, found in enumerate(known)})
     return doc.table(f"{LOOPS.get(loop, loop)}: {condition}", columns, rows)
 
 

@@ -7,47 +7,54 @@ from typing import Any
 
 from analyses.validation.conditional import Conditional, Prediction
 from reports import document as doc
+from reports.findings import Finding
 from reports.sections.names import POINTS
 
 
 def section(found: Conditional, axis: str = "rotary") -> dict[str, Any]:
     """Make the section: what the describing functions say, and what steps of growing size do."""
     scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
-    blocks = [doc.text(_words(found, scale, unit)), _facts(found, scale, unit)]
+    result, *more = _words(found, scale, unit)
+    blocks = [*map(doc.text, more), _facts(found, scale, unit)]
     if found.predictions:
         blocks.append(_table(found.predictions, scale, unit))
     intro = (
-        "A limit takes gain away. A loop that needs its gain (one with a lower gain margin) can then lose "
-        "its stability at large commands although every margin is healthy."
+        "A limit reduces the effective gain. A loop with a lower gain margin can then become unstable at "
+        "large "
+        "commands, although every linear margin is sufficient."
     )
     status = "fail" if found.found else "pass"
+    findings = [Finding(severity="fail", text=result, where="conditional")] if found.found else []
     return doc.section(
-        "conditional", "Large commands and conditional stability", blocks, intro=intro, status=status
-    )
+        "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
+        status=status, findings=findings,
+    )  # fmt: skip
 
 
-def _words(found: Conditional, scale: float, unit: str) -> str:
-    """Say in a sentence or two what was found."""
+def _words(found: Conditional, scale: float, unit: str) -> list[str]:
+    """Say in some sentences what was found, the result first."""
     full = f"{found.full_deflection_rad * scale:.4g} {unit}"
     if not found.found:
-        return f"Every step from rest up to full deflection ({full}) settles."
+        return [f"Every step from rest up to full deflection ({full}) settles."]
     threshold = (found.threshold_rad or 0.0) * scale
     words = f"Steps beyond {threshold:.4g} {unit} do not settle (full deflection {full})"
-    words += ", although the linear margins call every loop stable." if found.hidden else "."
+    words += ", although every loop is stable by its linear margins." if found.hidden else "."
+    made = [words]
     if found.oscillation_hz is not None and found.oscillation_rad is not None:
         size = f"{found.oscillation_rad * scale:.3g} {unit}"
-        words += (
-            f" At the threshold the output hovers around a limit cycle of {size} at "
-            f"{found.oscillation_hz:.3g} Hz, with the {found.limiter} limit acting."
+        made.append(
+            f"At the threshold the output approaches a limit cycle of {size} at {found.oscillation_hz:.3g} "
+            "Hz; the "
+            f"{found.limiter} limit acts."
         )
         free = [one for one in found.predictions if not one.antiwindup]
         if free:
             best = free[0]
-            words += (
-                f" The describing function of the {best.limiter} predicts "
+            made.append(
+                f"The describing function of the {best.limiter} limit predicts "
                 f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
             )
-    return words
+    return made
 
 
 def _facts(found: Conditional, scale: float, unit: str) -> dict[str, Any]:
@@ -81,9 +88,9 @@ def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> dict
             "ratio": one.amplitude / one.limit,
             "hertz": one.frequency_hz,
             "output": one.output_rad * scale,
-            "antiwindup": "yes: safer than this" if one.antiwindup else "no",
+            "antiwindup": "yes: safer than predicted" if one.antiwindup else "no",
         }
         for one in predictions
     ]
-    note = "Describing function of saturation: from this amplitude on an oscillation keeps itself up."
+    note = "Describing function of saturation: from this amplitude on an oscillation is sustained."
     return doc.table("Predicted limit cycles", columns, rows, note)

@@ -10,6 +10,8 @@ from analyses.validation.confirm import Confirmation
 from analyses.validation.release import AmplitudeMargin
 from analyses.validation.result import Validation
 from reports import document as doc
+from reports.findings import Finding
+from reports.numbers import significant
 
 SHORT = {
     "gain up": "gain up",
@@ -30,12 +32,30 @@ def sections(validation: Validation) -> list[dict[str, Any]]:
         blocks += [doc.text(words) for words in _remarks(validation.amplitude_margins)]
         blocks.append(_released(validation.amplitude_margins))
     intro = (
-        "Gain is raised and lowered, and delay added, in the simulator until an oscillation no longer dies "
-        "out. On a constant speed, without a limit acting, that is the linear margin; from rest, limits and "
-        "dry friction move it."
+        "In the simulator, gain is raised and lowered and delay is added until an oscillation no longer "
+        "decays. "
+        "At constant speed, with no limit acting, that is the linear margin. From rest, limits and dry "
+        "friction "
+        "change it."
     )
-    status = "pass" if all(item.passed for item in items) else "fail"
-    return [doc.section("confirmation", "Margins confirmed in time", blocks, intro=intro, status=status)]
+    good = sum(item.passed for item in items)
+    worst = max((abs(item.difference) for item in items if item.difference is not None), default=0.0)
+    result = (
+        f"{good} of {len(items)} margins are confirmed in the time domain, within "
+        f"{significant(100.0 * worst, 2)} % "
+        "of the linear ones."
+    )
+    status = "pass" if good == len(items) else "fail"
+    found = [
+        Finding(severity="warn", text=words, where="confirmation")
+        for words in _remarks(validation.amplitude_margins)
+    ]
+    return [
+        doc.section(
+            "confirmation", "Margins confirmed in the time domain", blocks, result=result, intro=intro,
+            status=status, findings=found,
+        )
+    ]  # fmt: skip
 
 
 def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) -> dict[str, Any]:
@@ -50,9 +70,11 @@ def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) 
     }
     worst = max((abs(item.difference) for item in items if item.difference is not None), default=0.0)
     caption = (
-        f"Left: border found in time against the linear margin, largest difference {worst:.1e} (allowed "
-        f"{items[0].tolerance:g}). Right: the same borders with the drive let go from rest at small, medium "
-        "and large deviations, limits on, with dry friction and without."
+        "Left: margin found in time relative to the linear margin, largest difference "
+        f"{significant(worst, 2)} "
+        f"(allowed {items[0].tolerance:g}). Right: the same margins after release from rest at small, medium "
+        "and "
+        "large deviations, limits active, with and without dry friction."
     )
     return doc.figure("confirmation", data, caption=caption, alt=caption)
 
@@ -66,13 +88,23 @@ def _remarks(released: Sequence[AmplitudeMargin]) -> list[str]:
             continue
         if known is None or value < (known.border.value or value):
             worst[item.loop, item.kind] = item
-    return [
-        f"The {item.loop} loop oscillates lastingly already from {_text(item.border.value or 0.0, item)} on "
-        f"({SHORT[item.kind]}; linear {_text(item.linear, item)}) when let go from "
-        f"{100.0 * item.part:.0f} % of its full range"
-        + (f": the {item.limiter} limit acts." if item.limiter else ".")
-        for item in worst.values()
-    ]
+    return [_remark(item) for item in worst.values()]
+
+
+def _remark(item: AmplitudeMargin) -> str:
+    """Say from where on a large motion keeps oscillating."""
+    border, linear = _text(item.border.value or 0.0, item), _text(item.linear, item)
+    how = {
+        "gain up": f"its gain is raised by {border} or more",
+        "gain down": f"its gain is lowered by {border}",
+    }
+    cause = how.get(item.kind, f"a delay of {border} or more is added")
+    acting = f" The {item.limiter} limit acts." if item.limiter else ""
+    return (
+        f"The {item.loop} loop sustains an oscillation if {cause} after release from {100.0 * item.part:.0f} "
+        "% of "
+        f"full range; the linear margin is {linear}.{acting}"
+    )
 
 
 def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
@@ -96,19 +128,22 @@ def _table(items: Sequence[Confirmation]) -> dict[str, Any]:
         doc.column("where", "Loop or break point"),
         doc.column("kind", "Varied"),
         doc.column("linear", "Linear margin", format="sig:6"),
-        doc.column("time", "Found in time", format="sig:6"),
+        doc.column("time", "In the time domain", format="sig:6"),
         doc.column("unit", "Unit"),
         doc.column("difference", "Difference", "%", format="sig:2"),
-        doc.column("hertz", "Oscillates at", "Hz", format="sig:4"),
-        doc.column("instrument", "Instrument's own error", "%", format="sig:2"),
-        doc.column("runs", "Runs", format="sig:4"),
+        doc.column("hertz", "Oscillation", "Hz", format="sig:4"),
+        doc.column("instrument", "Error of the method", "%", format="sig:2"),
+        doc.column("runs", "Runs", format="int"),
     ]
     note = (
-        "Gains scale the controller in front of the point. Delays go in behind it, a fraction of a sample by "
-        "Lagrange interpolation, whose own error at the border is stated; the computing delay is exact. "
-        "Margins beyond 50 dB count as none."
+        "Gains scale the controller in front of the point. Delays act behind it. A fraction of a sample is a "
+        "Lagrange interpolation; its error at the border is stated. The computing delay is exact. Margins "
+        "beyond "
+        "50 dB count as none."
     )
-    return doc.table("Gain and delay margins in time", columns, [_row(item) for item in items], note)
+    return doc.table(
+        "Gain and delay margins in the time domain", columns, [_row(item) for item in items], note
+    )
 
 
 def _row(item: Confirmation) -> dict[str, Any]:
@@ -136,10 +171,10 @@ def _released(items: Sequence[AmplitudeMargin]) -> dict[str, Any]:
     columns = [
         doc.column("loop", "Loop"),
         doc.column("kind", "Varied"),
-        doc.column("size", "Let go from"),
+        doc.column("size", "Released from"),
         doc.column("friction", "Dry friction"),
         doc.column("linear", "Linear margin", format="sig:4"),
-        doc.column("border", "Oscillations last from", format="sig:3"),
+        doc.column("border", "Sustained oscillation from", format="sig:3"),
         doc.column("unit", "Unit"),
         doc.column("limiter", "Limit acting"),
         doc.column("remark", ""),
@@ -154,7 +189,7 @@ def _released_row(item: AmplitudeMargin) -> dict[str, Any]:
     value, delay = item.border.value, item.kind == "delay"
     remark = ""
     if value is None:
-        remark = "no lasting oscillation up to " + _text(max(item.border.bracket), item)
+        remark = "no sustained oscillation up to " + _text(max(item.border.bracket), item)
     elif item.border.bracket == (1.0, 1.0) and not delay:
         remark = "the nominal drive oscillates"
     return {

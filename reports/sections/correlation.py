@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from analyses.correlation.summary import summarise, worst_of
 from reports import document as doc
 from reports.document import rounded
+from reports.sections.identification_inputs import finding_table, result_input_table
 from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
     from analyses.correlation.compare import SignalComparison
+    from analyses.correlation.summary import SignalSummary
 
 NAMES = {
     "angle": "Motor angle",
@@ -33,8 +37,58 @@ def section(result: CorrelationResult, number: int = 1) -> dict[str, Any]:
     intro = (
         f"Model {result.design} with the command of {result.record}; {result.counts}. Limits reached: {told}."
     )
-    blocks = [comparison_table(result), *figures, *[doc.text(note) for note in result.notes]]
-    return doc.section(f"correlation-{number}", f"Model against {result.record}", blocks, intro=intro)
+    blocks = [
+        comparison_table(result),
+        *figures,
+        result_input_table(result),
+        finding_table(result.record, result.findings),
+        *[doc.text(note) for note in result.notes],
+    ]
+    wrong = any(finding.passed is False for finding in result.findings)
+    return doc.section(
+        f"correlation-{number}",
+        f"Model against {result.record}",
+        blocks,
+        intro=intro,
+        status="fail" if wrong else "info",
+    )
+
+
+def summary_section(results: Sequence[CorrelationResult]) -> dict[str, Any]:
+    """Make the section of all records together: a table with a row for all, and the worst one's figure."""
+    columns = [
+        doc.column("name", "Signal"),
+        doc.column("record", "Record"),
+        doc.column("mean", "Mean |e|", format="sig:4"),
+        doc.column("rms", "rms", format="sig:4"),
+        doc.column("largest", "Largest", format="sig:4"),
+        doc.column("unit", "Unit"),
+        doc.column("relative", "Relative error", "%", format="sig:4"),
+    ]
+    rows = []
+    for one in summarise(results):
+        label = NAMES.get(one.name, one.name)
+        for result in results:
+            rows += [_summary_row(label, result.record, s) for s in result.signals if s.name == one.name]
+        rows.append(_summary_row(label, f"all {one.records}; worst: {one.worst}", one) | {"_status": "info"})
+    result, signal = worst_of(results)
+    figure = signal_figure(signal)
+    figure["caption"] = f"The worst record, {result.record}. {figure['caption']}"
+    intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
+    table = doc.table("All records", columns, rows)
+    return doc.section("correlation", "All records", [table, figure], intro=intro)
+
+
+def _summary_row(label: str, record: str, signal: SignalComparison | SignalSummary) -> dict[str, Any]:
+    return {
+        "name": label,
+        "record": record,
+        "mean": signal.mean_error,
+        "rms": signal.rms_error,
+        "largest": signal.max_error,
+        "unit": signal.unit,
+        "relative": 100.0 * signal.relative_error,
+    }
 
 
 def comparison_table(result: CorrelationResult) -> dict[str, Any]:
@@ -43,6 +97,8 @@ def comparison_table(result: CorrelationResult) -> dict[str, Any]:
         doc.column("name", "Signal"),
         doc.column("relative", "Relative error", "%", format="sig:4"),
         doc.column("fit", "Fit", "%", format="fix:3"),
+        doc.column("mean", "Mean |e|", format="sig:3"),
+        doc.column("rms", "rms", format="sig:3"),
         doc.column("largest", "Largest error", format="sig:3"),
         doc.column("unit", "Unit"),
         doc.column("at", "at", "s", format="fix:3"),
@@ -53,6 +109,8 @@ def comparison_table(result: CorrelationResult) -> dict[str, Any]:
             "name": NAMES.get(s.name, s.name),
             "relative": 100.0 * s.relative_error,
             "fit": s.fit_percent,
+            "mean": s.mean_error,
+            "rms": s.rms_error,
             "largest": s.max_error,
             "unit": s.unit,
             "at": s.max_error_time_s,

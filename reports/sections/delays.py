@@ -31,8 +31,9 @@ def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
     ]
     rows = [_row(name, budget) for name, budget in budgets.items()]
     note = (
-        "Measured by the same loop built up step by step, so that the parts add up to the phase of the exact "
-        "sampled loop. One more sample: what one more period of computing delay costs, not in the total."
+        "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
+        "One more "
+        "sample: cost of one more period of computing delay, not included in the total."
     )
     bars = [
         {
@@ -45,12 +46,25 @@ def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
         }
         for name, budget in budgets.items()
     ]
-    caption = "Lag at the gain crossover of each loop, part by part; the rest to 180° is phase margin."
+    caption = "Lag at the gain crossover of each loop, by cause. The rest to 180° is phase margin."
     blocks = [
         doc.figure("delay_budget", {"bars": bars}, caption=caption, alt=f"Stacked bars. {caption}"),
         doc.table("Phase at the gain crossover", columns, rows, note),
     ]
-    return doc.section("delays", "Delay budget", blocks, intro="Where the phase at each crossover is spent.")
+    intro = "The phase at the gain crossover of each loop, divided into its causes."
+    return doc.section("delays", "Delay budget", blocks, result=_result(budgets), intro=intro)
+
+
+def _result(budgets: Mapping[str, DelayBudget]) -> str:
+    """Say which loop loses most phase to sampling, hold and computing delay."""
+    digital = ("measurement", "hold", "computing delay", "sampling")
+    lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
+    name = max(lost, key=lambda key: lost[key])
+    return (
+        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, more "
+        "than "
+        f"any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
+    )
 
 
 def _row(name: str, budget: DelayBudget) -> dict[str, Any]:

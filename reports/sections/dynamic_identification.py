@@ -1,4 +1,4 @@
-"""The dynamic identification of one record: parameters, residual, refinement by simulation."""
+"""The identification from records of a motion: inputs, parameters, verdict, refinement by simulation."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
+from reports.sections.identification_inputs import finding_table, input_table, verdict_block
 
 if TYPE_CHECKING:
-    from analyses.identification.dynamic import DynamicModel
-    from analyses.identification.output_error import OutputErrorResult
+    from analyses.identification.bench import BenchResult
+    from analyses.identification.inverse import JointModel
 
 LABELS = {
-    "inertia": ("Inertia", "kg m²", "Mass", "kg"),
+    "inertia": ("Inertia, all at the motor", "kg m²", "Mass", "kg"),
     "viscous": ("Viscous friction", "N m s/rad", "Viscous friction", "N s/m"),
     "dry": ("Dry friction", "N m", "Dry friction", "N"),
     "offset": ("Offset", "N m", "Offset", "N"),
@@ -22,66 +23,178 @@ LABELS = {
     "dry_forward": ("Dry friction, forward", "N m", "Dry friction, forward", "N"),
     "viscous_reverse": ("Viscous friction, reverse", "N m s/rad", "Viscous friction, reverse", "N s/m"),
     "dry_reverse": ("Dry friction, reverse", "N m", "Dry friction, reverse", "N"),
+    "load_coefficient": ("Load friction", "N m/(N m)", "Load friction", "N/N"),
+    "gravity_sin": ("Gravity, m g l cos(offset)", "N m", "", ""),
+    "gravity_cos": ("Gravity, m g l sin(offset)", "N m", "", ""),
 }
 
 
-def section(
-    model: DynamicModel, axis: str, notes: tuple[str, ...], refined: OutputErrorResult | None = None
-) -> dict[str, Any]:
-    """Make the section of one record's identification."""
-    blocks = [
-        parameter_table(model, axis, refined),
-        *[doc.text(note) for note in notes],
-        _figure(model, axis),
-    ]
-    return doc.section("dynamic-identification", "Dynamic identification", blocks, intro=_intro(model))
+def section(result: BenchResult, axis: str) -> dict[str, Any]:
+    """Make the section of an identification."""
+    blocks = [verdict_block(result.items), parameter_table(result, axis)]
+    if result.refined is not None:
+        blocks.append(refined_table(result))
+    if result.laws:
+        blocks.append(law_table(result, axis))
+    blocks += fixed_blocks(result.model, axis)
+    if len(result.records) > 1:
+        blocks.append(scatter_table(result.model, axis))
+    for part, record in zip(result.model.records, result.records, strict=True):
+        blocks += [
+            input_table(record, part.used),
+            finding_table(record.name, result.findings[record.name]),
+            *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
+        ]
+    blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
+    blocks.append(_figure(result.model, axis))
+    status = "pass" if result.passed else "fail"
+    return doc.section(
+        "dynamic-identification", "Dynamic identification", blocks, intro=_intro(result), status=status
+    )
 
 
-def _intro(model: DynamicModel) -> str:
+def _intro(result: BenchResult) -> str:
+    model = result.model
     recipe = model.recipe
+    many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
+    rest = sum(record.rows_at_rest for record in model.records)
     return (
-        f"{model.rows_in} rows in, {model.rows_used} used. Position filtered at {recipe.cutoff_hz:g} Hz "
-        "(Butterworth of "
-        f"order {recipe.filter_order}, forward and backward), differentiated twice, the first "
-        f"{recipe.skip_samples} "
-        f"samples dropped, decimated by {recipe.decimation}; inverse dynamic model by least squares. "
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at "
+        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), "
+        "differentiated twice, the first "
+        f"{recipe.skip_samples} samples dropped, decimated by {recipe.decimation}"
+        f"{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by least squares. "
         "Relative residual "
         f"{100.0 * model.relative_residual:.4f} %."
     )
 
 
-def parameter_table(
-    model: DynamicModel, axis: str, refined: OutputErrorResult | None = None
-) -> dict[str, Any]:
-    """Values with standard errors, and those refined by simulation where there are any."""
+def _label(name: str, axis: str) -> tuple[str, str]:
+    side = 2 if axis == "linear" else 0
+    if name.startswith("map_"):
+        return f"Friction map, point {int(name[4:]) + 1}", "N" if axis == "linear" else "N m"
+    label, unit = LABELS[name][side : side + 2]
+    return label, unit
+
+
+def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
+    """Values, their standard errors as published recipes give them, and as the record really tells."""
+    model = result.model
     columns = [
         doc.column("name", "Parameter"),
         doc.column("value", "Value", format="sig:7"),
-        doc.column("std", "Standard error", format="sig:4"),
+        doc.column("white", "Standard error, white", format="sig:4"),
+        doc.column("std", "as it is", format="sig:3"),
         doc.column("unit", "Unit"),
     ]
     rows: list[dict[str, Any]] = []
-    side = 2 if axis == "linear" else 0
     for k, name in enumerate(model.names):
-        label, unit = LABELS[name][side : side + 2]
-        rows.append({"name": label, "value": model.values[k], "std": model.standard_errors[k], "unit": unit})
-    note = ""
-    if refined is not None:
-        columns[3:3] = [
-            doc.column("refined", "Refined by simulation", format="sig:6"),
-            doc.column("refined_std", "Standard error", format="sig:3"),
-        ]
-        for row, path in zip(rows, refined.values, strict=True):
-            row |= {"refined": refined.values[path], "refined_std": refined.standard_errors[path]}
-        note = (
-            "Closed-loop simulation: the relative error of the drive signal falls from "
-            f"{100 * refined.error_before:.3f} % "
-            f"to {100 * refined.error_after:.3f} % in {refined.iterations} iterations."
+        label, unit = _label(name, axis)
+        rows.append(
+            {
+                "name": label,
+                "value": model.values[k],
+                "white": model.standard_errors[k],
+                "std": float(np.sqrt(model.covariance[k, k])),
+                "unit": unit,
+            }
         )
+    note = (
+        "White: as if the residuals were white, as is usually published. As it is: with their correlation in "
+        "time, and with the scatter between records where there are several; this one goes into the design."
+    )
     return doc.table("Identified parameters", columns, rows, note)
 
 
-def _figure(model: DynamicModel, axis: str) -> dict[str, Any]:
+def refined_table(result: BenchResult) -> dict[str, Any]:
+    """The values refined by simulation, which are those of the design."""
+    refined = result.refined
+    assert refined is not None
+    columns = [
+        doc.column("name", "Key"),
+        doc.column("value", "Refined by simulation", format="sig:6"),
+        doc.column("std", "Standard error", format="sig:3"),
+    ]
+    rows = [
+        {"name": path, "value": value, "std": refined.standard_errors[path]}
+        for path, value in refined.values.items()
+    ]
+    note = (
+        "Simulation with each record's own command: the relative error of the signal that is fitted falls "
+        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
+        f"{refined.iterations} iterations. These values are the design's."
+    )
+    return doc.table("Refined by simulation", columns, rows, note)
+
+
+def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
+    """The friction laws that were tried, by the Bayesian criterion."""
+    unit = "m/s" if axis == "linear" else "rad/s"
+    columns = [
+        doc.column("name", "Law"),
+        doc.column("breaks", f"Break points, {unit}"),
+        doc.column("parameters", "Parameters", format="short:3"),
+        doc.column("residual", "Relative residual", "%", format="sig:4"),
+        doc.column("criterion", "Criterion", format="fix:1"),
+        doc.column("taken", "Taken"),
+    ]
+    rows = [
+        {
+            "name": law.name,
+            "breaks": ", ".join(f"{speed:.4g}" for speed in law.breaks_rad_s) or "–",
+            "parameters": law.parameters,
+            "residual": 100.0 * law.relative_residual,
+            "criterion": law.criterion,
+            "taken": "yes" if law.taken else "no",
+        }
+        for law in result.laws
+    ]
+    note = (
+        "Criterion: n ln(mean square of the residual) + p ln n (Bayesian information criterion), n the rows "
+        "worth one independent one, less that of the plain law. A map is taken where it is below -6."
+    )
+    return doc.table("Friction laws", columns, rows, note)
+
+
+def fixed_blocks(model: JointModel, axis: str) -> list[dict[str, Any]]:
+    """What was not fitted, and why."""
+    if not model.fixed:
+        return []
+    columns = [
+        doc.column("name", "Not fitted"),
+        doc.column("value", "Held at", format="sig:5"),
+        doc.column("unit", "Unit"),
+        doc.column("why", "Why"),
+    ]
+    rows = []
+    for name, one in model.fixed.items():
+        label, unit = _label(name, axis)
+        rows.append({"name": label, "value": one.value, "unit": unit, "why": one.reason})
+    return [doc.table("Parameters that were held", columns, rows)]
+
+
+def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
+    """Each record alone, and the scatter between them."""
+    columns = [doc.column("name", "Parameter")]
+    count = max((len(values) for values in model.singles.values()), default=0)
+    columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(min(count, 6))]
+    columns += [
+        doc.column("between", "Scatter between records", format="sig:3"),
+        doc.column("unit", "Unit"),
+    ]
+    rows = []
+    for name in model.names:
+        label, unit = _label(name, axis)
+        own = {f"r{k}": value for k, value in enumerate(model.singles.get(name, ())[:6])}
+        rows.append({"name": label, "between": model.between[name], "unit": unit, **own})
+    note = (
+        "Standard deviation of one record beyond its own error. What a record does not tell alone is held at "
+        "the joint value there."
+    )
+    return doc.table("Records alone", columns, rows, note)
+
+
+def _figure(model: JointModel, axis: str) -> dict[str, Any]:
     unit = "N" if axis == "linear" else "N m"
     rows = np.arange(len(model.residual), dtype=float)
     series = [{"label": "residual", "x": rounded(rows), "y": rounded(model.residual, 4)}]

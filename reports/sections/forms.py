@@ -8,6 +8,7 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 from analyses.responses import curve, frequency_grid
 from reports import document as doc
+from reports.numbers import to_minus
 from reports.sections.loop import bode_data, nyquist_hz
 from reports.sections.margins import margin_row, response_row
 from reports.sections.names import FORMS, LOOPS
@@ -39,9 +40,23 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
         "without any delay, the model of the paper. No form uses a Padé approximation."
     )
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
-    intro = "The difference between the forms is the price of sampling, hold and computing delay."
+    intro = "The forms differ by sampling, hold and computing delay."
     blocks = [_overlay(forms), table, *(doc.text(f"Not found: {reason}.") for reason in refused)]
-    return doc.section("forms", "Sampled, continuous, ideal", blocks, intro=intro)
+    return doc.section("forms", "Sampled, continuous, ideal", blocks, result=_result(rows), intro=intro)
+
+
+def _result(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Say which loop loses most phase margin against the ideal form."""
+    costs = [row for row in rows if row["form"] == FORMS["sampled"] and row["phase_cost_deg"] is not None]
+    if not costs:
+        return "No phase margin is known in both the sampled and the ideal form."
+    row = min(costs, key=lambda row: float(row["phase_cost_deg"]))
+    change = to_minus(f"{row['phase_cost_deg']:+.1f}")
+    return (
+        f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg, the "
+        "largest "
+        "change of all loops."
+    )
 
 
 def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures | None) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
 from reports.document import rounded
+from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
@@ -16,10 +17,9 @@ if TYPE_CHECKING:
 
 def section(result: FrictionEffects) -> dict[str, Any]:
     """Make the section from `analyses.friction_effects.friction_effects`."""
-    title = "What dry friction does at small signals"
+    title = "Dry friction at small signals"
     if not result.points:
-        blocks = [doc.text(f"Not applicable: {result.reason}.")]
-        return doc.section("friction-effects", title, blocks)
+        return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
     scale, unit = output_unit(result.design)
     fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
     load = load_unit(result.design)
@@ -28,10 +28,16 @@ def section(result: FrictionEffects) -> dict[str, Any]:
     figure = _figure(result, fine, small, load)
     blocks += [figure] if figure else []
     blocks += [_settling_table(result, fine, small, load)]
-    blocks.append(doc.text(_summary(result)))
-    intro = "Dry friction has no small-signal gain: below a threshold nothing moves, reversals lose motion."
+    intro = (
+        "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
+    )
     failed = any(item["passed"] is False for item in items)
-    return doc.section("friction-effects", title, blocks, intro=intro, status="fail" if failed else "info")
+    words, more = _summary(result)
+    blocks += [doc.text(more)] if more else []
+    return doc.section(
+        "friction-effects", title, blocks, result=words, intro=intro, status="fail" if failed else "info",
+        findings=[Finding(severity="fail" if failed else "info", text=words, where="friction-effects")],
+    )  # fmt: skip
 
 
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> dict[str, Any]:
@@ -39,17 +45,17 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
     cycles, swing = point.cycles, point.cycles.hunting
     foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
-        found = f"none found after steps of {len(cycles.settlings)} sizes"
+        found = f"none after steps of {len(cycles.settlings)} sizes"
     else:
-        kind = "limits keep" if swing.limited else "friction keeps"
+        kind = "limits sustain" if swing.limited else "friction sustains"
         size = fine * (swing.hunting_rad or 0.0)
-        found = f"{kind} it swinging by ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
-    agree = "as foreseen" if cycles.as_foreseen else "not as foreseen"
+        found = f"{kind} a cycle of ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
+    agree = "as predicted" if cycles.as_foreseen else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
-        f"no limit cycle at {point.load_Nm:g} {load}",
+        f"No limit cycle at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * (swing.hunting_rad or 0.0),
         limit=0.0,
         unit=small,
@@ -67,7 +73,7 @@ def _foreseen_words(cycles: LimitCycles, fine: float, small: str) -> str:
     parts = []
     for item in cycles.confirmations:
         one = item.foreseen
-        kind = "stable" if one.stable else "unstable, the border of what friction keeps quiet"
+        kind = "stable" if one.stable else "unstable, the border of what friction damps"
         seen = (
             "refuted" if item.simulated_ratio is None else f"simulated at {item.simulated_ratio:.2f} of that"
         )
@@ -90,23 +96,24 @@ def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
 def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
     """List thresholds and lost motion by load."""
     columns = [
-        doc.column("load", "Load", load, format="sig:2"),
+        doc.column("load", "Load", load, format="short:4"),
         doc.column("dry", "Dry friction, motor", "mN m" if load == "N m" else "N", format="sig:3"),
-        doc.column("threshold", "Step that moves at once", small, format="sig:3"),
+        doc.column("threshold", "Step that moves immediately", small, format="sig:3"),
         doc.column("simulated", "simulated", small, format="sig:3"),
         doc.column("wait", "Wait at half of it", "ms", format="sig:3"),
         doc.column("waited", "simulated", "ms", format="sig:3"),
         doc.column("width", "Lost motion", small, format="sig:3"),
-        doc.column("predicted", "foreseen", small, format="sig:3"),
+        doc.column("predicted", "predicted", small, format="sig:3"),
         doc.column("largest", "Largest effect of friction", small, format="sig:3"),
     ]
     rows = [_threshold_row(point, fine, 1e3 if load == "N m" else 1.0) for point in result.points]
     note = (
-        "Where the speed controller integrates, a step below the threshold moves the output after "
-        "Tn (A0/A − 1), and lost motion is made up: what friction does is largest just after a reversal."
+        "The speed controller integrates: a step below the threshold moves the output after Tn (A0/A − 1), "
+        "and lost "
+        "motion is recovered. The effect of friction is largest just after a reversal."
         if result.integrates
-        else "Nothing integrates: a step below the threshold never moves the output, and 2 Tc over the "
-        "stiffness is lost at every reversal."
+        else "No controller integrates: a step below the threshold never moves the output. Each "
+        "reversal loses 2 Tc over the stiffness."
     )
     return doc.table("Threshold of motion and lost motion", columns, rows, note)
 
@@ -128,12 +135,12 @@ def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> di
 
 
 def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
-    """List the standing error after steps."""
+    """List the steady-state error after steps."""
     columns = [
-        doc.column("load", "Load", load, format="sig:2"),
+        doc.column("load", "Load", load, format="short:4"),
         doc.column("step", "Step", small, format="sig:3"),
         doc.column("wait", "Waited", "s", format="sig:2"),
-        doc.column("error", "Error left", small, format="sig:2"),
+        doc.column("error", "Remaining error", small, format="sig:2"),
         doc.column("rest", "Rotor at rest", format="yesno"),
         doc.column("hunting", "Hunting"),
     ]
@@ -157,10 +164,11 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
                 }
             )
     note = (
-        "The third step at each load is 0.3 of the threshold, a fourth that of a foreseen cycle; errors "
-        "below 1e-6 of the step are shown as 0."
+        "The third step at each load is 0.3 of the threshold, the fourth that of a predicted cycle. Errors "
+        "below 1e-6 "
+        "of the step are shown as 0."
     )
-    return doc.table("Standing error after a step", columns, rows, note)
+    return doc.table("Steady-state error after a step", columns, rows, note)
 
 
 def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any] | None:
@@ -186,23 +194,23 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict
     if not loops:
         return None
     data = {"loops": loops, "waits": waits, "unit": small, "error_unit": small, "wait_unit": small}
-    caption = "Position error over a slow triangle at the command; without friction only the small lag stays."
+    caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
-        caption += (
-            " Beside it: a step below the threshold waits until the speed integral has grown to breakaway."
-        )
+        caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
     return doc.figure("hysteresis", data, caption=caption, alt=caption)
 
 
-def _summary(result: FrictionEffects) -> str:
-    """Say what becomes of the standing error."""
+def _summary(result: FrictionEffects) -> tuple[str, str]:
+    """Say what becomes of the steady-state error, and a remark."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if any(one.hunting for one in settlings):
-        return "The standing error does not vanish: the drive hunts, as the table says."
+        return "The drive hunts: after a step the output does not come to rest.", ""
     if result.integrates:
         return (
-            "The speed integral takes the standing error away: it creeps to zero and does not hunt. With "
-            "breakaway above sliding friction it may hunt, which a describing function of dry friction "
-            "cannot foresee, as a sinusoid spends no time at rest."
+            "Dry friction leaves no steady-state error and causes no hunting: the speed integrator removes "
+            "the error.",
+            "With breakaway above sliding friction the drive may hunt. A describing function of dry friction "
+            "cannot "
+            "predict that, as a sinusoid spends no time at rest.",
         )
-    return "Nothing integrates, so an error of up to the threshold stays for good."
+    return "No controller integrates: a steady-state error of up to the threshold remains.", ""

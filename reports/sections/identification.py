@@ -16,6 +16,7 @@ from reports.sections.identification_figures import (
     surface_figure,
     window_figures,
 )
+from reports.sections.identification_inputs import campaign_table, verdict_block
 
 if TYPE_CHECKING:
     from analyses.campaign_design import CampaignSuggestion
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from analyses.identification.contributions import Contribution
     from analyses.identification.richer import RicherLaws
     from analyses.identification.surface import SurfaceFit
+    from analyses.identification.verdict import Item
 
 SHOWN = (("mN m", 1e3), ("µN m s/rad", 1e6), ("mN m/(N m)", 1e3))
 MEANING = ("static", "viscous", "load")
@@ -32,6 +34,7 @@ def section(
     result: CampaignResult,
     shares: Sequence[Contribution],
     suggestion: CampaignSuggestion | None = None,
+    items: Sequence[Item] = (),
     *,
     load_Nm: float,
     speed_rad_s: float,
@@ -39,10 +42,11 @@ def section(
     """Make the section of a campaign's result."""
     fit = result.fit
     blocks = [
+        *([verdict_block(items)] if items else []),
         coefficient_table(fit),
         contribution_table(shares, load_Nm, speed_rad_s),
         surface_figure(fit),
-        region_figure(fit),
+        *([region_figure(fit)] if len(fit.told) > 1 else []),
         residual_figure(fit),
         *window_figures(result),
         shared_table(fit),
@@ -51,8 +55,10 @@ def section(
         blocks.append(law_table(result.laws))
     if suggestion is not None:
         blocks += suggestion_blocks(suggestion)
-    blocks += [*account_blocks(result), doc.details("Every run", [run_table(result)])]
-    return doc.section("identification", "Identified friction", blocks, intro=_intro(result))
+    blocks += [*account_blocks(result), campaign_table(result)]
+    blocks.append(doc.details("Every run", [run_table(result)]))
+    status = "fail" if any(item.passed is False for item in items) else "info"
+    return doc.section("identification", "Identified friction", blocks, intro=_intro(result), status=status)
 
 
 def _intro(result: CampaignResult) -> str:
@@ -63,6 +69,7 @@ def _intro(result: CampaignResult) -> str:
         f"M = kM i with kM = {result.torque_constant_Nm_A:g} N m/A, averaged over the steady part of each "
         "run "
         f"({result.criterion}), then M = C0 + Cv w + CM |M_ext| with errors in all variables."
+        + "".join(f" {name} is not fitted: {why}." for name, why in fit.held.items())
     )
 
 
@@ -80,7 +87,8 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
         doc.column("cv", "r with Cv", format="fix:2"),
     ]
     rows = []
-    random = np.diag(fit.random_covariance) / np.diag(fit.covariance)
+    whole = np.diag(fit.covariance)
+    random = np.diag(fit.random_covariance) / np.where(whole > 0.0, whole, 1.0)
     for k, (unit, scale) in enumerate(SHOWN):
         row: dict[str, Any] = {
             "name": f"{NAMES[k]}, {MEANING[k]}",
@@ -91,7 +99,14 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
             "unit": unit,
             "scatter": 100.0 * random[k],
         }
-        row |= {key: fit.correlation[k, j] for j, key in enumerate(("c0", "cv")) if j < k}
+        if NAMES[k] in fit.held:
+            row |= {"std": None, "low": None, "high": None, "scatter": None}
+            row["name"] += ", not fitted"
+        row |= {
+            key: fit.correlation[k, j]
+            for j, key in enumerate(("c0", "cv"))
+            if j < k and {k, j} <= set(fit.told)
+        }
         rows.append(row)
     note = (
         "Intervals by propagated distributions (GUM Supplement 1): Student for the scatter of the runs, "
@@ -122,7 +137,7 @@ def shared_table(fit: SurfaceFit) -> dict[str, Any]:
     columns = [doc.column("name", "Shared error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
     rows = [
-        {"name": name, **{n: 100.0 * s / v for n, s, v in zip(NAMES, shift, fit.values, strict=True)}}
+        {"name": name, **{n: 100.0 * s / v for n, s, v in zip(NAMES, shift, fit.values, strict=True) if v}}
         for name, shift in fit.shared_shifts.items()
     ]
     note = (

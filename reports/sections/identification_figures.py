@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,7 +83,7 @@ def region_figure(fit: SurfaceFit) -> dict[str, Any]:
 
     radius = float(np.sqrt(chi2.ppf(0.95, 2)))
     pairs = []
-    for i, j in ((0, 1), (0, 2), (1, 2)):
+    for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]
         pairs.append(
             {

@@ -9,6 +9,7 @@ import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
+from reports.findings import Finding
 from reports.sections.limits import NAMES
 
 if TYPE_CHECKING:
@@ -35,12 +36,30 @@ def section(result: LargeSignals) -> dict[str, Any]:
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
     failed = any(item["passed"] is False for item in items)
     intro = (
-        "Every cell of the map is a sine command, simulated until it settled. Below the lines the linear "
-        "model holds; above, the first limiter to be reached shapes the output."
+        "Each cell of the map is one sine command, simulated until steady. Below the lines the linear model "
+        "holds. "
+        "Above them the limit that is reached first determines the output."
     )
+    words = _result(result.bode, scale, unit)
+    findings = [Finding(severity="info", text=words, where="large-signal")]
+    status = "fail" if failed else "pass"
     return doc.section(
-        "large-signal", "Large signals", blocks, intro=intro, status="fail" if failed else "pass"
+        "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, findings=findings
     )
+
+
+def _result(found: AmplitudeBode, scale: float, unit: str) -> str:
+    """Say how far the bandwidth falls with the amplitude."""
+    largest, fraction = max(zip(found.amplitude_rad, found.fractions, strict=True), default=(math.nan, 0.0))
+    value = found.minus3db_hz[int(np.argmin(np.abs(found.all_amplitude_rad - largest)))]
+    part = "full deflection" if fraction == 1.0 else f"{100.0 * fraction:.0f} % of full deflection"
+    size, linear = f"{part} ({scale * largest:.3g} {unit})", found.linear_minus3db_hz
+    if linear is None or not math.isfinite(linear):
+        return "The linear loop has no −3 dB bandwidth in the range of the map."
+    if not math.isfinite(value):
+        start = found.frequency_hz[0]
+        return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to below {start:.3g} Hz at {size}."
+    return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
 
 
 def output_unit(design: Design) -> tuple[float, str]:
@@ -57,16 +76,19 @@ def _border_verdict(border: BorderCheck | None) -> dict[str, Any]:
     """Judge the simulated border against the smallest A_k."""
     from analyses.large_signal.border import TOLERANCE
 
-    what = {"id": "validation-border", "label": "onset of saturation, simulated against linear, friction off"}
+    what = {
+        "id": "validation-border",
+        "label": "Onset of saturation: difference between simulation and linear model, friction off",
+    }
     common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
     if border is None:
         return doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")
     error = border.largest_error
     if error is None:
-        reason = "no limit can be reached: the design has none"
+        reason = "the design has no limit"
         return doc.verdict(**common, value=None, distance=None, passed=None, reason=reason)
     same, count = sum(border.same_limiter), len(border.same_limiter)
-    reason = f"largest of {count} frequencies; the limiter foreseen is the one that acts at {same} of {count}"
+    reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
     reason += f"; not judged: {border.reason}" if border.reason else ""
     distance = 100.0 * (TOLERANCE - error)
     return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
@@ -81,12 +103,13 @@ def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
     reason = found.reason
     if found.runs and not found.applicable:
         reason = (
-            f"formulas need fast loops and torque: Kv/w = {found.gain_over_frequency:.3g} (50 wanted), and "
-            f"the reversal takes {found.reversal_deg:.3g}° of the period (1° wanted); shown, not judged"
+            f"the formulas need Kv/w >= 50 (here {found.gain_over_frequency:.3g}) and a reversal within 1° "
+            "of the "
+            f"period (here {found.reversal_deg:.3g}°); shown, not judged"
         )
     rows = (
-        ("gain", "fundamental of the sawtooth against 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
-        ("lag", "lag of the sawtooth against arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
+        ("gain", "Sawtooth: difference of the fundamental from 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
+        ("lag", "Sawtooth: difference of the lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
     )
     return [
         doc.verdict(
@@ -140,9 +163,11 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
         "unit": unit,
     }
     caption = (
-        f"{design.name}: what limits a sine command, at no load, with friction. Colour: what acts longest; "
-        "marks: waveform of the output; lines: amplitude at which the linear loop reaches each limit; "
-        "diamonds and triangles on them: where the simulator first does."
+        "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
+        "waveform "
+        "of the output; a sine has none. Lines: amplitude at which the linear loop reaches each limit. "
+        "Diamonds "
+        "and triangles: where the simulation first reaches it."
     )
     return doc.figure("map", data, caption=caption, alt=_map_words(found))
 
@@ -165,8 +190,8 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, An
         doc.column("predicted", "Smallest A_k", unit, format="sig:4"),
         doc.column("simulated", "Simulated, friction off", unit, format="sig:4"),
         doc.column("error", "Difference", "%", format="fix:3"),
-        doc.column("limiter", "Limiter foreseen"),
-        doc.column("acts", "acts"),
+        doc.column("limiter", "Predicted limiter"),
+        doc.column("acts", "Acting limiter"),
     ]
     if shifted is not None:
         columns.append(doc.column("shift", "Shift by friction", "%", format="fix:2"))
@@ -183,7 +208,7 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, An
         if shifted is not None:
             row["shift"] = 100.0 * (shifted.ratio[k] - 1.0)
         rows.append(row)
-    note = "Friction shifts the border: it is shown, not judged."
+    note = "The shift by friction is shown, not judged."
     return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
 
 
@@ -212,9 +237,9 @@ def _bode_figure(found: AmplitudeBode, scale: float, unit: str, full: float) -> 
         },
     }
     caption = (
-        "Fundamental of the output over the command at several amplitudes, simulated with friction and "
-        "limits at no load, and where gain and phase pass −3 dB (1/√2 of the command) and −90° at every "
-        "amplitude. Gaps: not settled."
+        "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
+        "friction "
+        "and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
     )
     return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
 
@@ -238,7 +263,7 @@ def _bode_table(found: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]
                 "amplitude": scale * amplitude,
                 "gain": found.minus3db_hz[k],
                 "phase": found.minus90deg_hz[k],
-                "note": f"below −3 dB at {found.frequency_hz[0]:.3g} Hz already" if below else "",
+                "note": f"below −3 dB at {found.frequency_hz[0]:.3g} Hz and above" if below else "",
             }
         )
     rows.append(
@@ -266,9 +291,10 @@ def _sawtooth_blocks(found: Sawtooth, design: Design, scale: float, unit: str) -
     }
     caption = (
         f"A sine of {scale * found.amplitude_rad:.3g} {unit} at {found.frequency_hz:.3g} Hz, three times "
-        f"faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. In the boxes "
-        "what was simulated, in brackets what a pure rate limit would do: peak πR/2w, gain 4/(πx), lag "
-        "arccos(π/2x)."
+        "faster "
+        f"than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated values; in "
+        "brackets "
+        "those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
     )
     return [doc.figure("sawtooth", data, caption=caption, alt=caption)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.limiters import Onset
 from reports import document as doc
 from reports.document import rounded
+from reports.findings import Finding
 from reports.sections.names import hertz
 
 NAMES = {
@@ -37,24 +39,46 @@ def section(design: Design, border: Onset) -> dict[str, Any]:
         "full_deflection": full,
     }
     caption = (
-        "Amplitude of a sinusoidal command at the output (peak) at which each limit is just reached. "
-        "Below the lowest line every linear figure of this report holds, dry friction apart."
+        "Peak amplitude of a sine command, at the output, at which each limit is just reached. Below the "
+        "lowest line "
+        "every linear figure of this report holds, except for dry friction."
     )
     blocks = [
         doc.figure("onset", data, caption=caption, alt=caption),
         _table(design, border, scale, unit),
     ]
-    intro = "A linear prediction ends where a limiter is reached; which one, and when, depends on frequency."
-    return doc.section("limits", "Border of the linear model", blocks, intro=intro)
+    intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
+    words = _result(blocks[1]["rows"], unit)
+    findings = [Finding(severity="info", text=words, where="limits")] if words else []
+    return doc.section(
+        "limits", "Validity of the linear model", blocks, result=words, intro=intro, findings=findings
+    )
+
+
+def _result(rows: Sequence[Mapping[str, Any]], unit: str) -> str:
+    """Say how far the largest command of the table stays linear."""
+    if not rows:
+        return ""
+    row = max(rows, key=lambda row: float(row["amplitude"]))
+    full = row["fraction"] == 100.0
+    part = "full deflection" if full else f"{row['fraction']:.0f} % of full deflection"
+    size = f"{part} ({row['amplitude']:.3g} {unit})"
+    if row["hz"] is None:
+        return f"A sine of {size} stays linear over the whole frequency range."
+    return f"A sine of {size} stays linear up to {row['hz']:.3g} Hz; above, the {_noun(row['limiter'])} acts."
+
+
+def _noun(limiter: str) -> str:
+    return limiter if limiter.endswith("limit") else f"{limiter} limit"
 
 
 def _table(design: Design, border: Onset, scale: float, unit: str) -> dict[str, Any]:
     """List the highest frequency at which each command amplitude still passes unlimited."""
     columns = [
         doc.column("amplitude", "Command amplitude", unit, format="short:3"),
-        doc.column("fraction", "of full deflection", "%", format="fix:0"),
-        doc.column("hz", "linear up to", "Hz", format="sig:3"),
-        doc.column("limiter", "then limited by"),
+        doc.column("fraction", "Of full deflection", "%", format="fix:0"),
+        doc.column("hz", "Linear up to", "Hz", format="sig:3"),
+        doc.column("limiter", "Then limited by"),
     ]
     rows = []
     for fraction in design.validation.amplitude_fractions:

@@ -10,10 +10,11 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.loop_figures import LoopFigures
-from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at
+from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
 from reports import document as doc
 from reports.document import rounded
-from reports.numbers import fixed, seconds
+from reports.numbers import fixed, seconds, to_minus
+from reports.numbers import hertz as hertz_words
 from reports.sections.margins import finite, margin_row, response_row, worst_status
 from reports.sections.names import LOOPS, hertz
 
@@ -27,16 +28,36 @@ def section(
     """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
     grid = frequency_grid(found)
     title, status = LOOPS[name], worst_status([found.margins.stable])
-    blocks = [_facts(found), open_bode(title, found, grid)]
+    blocks = [_facts(found), open_bode(title, found, grid, name=name)]
     if found.stable:
-        blocks.append(closed_bode(title, found, grid, locked))
+        blocks.append(closed_bode(title, found, grid, locked, name=name))
     blocks.append(nyquist(title, found, grid))
     if found.peaks is not None:
         blocks.append(sensitivity(title, design, name, found, grid))
     if found.step is not None:
-        blocks.append(step(title, found, locked))
+        blocks.append(step(title, found, locked, name=name))
     blocks += [doc.text(note) for note in (*found.margins.notes, *found.notes)]
-    return doc.section(f"loop-{name}", title, blocks, intro=_intro(name, found), status=status)
+    return doc.section(
+        f"loop-{name}", title, blocks, result=result(found), intro=_intro(name, found), status=status
+    )
+
+
+def result(found: LoopFigures) -> str:
+    """Say in one sentence what the loop is like."""
+    row = {**margin_row(found), **response_row(found)}
+    parts = [
+        ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"]),
+        ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"]),
+    ]
+    words = [
+        f"{name} {value:.1f} {unit}" + (f" at {hertz_words(hz)}" if hz else "")
+        for name, value, unit, hz in parts
+        if value is not None
+    ]
+    if row["minus3db_hz"] is not None:
+        words.append(f"bandwidth {hertz_words(row['minus3db_hz'])}")
+    verdict = found.margins.verdict.capitalize()
+    return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
 
 def _intro(name: str, found: LoopFigures) -> str:
@@ -68,11 +89,12 @@ def _short(value: float | None, places: int | None) -> float | None:
     return round(value, places) if places is not None else float(f"{value:.3g}")
 
 
-def open_bode(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
+def open_bode(title: str, found: LoopFigures, grid: np.ndarray, *, name: str = "") -> dict[str, Any]:
     """Make the open-loop Bode figure with every margin on it."""
     margins = found.margins
     data = {
         **bode_data([("open loop", curve(found.loop.open_loop, grid))]),
+        "loop": name,
         "nyquist_hz": nyquist_hz(found),
         "gain_margins": [
             {"frequency_hz": hertz(m.frequency_rad_s), "db": m.db}
@@ -93,14 +115,14 @@ def open_bode(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any
 
 
 def closed_bode(
-    title: str, found: LoopFigures, grid: np.ndarray, locked: LoopFigures | None
+    title: str, found: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> dict[str, Any]:
     """Make the closed-loop Bode figure with the bandwidths."""
     series = [("rotor free" if locked else "closed loop", curve(found.response, grid))]
     if locked is not None and locked.stable:
         series.append(("rotor locked", curve(locked.response, grid)))
     band = _bandwidths(found)
-    data = {**bode_data(series), "nyquist_hz": nyquist_hz(found), "bandwidth": band}
+    data = {**bode_data(series), "loop": name, "nyquist_hz": nyquist_hz(found), "bandwidth": band}
     corner, lag = _hz(band["minus3db_hz"]), _hz(band["minus90deg_hz"])
     words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
     return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
@@ -121,7 +143,7 @@ def _bandwidths(found: LoopFigures) -> dict[str, float | None]:
 def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
     """Make the Nyquist figure."""
     margins, system = found.margins, found.loop.open_loop
-    points = nyquist_curve(system, grid, REACH)
+    omega, points = nyquist_curve(system, grid, REACH)
     closest = margins.modulus_frequency_rad_s
     at = None
     if closest is not None and math.isfinite(closest) and closest > 0:
@@ -130,6 +152,7 @@ def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     on_circle = response_at(system, np.array(phases)) if phases else np.empty(0, dtype=complex)
     data = {
+        "frequency_hz": rounded(omega / (2.0 * np.pi)),
         "real": rounded(points.real, 4),
         "imag": rounded(points.imag, 4),
         "modulus": margins.modulus_margin,
@@ -166,6 +189,7 @@ def sensitivity(
         "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
         "t_peak": _peak(peaks.complementary_db, peaks.complementary_rad_s),
         "limit_db": min(limits, default=None),
+        "loop": name,
         "nyquist_hz": nyquist_hz(found),
     }
     caption = (
@@ -175,17 +199,18 @@ def sensitivity(
     return doc.figure("sensitivity", data, caption=caption, alt=caption, layout="half")
 
 
-def step(title: str, found: LoopFigures, locked: LoopFigures | None) -> dict[str, Any]:
+def step(title: str, found: LoopFigures, locked: LoopFigures | None, *, name: str = "") -> dict[str, Any]:
     """Make the step figure."""
     figures = found.step
     assert figures is not None
     end = None
     if locked is not None and locked.step is not None:
-        end = 6.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
+        end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
     series = [_step_series("rotor free" if locked else "closed loop", found, end)]
     if locked is not None and locked.step is not None:
         series.append(_step_series("rotor locked", locked, end))
     data = {
+        "loop": name,
         "time_s": series[0]["time_s"],
         "series": series,
         "final": finite(figures.final_value),
@@ -228,6 +253,10 @@ def _step_series(label: str, found: LoopFigures, end_s: float | None = None) -> 
     settled = figures.settling_time_s
     if end_s is None and settled is not None and math.isfinite(settled) and settled > 0:
         end_s = 2.2 * settled
+    period = found.loop.period_s
+    if end_s is not None and period is not None and end_s / period < STEP_POINTS:
+        response = sampled_step(found.response, math.ceil(end_s / period) + 1)
+        time = period * np.arange(len(response))
     if end_s is not None:
         keep = max(int(np.searchsorted(time, end_s, side="right")), 8)
         time, response = time[:keep], response[:keep]

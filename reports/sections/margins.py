@@ -8,6 +8,7 @@ from typing import Any
 
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
+from reports.numbers import to_minus
 from reports.sections.names import LOOPS, hertz
 
 STATUS = {True: "pass", False: "fail", None: "warn"}
@@ -64,7 +65,28 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
         "Sampled form: exact hold and computing delay, no approximation; sliding friction."
     )
     status = worst_status([found.margins.stable for found in figures.values()])
-    return doc.section("margins", "Margins and bandwidths", blocks, intro=intro, status=status)
+    return doc.section(
+        "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status
+    )
+
+
+def result(figures: Mapping[str, LoopFigures]) -> str:
+    """Say whether all loops are stable, and which has the smallest margins."""
+    unstable = [LOOPS[name].lower() for name, found in figures.items() if found.margins.stable is not True]
+    if unstable:
+        return f"Not known to be stable: {', '.join(unstable)}."
+    rows = {LOOPS[name].lower(): margin_row(found) for name, found in figures.items()}
+    words = []
+    for key, what, unit in (
+        ("gain_margin_db", "gain margin", "dB"),
+        ("phase_margin_deg", "phase margin", "deg"),
+    ):
+        known = {name: abs(row[key]) for name, row in rows.items() if row[key] is not None}
+        if known:
+            name = min(known, key=lambda n: known[n])
+            words.append(f"the smallest {what} is {rows[name][key]:.1f} {unit} ({name})")
+    count = "The loop is" if len(rows) == 1 else f"All {len(rows)} loops are"
+    return to_minus(f"{count} stable; {' and '.join(words)}." if words else f"{count} stable.")
 
 
 def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
@@ -157,6 +179,8 @@ def _crossings(name: str, found: LoopFigures) -> list[dict[str, Any]]:
 
 def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> dict[str, Any]:
     row = {
+        "_loop": next((key for key, words in LOOPS.items() if words == name), ""),
+        "_hz": finite(hertz(omega_rad_s)) or None,
         "loop": name,
         "kind": kind,
         "value": finite(value),

@@ -35,8 +35,30 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> dict[str
         "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
     )
     blocks = [doc.table("PM: phase margin, GM: gain margin, −3 dB: closed loop", columns, rows, note)]
-    intro = "Friction is no constant: what it does to small motions depends on speed and load."
-    return doc.section("operating-points", "Operating points", blocks, intro=intro)
+    intro = "The effect of friction on small motions depends on speed and load."
+    return doc.section("operating-points", "Operating points", blocks, result=_result(points), intro=intro)
+
+
+def _result(points: Sequence[OperatingPointFigures]) -> str:
+    """Say the smallest phase margin over all operating points."""
+    unstable = [
+        point.label for point in points if any(f.margins.stable is False for f in point.figures.values())
+    ]
+    if unstable:
+        return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
+    found = [
+        (row["phase_margin_deg"], name, point.label)
+        for point in points
+        for name, figures in point.figures.items()
+        if (row := margin_row(figures))["phase_margin_deg"] is not None
+    ]
+    if not found:
+        return f"Stable at all {len(points)} operating points."
+    deg, name, label = min(found)
+    return (
+        f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
+        f"({name} loop, {label})."
+    )
 
 
 def _row(point: OperatingPointFigures, scale: float) -> dict[str, Any]:

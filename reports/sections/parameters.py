@@ -7,6 +7,7 @@ from typing import Any
 
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
+from reports.findings import Finding
 
 GRADES = (
     "Grades: A maker's document or standard text; B file of a real device or a consistent second source; "
@@ -28,15 +29,10 @@ def section(design: Design, warnings: Sequence[str] = ()) -> dict[str, Any]:
     """Make the section."""
     parameters = list(design.parameters.values())
     assumed = sum("X" in item.grade for item in parameters)
-    intro = (
-        f"{len(parameters)} values, of which {assumed} are assumed (grade X). {GRADES}"
-        if parameters
-        else "The design carries no record of where its values come from."
-    )
     blocks: list[dict[str, Any]] = [_derived(design)]
     if warnings:
         rows = [{"warning": warning, "_status": "warn"} for warning in warnings]
-        blocks.append(doc.table("Suspicious, worth a look", [doc.column("warning", "Warning")], rows))
+        blocks.append(doc.table("To be checked", [doc.column("warning", "Warning")], rows))
     if parameters:
         blocks.append(doc.table("Values of the design file", COLUMNS, [_row(item) for item in parameters]))
     if design.facts:
@@ -45,11 +41,27 @@ def section(design: Design, warnings: Sequence[str] = ()) -> dict[str, Any]:
         rows = [
             {"label": f.label, "value": f.value, "grade": f.grade, "source": f.source} for f in design.facts
         ]
-        blocks.append(
-            doc.details("Known of the drive, but in no equation", [doc.table("Facts", columns, rows)])
-        )
+        blocks.append(doc.details("Facts that enter no equation", [doc.table("Facts", columns, rows)]))
     status = "warn" if warnings else "info"
-    return doc.section("parameters", "Parameters and their sources", blocks, intro=intro, status=status)
+    findings = [Finding(severity="warn", text=words, where="parameters") for words in warnings]
+    result = (
+        f"{len(parameters)} values; {assumed} of them are assumed (grade X)."
+        if parameters
+        else "The design carries no record of where its values come from."
+    )
+    if assumed:
+        findings.append(
+            Finding(
+                severity="info",
+                text=f"{assumed} of {len(parameters)} values are assumed.",
+                where="parameters",
+            )
+        )
+    return doc.section(
+        "parameters", "Parameters and their sources", blocks, result=result,
+        intro=GRADES if parameters else "",
+        status=status, findings=findings,
+    )  # fmt: skip
 
 
 def _derived(design: Design) -> dict[str, Any]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports import document as doc
+from reports.findings import Finding
 
 
-def section(design: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
+def section(
+    design: Mapping[str, Any], provenance: Mapping[str, Any], findings: Sequence[Finding] = ()
+) -> dict[str, Any]:
     """Make the section from the document's own head."""
     rows = [
         {"what": "design", "value": f"{design['name']}, revision {design['revision'] or 'none'}"},
@@ -21,5 +24,11 @@ def section(design: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[st
         *({"what": name, "value": version} for name, version in provenance["libraries"].items()),
     ]
     columns = [doc.column("what", "What"), doc.column("value", "Value")]
-    blocks = [doc.table("To build this report again", columns, rows)]
-    return doc.section("provenance", "Provenance", blocks)
+    blocks = [
+        doc.details("To build this report again", [doc.table("Design, program and libraries", columns, rows)])
+    ]
+    result = (
+        f"Computed by actuator-lti {provenance['version']} from the design with hash "
+        f"{provenance['design_hash'][:12]}."
+    )
+    return doc.section("provenance", "Provenance", blocks, result=result, findings=findings)

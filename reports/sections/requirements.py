@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyses.requirements import RequirementVerdict, all_pass
@@ -15,14 +15,27 @@ def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> d
     """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
         blocks = [doc.text("The design file states no requirement.")]
-        return doc.section("verdicts", "Verdicts", blocks, status="info")
+        return doc.section("verdicts", "Requirements", [], result=blocks[0]["text"], status="info")
     intro = (
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
     items = [item(verdict, load_unit) for verdict in verdicts]
     status = "pass" if all_pass(tuple(verdicts)) else "fail"
-    return doc.section("verdicts", "Verdicts", [doc.verdicts(items)], intro=intro, status=status)
+    return doc.section(
+        "verdicts", "Requirements", [doc.verdicts(items)], result=result(items), intro=intro, status=status
+    )
+
+
+def result(items: Sequence[Mapping[str, Any]]) -> str:
+    """Say how many requirements are met, and which are not."""
+    failed = [item["label"] for item in items if item["passed"] is False]
+    unjudged = sum(item["passed"] is None for item in items)
+    rest = f" {unjudged} cannot be judged." if unjudged else ""
+    if failed:
+        return f"{len(failed)} of {len(items)} requirements are not met: {'; '.join(failed)}.{rest}"
+    met = len(items) - unjudged
+    return f"{'All' if not unjudged else f'{met} of'} {len(items)} requirements are met.{rest}"
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> dict[str, Any]:
@@ -35,7 +48,7 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> dict[str, Any]:
     source = requirement.source + (
         f" ({requirement.note})" if requirement.note and requirement.note != requirement.source else ""
     )
-    return doc.verdict(
+    made = doc.verdict(
         verdict.id,
         label(verdict, load_unit),
         value=verdict.value,
@@ -47,6 +60,7 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> dict[str, Any]:
         source=source,
         reason=reason,
     )
+    return {**made, "loop": verdict.loop, "quantity": requirement.quantity}
 
 
 def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:

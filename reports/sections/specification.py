@@ -9,6 +9,7 @@ import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
+from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 from reports.sections.limits import NAMES
 
@@ -20,8 +21,43 @@ if TYPE_CHECKING:
 def section(result: Specification) -> dict[str, Any]:
     """Make the section from `analyses.specification.specification`."""
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
-    intro = "Closed form beside the simulator; output side unless a column says motor."
-    return doc.section("specification", "Actuator figures", blocks, intro=intro)
+    intro = "Closed form and simulation side by side; output side unless a column says motor."
+    findings = _findings(result)
+    return doc.section(
+        "specification", "Actuator figures", blocks, result=_result(result), intro=intro, findings=findings
+    )
+
+
+def _result(result: Specification) -> str:
+    """Say what the drive can do at the largest load."""
+    scale, unit = output_unit(result.design)
+    one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
+    if one is None:
+        return ""
+    rate, push = one.figures.output_rate_rad_s, one.figures.acceleration_rad_s2
+    parts = [f"{scale * rate:.3g} {unit}/s"] if rate is not None and math.isfinite(rate) else []
+    parts += [f"{scale * push:.3g} {unit}/s²"] if push is not None and math.isfinite(push) else []
+    return (
+        f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the output reaches "
+        f"{' and '.join(parts)}."
+    )
+
+
+def _findings(result: Specification) -> list[Finding]:
+    """Name the loads at which the drive cannot run without pause."""
+    unit = load_unit(result.design)
+    return [
+        Finding(
+            severity="warn",
+            text=(
+                f"At {one.figures.load_Nm:g} {unit} load the continuous current allows a duty of "
+                f"{100.0 * one.duty:.0f} %."
+            ),
+            where="specification",
+        )
+        for one in result.capabilities
+        if one.duty is not None and one.duty < 0.995
+    ]
 
 
 def _finite(value: float | None, scale: float = 1.0) -> float | None:
@@ -32,12 +68,12 @@ def _capability_table(result: Specification) -> dict[str, Any]:
     """List rate, acceleration, current and duty by load."""
     scale, unit = output_unit(result.design)
     columns = [
-        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+        doc.column("load", "Load", load_unit(result.design), format="short:4"),
         doc.column("rate", "Rate", f"{unit}/s", format="sig:4"),
-        doc.column("rate_seen", "simulated", f"{unit}/s", format="sig:4"),
-        doc.column("by", "set by"),
+        doc.column("rate_seen", "Simulated", f"{unit}/s", format="sig:4"),
+        doc.column("by", "Set by"),
         doc.column("push", "Acceleration", f"{unit}/s²", format="sig:4"),
-        doc.column("push_seen", "simulated", f"{unit}/s²", format="sig:4"),
+        doc.column("push_seen", "Simulated", f"{unit}/s²", format="sig:4"),
     ]
     electric = result.design.motor.has_electrical_dynamics
     if electric:
@@ -150,7 +186,7 @@ def _manoeuvre_table(result: Specification) -> dict[str, Any]:
     electric = result.design.motor.has_electrical_dynamics
     columns = [
         doc.column("name", "Manoeuvre"),
-        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+        doc.column("load", "Load", load_unit(result.design), format="short:4"),
     ]
     if electric:
         columns += [
@@ -194,7 +230,7 @@ def _step_table(result: Specification) -> dict[str, Any]:
     """List step times from small to full deflection."""
     scale, unit = output_unit(result.design)
     columns = [
-        doc.column("load", "Load", load_unit(result.design), format="sig:2"),
+        doc.column("load", "Load", load_unit(result.design), format="short:4"),
         doc.column("step", "Step", unit, format="sig:3"),
         doc.column("fraction", "of full", "%", format="sig:2"),
         doc.column("rise", "Rise 10–90 %", "ms", format="sig:3"),

@@ -11,6 +11,7 @@ from analyses.validation.at_rest import RestSweep
 from analyses.validation.result import LoopValidation, PointValidation, Validation
 from reports import document as doc
 from reports.document import rounded
+from reports.numbers import significant
 
 GAIN_DB, PHASE_DEG = 0.01, 0.1  # what the measurement must meet up to a third of Nyquist
 NAMES = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
@@ -41,16 +42,26 @@ def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     blocks: list[dict[str, Any]] = [_overlay(name, loop) for name, loop in shown.items()]
     blocks.append(_agreement(shown, points))
     intro = (
-        "A sine is added at the break point while the drive runs at constant speed; fundamentals come from "
-        "correlation over whole periods once two windows agree. The same run gives open loop, closed loop "
-        "and plant. The drive's own limits are on; amplitudes keep clear of them."
+        "A sine is added at the break point while the drive runs at constant speed. Fundamentals are "
+        "correlated "
+        "over whole periods, once two windows agree. One run gives open loop, closed loop and plant. The "
+        "limits "
+        "of the drive are active; the amplitudes stay below them."
     )
     good = all(
         worst_below_third(x)[0] <= GAIN_DB and worst_below_third(x)[1] <= PHASE_DEG for x in shown.values()
     )
-    return doc.section(
-        "injection", "Frequency response by injection", blocks, intro=intro, status="pass" if good else "fail"
+    worst = [worst_below_third(loop) for loop in shown.values()]
+    gain, phase = (max((pair[k] for pair in worst), default=0.0) for k in (0, 1))
+    result = (
+        "Up to a third of the Nyquist frequency, model and simulation differ by at most "
+        f"{significant(gain, 2)} dB "
+        f"and {significant(phase, 2)} deg."
     )
+    return doc.section(
+        "injection", "Frequency response by injection", blocks, result=result, intro=intro,
+        status="pass" if good else "fail",
+    )  # fmt: skip
 
 
 def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
@@ -72,9 +83,9 @@ def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
     }
     gain, phase = worst_below_third(loop)
     caption = (
-        f"{NAMES[name]}: linear (line) and measured in the nonlinear simulation (circles), with the "
-        f"magnitude of their difference below. Up to a third of Nyquist ({third:.4g} Hz, dotted) they differ "
-        f"by at most {gain:.1e} dB and {phase:.1e} deg."
+        f"{NAMES[name]}: linear model (line), nonlinear simulation (circles), and the magnitude of their "
+        f"difference. Up to a third of the Nyquist frequency ({third:.4g} Hz, dotted) it is at most "
+        f"{significant(gain, 2)} dB and {significant(phase, 2)} deg."
     )
     return doc.figure("overlay_sweep", data, caption=caption, alt=caption)
 
@@ -99,14 +110,14 @@ def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     """List how well each response is met, and how clean the measurement was."""
     columns = [
         doc.column("name", "Response"),
-        doc.column("points", "Points", format="sig:3"),
-        doc.column("gain", "Gain off by", "dB", format="sig:2"),
-        doc.column("phase", "Phase off by", "deg", format="sig:2"),
+        doc.column("points", "Points", format="int"),
+        doc.column("gain", "Largest gain difference", "dB", format="sig:2"),
+        doc.column("phase", "Largest phase difference", "deg", format="sig:2"),
         doc.column("distortion", "Distortion", "%", format="sig:2"),
-        doc.column("unsteady", "Last two windows differ by", format="sig:2"),
-        doc.column("tones", "Multisine off by", "dB", format="sig:2"),
-        doc.column("coherence", "Coherence, 1 less", format="sig:2"),
-        doc.column("left_out", "Not reported"),
+        doc.column("unsteady", "Difference of the last two windows", format="sig:2"),
+        doc.column("tones", "Multisine: gain difference", "dB", format="sig:2"),
+        doc.column("coherence", "1 − coherence", format="sig:2"),
+        doc.column("left_out", "Left out"),
     ]
     rows = [_loop_row(name, loop) for name, loop in loops.items()]
     rows += [_point_row(name, point) for name, point in points.items() if point.sweep is not None]
@@ -115,7 +126,7 @@ def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
         "1e-5 is not reported as steady. Distortion at u and i_ref of a multirate drive holds the images of "
         "its periodic loop."
     )
-    return doc.table("Measured against assembled loops", columns, rows, note)
+    return doc.table("Agreement of measured and assembled loops", columns, rows, note)
 
 
 def _loop_row(name: str, loop: LoopValidation) -> dict[str, Any]:
@@ -172,10 +183,14 @@ def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
     phase = float(np.nanmax(np.abs(np.degrees(np.angle(off)))))
     low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale
     caption = (
-        f"Command to output without bias motion, amplitudes of {low:.3g} to {high:.3g} {unit} clear of every "
-        f"limit. The describing function at the speed amplitude that was seen is met within {gain:.2g} dB "
-        f"and {phase:.2g} deg; the sliding loop knows nothing of the reversals."
+        f"Command to output without bias motion, amplitudes of {low:.3g} to {high:.3g} {unit}, below every "
+        f"limit. The describing function at the measured speed amplitude agrees within {gain:.2g} dB and "
+        f"{phase:.2g} deg. The sliding loop does not include the reversals."
     )
     intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."
     block = doc.figure("rest_sweep", data, caption=caption, alt=caption)
-    return doc.section("from-rest", "From rest: what dry friction makes of it", [block], intro=intro)
+    result = (
+        f"The describing function of dry friction agrees with the simulation within {gain:.2g} dB and "
+        f"{phase:.2g} deg."
+    )
+    return doc.section("from-rest", "From rest: effect of dry friction", [block], result=result, intro=intro)

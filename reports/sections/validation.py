@@ -10,18 +10,19 @@ from typing import Any
 from analyses.validation.ledger import Entry
 from analyses.validation.result import Validation
 from reports import document as doc
+from reports.findings import Finding
 from reports.sections.names import LOOPS, POINTS, QUANTITIES
 
 MORE = {
     "gain_margin_up": "gain margin, upwards",
     "gain_margin_down": "gain margin, downwards",
-    "computing_delay_margin": "margin of computing delay",
+    "computing_delay_margin": "computing delay margin",
     "complementary_peak": "peak of T",
-    "resonance": "frequency of the resonance",
+    "resonance": "resonance frequency",
     "stability": "stability",
 }
 STATUS = {True: "pass", False: "fail", None: "info"}
-WORD = {True: "holds", False: "FAILS", None: "not judged"}
+WORD = {True: "agrees", False: "DISAGREES", None: "not judged"}
 
 
 def section(validation: Validation, *, timing: bool = True) -> list[dict[str, Any]]:
@@ -58,7 +59,7 @@ def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
     blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation), what="checks")]
     failed = [row for row in validation.ledger if row.passed is False]
     if failed:
-        blocks.append(ledger_table(failed, "Predictions that fail"))
+        blocks.append(ledger_table(failed, "Predictions that the simulation contradicts"))
     for name, rows in by_loop(validation.ledger).items():
         blocks.append(
             doc.details(f"{loop_name(name)}: every prediction", [ledger_table(rows, loop_name(name))])
@@ -68,13 +69,36 @@ def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
     if timing:
         blocks.append(doc.details("Where the time went", [_times(validation)]))
     intro = (
-        "Every linear prediction was put to the nonlinear simulator. Small signals ride on a constant speed, "
-        "where dry friction is a constant torque; what cannot hold from rest is shown with the reason."
+        "Every linear prediction is compared with the nonlinear simulation. Small signals are measured at "
+        "constant speed, where dry friction is a constant torque. What cannot hold from rest is shown with "
+        "the "
+        "reason."
     )
     status = "pass" if validation.passed else "fail"
     return doc.section(
-        "validation", "Linear predictions against simulation", blocks, intro=intro, status=status
-    )
+        "validation", "Linear predictions against simulation", blocks, result=result(validation), intro=intro,
+        status=status, findings=findings(validation),
+    )  # fmt: skip
+
+
+def result(validation: Validation) -> str:
+    """Say how many predictions agree with the simulation."""
+    judged = [row for row in validation.ledger if row.passed is not None]
+    agree, shown = sum(row.passed is True for row in judged), len(validation.ledger) - len(judged)
+    rest = f" {shown} more are shown, but not judged." if shown else ""
+    return f"{agree} of {len(judged)} linear predictions agree with the simulation.{rest}"
+
+
+def findings(validation: Validation) -> list[Finding]:
+    """Name every prediction that the simulation contradicts."""
+    return [
+        Finding(
+            severity="fail",
+            text=f"{loop_name(row.loop)}: {quantity_name(row)} is not confirmed by simulation.",
+            where="validation",
+        )
+        for row in validation.failed
+    ]
 
 
 def verdict_items(validation: Validation) -> list[dict[str, Any]]:
@@ -87,13 +111,13 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
         items.append(
             _verdict(
                 f"predictions-{name}",
-                f"{loop_name(name)}: predictions that hold",
+                f"{loop_name(name)}: linear predictions that agree with simulation",
                 held,
                 len(judged),
                 ">=",
                 "",
                 held == len(judged) if judged else None,
-                "; ".join(worst) or f"{len(rows) - len(judged)} more shown, not judged",
+                "; ".join(worst) or _agreement(held, len(rows) - len(judged)),
             )
         )
     items += _response_items(validation)
@@ -101,7 +125,9 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
     if conditional is not None:
         full = _size(conditional.full_deflection_rad, validation.design.axis)
         reached = conditional.threshold_rad if conditional.found else conditional.full_deflection_rad
-        reason = "larger steps diverge although every margin says stable" if conditional.hidden else ""
+        reason = (
+            "larger steps diverge, although every linear margin says stable" if conditional.hidden else ""
+        )
         items.append(
             _verdict(
                 "large-commands",
@@ -117,6 +143,11 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
     return items
 
 
+def _agreement(held: int, shown: int) -> str:
+    """Say that all agree, and how many are shown beside them."""
+    return f"{held} of {held} agree" + (f"; {shown} shown, not judged" if shown else "")
+
+
 def _response_items(validation: Validation) -> list[dict[str, Any]]:
     """Agreement of measured and assembled responses up to a third of Nyquist."""
     from reports.sections.sweep import GAIN_DB, PHASE_DEG, worst_below_third
@@ -127,7 +158,7 @@ def _response_items(validation: Validation) -> list[dict[str, Any]]:
             continue
         gain, phase = worst_below_third(loop)
         for kind, value, limit, unit in (("gain", gain, GAIN_DB, "dB"), ("phase", phase, PHASE_DEG, "deg")):
-            label = f"{loop_name(name)}: {kind} by injection, up to a third of Nyquist, off by"
+            label = f"{loop_name(name)}: largest {kind} difference between model and simulation"
             passed = value <= limit
             items.append(_verdict(f"injection-{name}-{kind}", label, value, limit, "<=", unit, passed, ""))
     return items
@@ -165,7 +196,7 @@ def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
     """Lay entries out as a table."""
     columns = [
         doc.column("quantity", "Prediction"),
-        doc.column("condition", "Measured"),
+        doc.column("condition", "Condition"),
         doc.column("predicted", "Linear", format="sig:6"),
         doc.column("measured", "Simulated", format="sig:6"),
         doc.column("unit", "Unit"),

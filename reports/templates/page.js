@@ -1,6 +1,5 @@
 "use strict";
 (() => {
-  const folds = () => document.querySelectorAll("details");
   const open = (target) => {
     for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
   };
@@ -10,14 +9,13 @@
   addEventListener("hashchange", follow);
   follow();
   if (matchMedia("(max-width: 68rem)").matches) document.querySelectorAll(".toc details").forEach((d) => (d.open = false));
-  let closed = [];
-  addEventListener("beforeprint", () => {
-    const shut = [...folds()].filter((d) => !d.open);
-    shut.forEach((d) => (d.open = true));
-    closed = closed.concat(shut);
+  // paper gets what is open on the screen; a fold left shut is named, and its figures are in report.json
+  const hint = () => document.querySelectorAll(".scroll").forEach((box) => {
+    const wide = box.scrollWidth > box.clientWidth + 2;
+    box.classList.toggle("wide", wide && box.scrollLeft + box.clientWidth < box.scrollWidth - 4);
   });
-  addEventListener("afterprint", () => {
-    closed.forEach((d) => (d.open = false));
-    closed = [];
-  });
+  document.querySelectorAll(".scroll").forEach((box) => box.addEventListener("scroll", hint, { passive: true }));
+  addEventListener("resize", hint);
+  document.addEventListener("toggle", hint, true);
+  hint();
 })();

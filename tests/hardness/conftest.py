@@ -3,4 +3,5 @@
 import sys
 from pathlib import Path
 
+sys.path.append(str(Path(__file__).parent))
 sys.path.append(str(Path(__file__).parents[1] / "nightly"))

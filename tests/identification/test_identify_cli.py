@@ -82,7 +82,7 @@ def test_emps_on_the_command_line(
     assert found["rows_in"] == 24841
     assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.28, abs=0.05)
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
-    signals = json.loads(out)[0]["signals"]
+    signals = json.loads(out)["records"][0]["signals"]
     assert status == 0
     assert 100.0 * signals["force"]["relative_error"] < 5.848
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
@@ -93,7 +93,7 @@ def test_the_results_become_sections_of_the_report(
 ) -> None:
     _run(capsys, "identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
     result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
-    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out, "--processes", "1")
+    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out)
     ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
     assert "identification" in ids
     assert ids.count("provenance") == 1
@@ -137,7 +137,7 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
     ("arguments", "reason"),
     [
         (("identify",), "give one of"),
-        (("identify", "nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("identify", "nowhere.toml"), "nowhere.toml: no such file"),
         (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read"),
         (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
@@ -166,7 +166,7 @@ def test_bad_input_is_one_line_and_status_2(
         ("torque_accuracy = 0.005", "torque_acuracy = 0.005", 'did you mean "torque_accuracy"'),
         ('speed = "105 rad/s"', 'speed = "105 N"', "run[1].speed"),
         ('id = "02"', 'id = "01"', "given twice"),
-        ("[campaign]", "[campaign", "is no TOML"),
+        ("[campaign]", "[campaign", "not TOML"),
     ],
 )
 def test_a_bad_campaign_file_is_one_line_with_its_key(

@@ -124,7 +124,8 @@ def test_a_compressed_and_a_plain_file_read_alike() -> None:
         assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
         assert content.arrays["k"].item() == 3.5
-        assert content.passed_over == ["text"]
+        assert content.passed_over == []
+        assert content.texts == {"text": ("abc",)}
 
 
 def _check_one_line(error: InputError) -> None:

@@ -12,13 +12,14 @@ from actuator_lti.design import load_design, parameter_value, read_design_text, 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.campaign_design import predicted_covariance, suggest_runs
+from analyses.identification.bench import BenchSettings, identify_bench
 from analyses.identification.dynamic import Recipe, identify_dynamics
-from analyses.identification.from_record import identify_record, refine_record
+from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
 from analyses.identification.steady import SteadyWindow
 from analyses.identification.surface import SurfaceFit, fit_surface
-from analyses.identification.to_design import Estimate, design_with_estimate, dynamic_estimate
+from analyses.identification.to_design import Estimate, design_with_estimate, joint_estimate
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
 
@@ -149,19 +150,22 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
     assert found.error_after < 0.05 * found.error_before
 
 
-def test_refinement_on_emps_lowers_the_force_error(emps_file: Path) -> None:
+def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
-    model, _ = identify_record(design, record)
-    found = refine_record(design, record, model)
-    assert found.error_after < found.error_before < 0.05848
-    assert found.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
+    found = identify_bench(design, [record], settings=BenchSettings(refine=True))
+    assert found.refined is not None
+    assert found.refined.error_after < found.refined.error_before < 0.05848
+    for path, value in found.refined.values.items():
+        assert parameter_value(read_design_text(found.text), path) == pytest.approx(value, rel=1e-6)
+    assert found.refined.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
+    assert found.resimulated[0].relative_error == pytest.approx(found.refined.error_after, rel=1e-4)
 
 
 def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     for form in ("symmetric", "per-direction"):
-        model, _ = identify_record(design, record, form=form)  # type: ignore[arg-type]
-        identified = design_with_estimate(design, dynamic_estimate(model, "EMPS"))
+        model = fit_records(design, [record], form=form)  # type: ignore[arg-type]
+        identified = design_with_estimate(design, joint_estimate(design, model, "EMPS"))
         back = read_design_text(write_design(identified))
         assert back.motor.rotor_inertia_kgm2 == pytest.approx(model["inertia"], rel=1e-6)
         if form == "per-direction":

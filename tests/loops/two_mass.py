@@ -1,4 +1,4 @@
-"""Drives D and E of cases2.md: two masses, built directly."""
+"""Drives D and E of the reference cases: two masses, built directly."""
 
 from __future__ import annotations
 

@@ -18,8 +18,9 @@ _KERNELS = {  # OpenBLAS core type: what the processor must have
 
 
 def kernels() -> list[str]:
-    """Core types of OpenBLAS that run here, oldest first."""
-    return [name for name, needs in _KERNELS.items() if all(__cpu_features__.get(each) for each in needs)]
+    """Core types of OpenBLAS that run here: the oldest and the two newest."""
+    run = [name for name, needs in _KERNELS.items() if all(__cpu_features__.get(each) for each in needs)]
+    return list(dict.fromkeys([*run[:1], *run[-2:]]))
 
 
 def kinds() -> dict[str, dict[str, str]]:
@@ -35,5 +36,4 @@ def kinds() -> dict[str, dict[str, str]]:
 
 
 if __name__ == "__main__":
-    found = kernels()
-    sys.stdout.write("\n".join(dict.fromkeys([*found[:1], *found[-2:]])) + "\n")
+    sys.stdout.write("\n".join(kernels()) + "\n")

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
+import control
 import numpy as np
 from mpmath import mp, mpc, mpf
 
+from actuator_lti.margins import StabilityMargins
+
 DIGITS = 50
-EXACT = 260  # digits in which products of a dozen doubles are exact
+MANY_DIGITS = 90
+ULP = 8  # by how much the entries may be wrong
+NEIGHBOURS = 6
+EXACT = 900  # digits in which products of two dozen doubles are exact
+ROUNDED = mpf(10) ** -700  # what is left of an exact zero where they are not
 REAL = mpf(10) ** -22
 
 
@@ -23,6 +31,7 @@ class Truth:
     gain_margins: list[float]
     unstable: int
     nearest_to_border: float
+    end_margins: list[float]  # at zero frequency and at the end of the axis
 
 
 def polyval(p: list[mpf], x: mpc) -> mpc:
@@ -65,13 +74,14 @@ def divided(p: list[mpf], root: mpf) -> list[mpf]:
 def roots(p: list[mpf]) -> list[mpc]:
     """All roots but -1: Aberth in double precision, then at high precision until 25 digits stand."""
     size = max(abs(c) for c in p)
-    while p and abs(p[0]) <= size * mpf(10) ** -40:
+    while p and abs(p[0]) <= size * ROUNDED:
         p = p[1:]
     at_zero = 0
     while len(p) > 1 and p[-1] == 0:
         p, at_zero = p[:-1], at_zero + 1
-    while len(p) > 1 and abs(polyval(p, -1)) <= size * mpf(10) ** -40:  # delays z^-q: multiple, not wanted
-        p = divided(p, mpf(-1))
+    with mp.workdps(EXACT):
+        while len(p) > 1 and abs(polyval(p, -1)) <= size * ROUNDED:  # delays z^-q: multiple, not wanted
+            p = divided(p, mpf(-1))
     n = len(p) - 1
     if n < 1:
         return [mpc(0)] * at_zero
@@ -129,14 +139,47 @@ def _at(num: list[mpf], den: list[mpf], point: mpc) -> mpc:
     return polyval(num, point) / polyval(den, point)
 
 
-def truth(num: list[mpf], den: list[mpf], sampled: bool) -> Truth:
+def exact_polynomials(loop: control.LTI) -> tuple[list[mpf], list[mpf]]:
+    """Numerator and denominator of the very doubles (highest power first), by Faddeev and LeVerrier."""
+    with mp.workdps(EXACT):
+        if hasattr(loop, "num"):
+            num, den = (np.trim_zeros(np.asarray(p[0][0]), "f") for p in (loop.num, loop.den))
+            return [mpf(float(c)) for c in num], [mpf(float(c)) for c in den]
+        A, unit = _integers(loop.A)
+        b, unit_b = _integers(loop.B[:, 0])
+        c, unit_c = _integers(loop.C[0])
+        n = len(b)
+        M, den_c, num_c = np.eye(n, dtype=int).astype(object), [1], []
+        for k in range(1, n + 1):
+            num_c.append(c @ M @ b)
+            AM = A @ M
+            last = -sum(AM[i, i] for i in range(n))
+            assert last % k == 0
+            den_c.append(last // k)
+            M = AM + (last // k) * np.eye(n, dtype=int).astype(object)
+        den = [mpf(int(x)) / mpf(unit) ** k for k, x in enumerate(den_c)]
+        num = [mpf(0)] + [mpf(int(x)) / (mpf(unit) ** k * unit_b * unit_c) for k, x in enumerate(num_c)]
+        num = [x + mpf(float(loop.D[0, 0])) * y for x, y in zip(num, den, strict=True)]
+        while len(num) > 1 and num[0] == 0:
+            num = num[1:]
+        return num, den
+
+
+def _integers(x: np.ndarray) -> tuple[np.ndarray, int]:
+    ratios = [float(v).as_integer_ratio() for v in np.ravel(x)]
+    unit = max(d for _, d in ratios)
+    return np.array([a * (unit // d) for a, d in ratios], dtype=object).reshape(np.shape(x)), unit
+
+
+def truth(num: list[mpf], den: list[mpf], sampled: bool, digits: int = DIGITS) -> Truth:
     """Everything of num/den (highest power first) under negative unit feedback."""
     with mp.workdps(EXACT):
         if sampled:
             degree = len(den) - 1
             num, den = bilinear(num, degree), bilinear(den, degree)
         gain, phase = _equations(num, den)
-    with mp.workdps(DIGITS):
+        ends = _end_margins(num, den)
+    with mp.workdps(digits):
         gains = [mp.sqrt(v) for v in _positive_roots(gain)]
         phases = [mp.sqrt(v) for v in _positive_roots(phase)]
 
@@ -154,8 +197,16 @@ def truth(num: list[mpf], den: list[mpf], sampled: bool) -> Truth:
         nearest = min((abs(p.real) / abs(p) for p in closed if p != 0), default=mpf(0))
         return Truth(
             [frequency(x) for x in gains], degrees, [frequency(x) for x, _ in real],
-            [float(-1 / L) for _, L in real], sum(d > 0 for d in size), float(nearest),
+            [float(-1 / L) for _, L in real], sum(d > 0 for d in size), float(nearest), ends,
         )  # fmt: skip
+
+
+def _end_margins(num: list[mpf], den: list[mpf]) -> list[float]:
+    """-1/L where L is negative: at s = 0, and at infinity if there are poles at all."""
+    pairs = [(num[-1], den[-1])]
+    if len(den) > 1:
+        pairs.append((num[0] if len(num) == len(den) else mpf(0), den[0]))
+    return [float(-d / n) for n, d in pairs if n * d < 0]
 
 
 def _split(p: list[mpf]) -> tuple[list[mpf], list[mpf]]:
@@ -184,3 +235,56 @@ def bilinear(p: list[mpf], degree: int) -> list[mpf]:
     for k, c in enumerate(reversed(p)):
         out = subtract(out, [-c * x for x in multiply(up[k], down[degree - k])])
     return out
+
+
+def difference(m: StabilityMargins, expected: Truth, period: float, rel: float) -> str | None:
+    """What is wrong, or ``None``."""
+    if m.stable is None:
+        return f"withheld: {m.agreement}"
+    if m.stable is (expected.unstable > 0):
+        return f"verdict {m.verdict}, but {expected.unstable} unstable"
+    gains = [(g.frequency_rad_s * period, g.ratio) for g in m.gain_margins]
+    end = math.pi * (1 - 1e-12) if m.period_s is not None else math.inf
+    ends = [k for x, k in gains if not 0 < x < end]
+    gains = [g for g in gains if 0 < g[0] < end]
+    found = {
+        "gain crossovers": ([p.frequency_rad_s * period for p in m.phase_margins], expected.gain_crossovers),
+        "phase crossovers": ([w for w, _ in gains], expected.phase_crossovers),
+        "gain margins": ([k for _, k in gains], expected.gain_margins),
+        "gain margins at the ends": (ends, expected.end_margins),
+    }
+    for name, (ours, theirs) in found.items():
+        if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=rel, atol=0):
+            return f"{name} {ours}, not {theirs}"
+    degrees = [p.deg for p in m.phase_margins]
+    if not np.allclose(degrees, expected.phase_margins_deg, rtol=0, atol=1e3 * rel):
+        return f"phase margins {degrees}, not {expected.phase_margins_deg}"
+    return None
+
+
+def moved(loop: control.LTI, rng: np.random.Generator) -> control.LTI:
+    """Each entry 8 ulp up or down."""
+
+    def near(x: np.ndarray) -> np.ndarray:
+        return x + ULP * np.spacing(np.abs(x)) * rng.choice([-1.0, 1.0], np.shape(x)) * (x != 0.0)
+
+    if isinstance(loop, control.TransferFunction):
+        return control.tf(near(loop.num[0][0]), near(loop.den[0][0]), loop.dt)
+    parts = [near(np.asarray(part)) for part in (loop.A, loop.B, loop.C, loop.D)]
+    return control.StateSpace(*parts, loop.dt, remove_useless_states=False)
+
+
+def truth_of(loop: control.LTI) -> Truth:
+    return truth(*exact_polynomials(loop), bool(loop.dt), MANY_DIGITS)
+
+
+def same_facts(a: Truth, b: Truth) -> bool:
+    lists = ((a.gain_crossovers, b.gain_crossovers), (a.phase_crossovers, b.phase_crossovers),
+             (a.gain_margins, b.gain_margins), (a.end_margins, b.end_margins))  # fmt: skip
+    return a.unstable == b.unstable and all(
+        len(x) == len(y) and np.allclose(x, y, rtol=0.05, atol=0.0) for x, y in lists
+    )
+
+
+def determined(loop: control.LTI, answer: Truth, rng: np.random.Generator) -> bool:
+    return all(same_facts(answer, truth_of(moved(loop, rng))) for _ in range(NEIGHBOURS))

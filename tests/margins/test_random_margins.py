@@ -1,7 +1,7 @@
 """Thousands of random loops against polynomial roots at high precision: every crossover found, none invented.
 
 Lightly damped, non-minimum-phase, unstable, integrating and sampled loops of order 2 to 12, as transfer
-functions and as badly scaled, permuted state spaces.
+functions and as badly scaled, permuted state spaces. What 8 ulp of the entries change is left out.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import math
 import control
 import numpy as np
 import pytest
-from margin_truth import Truth, product, truth
+from margin_truth import determined, difference, product, truth
 from mpmath import mpf
 
-from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.margins import stability_margins
 
 PERIOD_S = 0.05
-LOOPS = 250  # per seed
+LOOPS = 150  # per seed
 SEEDS = range(8)
 Factor = list[float]
 
@@ -92,29 +92,6 @@ def scrambled(loop: control.StateSpace, rng: np.random.Generator) -> control.Sta
     return control.StateSpace(A, B, C, loop.D, loop.dt, remove_useless_states=False)
 
 
-def difference(m: StabilityMargins, expected: Truth, period: float, rel: float) -> str | None:
-    """What is wrong, or ``None``."""
-    if m.stable is None:
-        return f"withheld: {m.agreement}"
-    if m.stable is (expected.unstable > 0):
-        return f"verdict {m.verdict}, but {expected.unstable} unstable"
-    gains = [(g.frequency_rad_s * period, g.ratio) for g in m.gain_margins]
-    end = math.pi * (1 - 1e-12) if m.period_s is not None else math.inf
-    gains = [g for g in gains if 0 < g[0] < end]
-    found = {
-        "gain crossovers": ([p.frequency_rad_s * period for p in m.phase_margins], expected.gain_crossovers),
-        "phase crossovers": ([w for w, _ in gains], expected.phase_crossovers),
-        "gain margins": ([k for _, k in gains], expected.gain_margins),
-    }
-    for name, (ours, theirs) in found.items():
-        if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=rel, atol=0):
-            return f"{name} {ours}, not {theirs}"
-    degrees = [p.deg for p in m.phase_margins]
-    if not np.allclose(degrees, expected.phase_margins_deg, rtol=0, atol=1e3 * rel):
-        return f"phase margins {degrees}, not {expected.phase_margins_deg}"
-    return None
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_transfer_functions(seed: int) -> None:
     rng = np.random.default_rng([seed, 1])
@@ -127,8 +104,9 @@ def test_transfer_functions(seed: int) -> None:
         for f in den:
             below = np.polymul(below, f)
         expected = truth([mpf(float(c)) for c in above], [mpf(float(c)) for c in below], sampled)
-        m = stability_margins(control.tf(above, below, PERIOD_S if sampled else 0))
-        if problem := difference(m, expected, PERIOD_S if sampled else 1.0, 1e-6):
+        loop = control.tf(above, below, PERIOD_S if sampled else 0)
+        problem = difference(stability_margins(loop), expected, PERIOD_S if sampled else 1.0, 1e-6)
+        if problem and determined(loop, expected, np.random.default_rng(k)):
             wrong.append((k, problem))
     assert not wrong
 
@@ -143,7 +121,8 @@ def test_state_spaces(seed: int) -> None:
         if loop is None:
             continue
         expected = truth(product([[gain], *num]), product(den), sampled)
-        m = stability_margins(scrambled(loop, rng))
-        if problem := difference(m, expected, PERIOD_S if sampled else 1.0, 1e-6):
+        given = scrambled(loop, rng)
+        problem = difference(stability_margins(given), expected, PERIOD_S if sampled else 1.0, 1e-6)
+        if problem and determined(given, expected, np.random.default_rng(k)):
             wrong.append((k, problem))
     assert not wrong

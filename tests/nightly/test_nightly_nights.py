@@ -13,7 +13,7 @@ from site_checks import check_whole
 
 from actuator_lti.bounds import NIGHTLY_JOBS
 from actuator_lti.errors import InputError
-from reports.nightly.changes import compare_figures
+from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure
 from reports.nightly.job import Job
 from reports.nightly.night import approve, run_night
@@ -253,9 +253,9 @@ def test_several_runs_a_day_are_no_missing_nights() -> None:
 
 
 def test_figures_that_appear_or_vanish_are_changes_without_a_side() -> None:
-    one = {"x": Figure(name="x", value=1.0, better=1)}
-    two = {"y": Figure(name="y", value=1.0, better=1)}
-    assert [(c.figure, c.worse) for c in compare_figures(one, two, Tolerances())] == [
+    columns = Columns([Figure(name=name, value=None, better=1) for name in "xy"], Tolerances())
+    found = columns.compare(np.array([1.0, np.nan]), np.array([np.nan, 1.0]))
+    assert [(c.figure, c.worse) for c in found] == [
         ("x", None),
         ("y", None),
     ]

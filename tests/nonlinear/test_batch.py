@@ -11,10 +11,8 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError
-from nonlinear import Probe, Reducers, Run, commands, loads, simulate, simulate_many
+from nonlinear import Probe, Reducers, Rows, Run, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
-from nonlinear.batch import injection_place, put_ramp, put_sine, put_window, repeat_row, run_rows
-from nonlinear.parameters import design_row
 from nonlinear.reduced import whole_periods
 
 
@@ -105,16 +103,13 @@ def test_step_figures_against_the_history() -> None:
 
 def test_rows_are_the_same_as_runs() -> None:
     design = load_design("ilr33-amber")
-    row = design_row(design)
-    row[layout.TICKS] = 2000
-    rows = repeat_row(row, 3)
     gains = np.array([0.1, 0.2, 0.3])
-    put_ramp(rows, layout.BIAS, 0.1)
-    put_window(rows, 500, 5)
-    place = injection_place("i_ref")
-    rows[:, place - layout.PROBE_SIGNAL] = 1.0
-    put_sine(rows, place, gains, 100.0)
-    batch = run_rows(rows)
+    rows = Rows.of(design, 3)
+    rows["ticks"] = 2000
+    rows.ramp("bias", 0.1)
+    rows.window(500, 5)
+    rows.sine("i_ref", gains, 100.0)
+    batch = rows.run()
     runs = [
         Run(
             design=design,

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
-from nonlinear import commands, simulate
-from nonlinear._kernels import layout
-from nonlinear.parameters import design_row
-from nonlinear.setup import Tables, put_signal
+from nonlinear import Rows, commands, simulate
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
@@ -20,11 +17,11 @@ def test_same_motion(name: str) -> None:
     from benchmarks.c_simulator import CSimulator
 
     design, command, ticks = load_design(name), commands.sine(0.0873, 1.0), 20_000
-    row = design_row(design)
-    row[layout.TICKS], row[layout.LOAD] = ticks, 4.0
-    put_signal(row, layout.COMMAND, command, Tables())
+    rows = Rows.of(design)
+    rows["ticks"], rows["load"] = ticks, 4.0
+    rows.sine("command", 0.0873, 1.0)
     history, flags = np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
-    events = CSimulator().run(row, history, flags)
+    events = CSimulator().run(rows.values[0], history, flags)
     run = simulate(design, command, ticks * design.controller.period_s, 4.0)
     assert events == run.events > 4
     assert np.array_equal(flags, run.limit_flags)

@@ -12,10 +12,8 @@ from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import State, commands, loads, simulate
-from nonlinear._kernels.control import measured_speed
+from nonlinear import Drive, State, commands, loads, simulate
 from nonlinear.commands import Command
-from nonlinear.parameters import design_row
 from nonlinear.records import read_columns
 
 TS = 1e-3
@@ -166,16 +164,14 @@ def test_progress_and_interruption() -> None:
 def test_speed_from_counts_is_floored_differenced_and_filtered() -> None:
     design = load_design("ilr33-amber")
     encoder = replace(design.encoder, speed="difference", difference_samples=2, filter_time_s=3e-4)
-    row, period = design_row(replace(design, encoder=encoder)), 1e-4
-    count = 2.0 * np.pi / 1024
-    angles, place, filtered, expected = np.zeros(2), 0, 0.0, 0.0
+    drive, period = Drive(replace(design, encoder=encoder)), 1e-4
+    count, expected = 2.0 * np.pi / 1024, 0.0
     th = np.linspace(-3.5, 6.2, 9) * count
     floors = np.concatenate(([0.0, 0.0], np.floor(th / count) * count))
     for k, angle in enumerate(th):
-        filtered = measured_speed(row, angle, 0.0, angles, place, filtered, period)
-        place = 1 - place
+        drive.control(0.0, 0.0, 0.0, angle)
         expected += 0.25 * ((floors[k + 2] - floors[k]) / (2 * period) - expected)
-        assert filtered == pytest.approx(expected, abs=1e-9)
+        assert drive.value("measured_speed") == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_coarse_encoder_makes_the_drive_rough() -> None:

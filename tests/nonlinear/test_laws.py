@@ -10,11 +10,7 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
-from nonlinear import Probe, Trajectory, commands, simulate
-from nonlinear._kernels import layout
-from nonlinear.parameters import design_row
-from nonlinear.setup import Tables, put_signal
-from nonlinear.simulation import run_row
+from nonlinear import Probe, Rows, Trajectory, commands, simulate
 
 
 def smooth(width: float = 1.0, **friction: float) -> Design:
@@ -93,11 +89,10 @@ def test_a_narrow_tanh_tends_to_coulomb() -> None:
 
 def fixed_level(level: int) -> Trajectory:
     """A run with 2**level sub-steps in every tick."""
-    design = smooth(2.0)
-    row, tables = design_row(design), Tables()
-    row[layout.TICKS], row[layout.TANH_LEVEL] = 120, level
-    put_signal(row, layout.COMMAND, commands.sine(0.002, 100.0), tables)
-    return run_row(design, row, tables.joined())
+    rows = Rows.of(smooth(2.0))
+    rows["ticks"], rows["tanh_level"] = 120, level
+    rows.sine("command", 0.002, 100.0)
+    return rows.trajectory()
 
 
 def test_fourth_order() -> None:

@@ -11,6 +11,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design.model import (
     Controller,
+    CurrentLoop,
     Design,
     Limits,
     Motor,
@@ -18,8 +19,9 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
-from nonlinear import Reducers, Run, State, commands, simulate, simulate_many
-from nonlinear._kernels.control import pi as pi_law
+from actuator_lti.drive.signals import LIMITERS
+from nonlinear import Drive, Reducers, Run, State, commands, simulate, simulate_many
+from nonlinear._kernels import layout
 
 
 def ideal_drive(period_s: float, limits: Limits) -> Design:
@@ -142,7 +144,14 @@ def test_multirate_limit_holds_between_updates() -> None:
 )
 def test_conditional_integration(e: float, integral: float, output: float, kept: float, acts: bool) -> None:
     """Kp = 2, Kp T/Tn = 0.5, limit 5 (model.md section 2)."""
-    assert pi_law(e, integral, 2.0, 0.5, 5.0) == (output, kept, acts)
+    design = load_design("ilr33-amber")
+    current = CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * design.controller.period_s)
+    control = replace(design.controller, position=None, velocity=None, current=current)
+    design = replace(design, controller=control, limits=Limits(voltage_V=5.0))
+    drive = Drive(design, State(current_integral_V=integral))
+    assert drive.control(e, 0.0, 0.0, 0.0) == output
+    assert drive.value("current_integrator") == kept
+    assert (drive.value("flags_current") == 8.0) == acts
 
 
 def test_voltage_saturation_leaves_no_windup() -> None:
@@ -153,3 +162,11 @@ def test_voltage_saturation_leaves_no_windup() -> None:
     assert np.abs(run.voltage_V).max() <= 3.0
     assert run.output_angle_rad.max() < 0.1 * 1.01
     assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
+
+
+def test_flag_bits_are_those_of_the_limiters() -> None:
+    """The two writings name the same limiters by the same bits; the profile is the running one's alone."""
+    bits = dict(zip(layout.LIMITERS, layout.LIMITER_BITS, strict=True))
+    assert bits.pop("profile") == layout.FLAG_PROFILE
+    assert bits == {name: 1 << limiter.bit for name, limiter in LIMITERS.items()}
+    assert layout.FLAG_STICK not in bits.values()

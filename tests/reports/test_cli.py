@@ -98,7 +98,7 @@ def test_a_failed_requirement_is_status_1(tmp_path: Path, capsys: pytest.Capture
         (["margins", "--no-such-option"], "--no-such-option"),
         (["no-such-command"], "no-such-command"),
         (["report", "missing.toml"], "missing.toml"),
-        (["report", "--processes", "0"], "--processes"),
+        (["report", "--processes", "2"], "--processes"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(

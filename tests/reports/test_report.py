@@ -59,13 +59,13 @@ def rows_of(document: dict[str, Any], section: str, caption: str) -> list[dict[s
 
 def test_every_section_that_a_review_asks_for_is_there(built: Built) -> None:
     ids = [part["id"] for part in built.document["sections"]]
-    assert ids[:2] == ["verdicts", "validation"]
+    assert ids[:3] == ["answer", "verdicts", "validation"]
     wanted = {"margins", "loop-current", "loop-velocity", "loop-position", "forms", "break-points"}
     wanted |= {"operating-points", "delays", "limits", "parameters", "provenance"}
     assert wanted <= set(ids)
     drawn = [block["figure"] for block in doc.figures(built.document)]
-    for name in ("bode", "closed_bode", "nyquist", "sensitivity", "step"):
-        assert drawn.count(name) == 3
+    for name, count in {"bode": 4, "closed_bode": 3, "nyquist": 3, "sensitivity": 3, "step": 4}.items():
+        assert drawn.count(name) == count  # one Bode and one step on the first screen
 
 
 def test_the_json_is_the_document_and_holds_no_nan(built: Built) -> None:
@@ -108,7 +108,7 @@ def test_the_page_shows_what_the_json_holds(built: Built) -> None:
 
 
 def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
-    figures = [block for block in doc.figures(built.document) if block["figure"] == "bode"]
+    figures = [block for block in doc.figures(built.document) if block["figure"] == "bode"][1:]
     loops = assemble_loops(load_design("ilr33-amber")).present.values()
     for block, loop in zip(figures, loops, strict=True):
         margins = stability_margins(loop.open_loop)
@@ -145,7 +145,7 @@ def test_the_same_input_gives_the_same_bytes(
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     document = design_report(load_design("ilr33-amber"), validated())
-    page_path, data = write_report(document, tmp_path, processes=2)
+    page_path, data = write_report(document, tmp_path)
     assert data.read_bytes() == built.data.read_bytes()
     assert page_path.read_bytes() == built.page.read_bytes()
 
@@ -185,7 +185,7 @@ def test_tables_have_captions_and_scoped_headers(built: Built) -> None:
     assert all(
         attributes.get("role") == "img" and attributes.get("aria-label")
         for tag, attributes in tags
-        if tag == "svg"
+        if tag == "svg" and attributes.get("aria-hidden") != "true"
     )
 
 
@@ -217,7 +217,13 @@ def test_names_from_a_design_file_stay_text() -> None:
 @pytest.mark.parametrize(
     ("figure", "data"),
     [
-        ("step", {"time_s": [0.0, 1.0], "series": [{"label": HOSTILE, "response": [0.0, 1.0]}] * 2}),
+        (
+            "step",
+            {
+                "time_s": [0.0, 1.0],
+                "series": [{"label": label, "response": [0.0, 1.0]} for label in (HOSTILE, "b")],
+            },
+        ),
         (
             "curves",
             {
@@ -237,9 +243,7 @@ def test_names_in_a_figure_stay_text(figure: str, data: dict[str, Any], on_page:
 
     svg = draw_svg(figure, data, page=on_page)
     assert "<script" not in svg
-    words = [
-        "".join(node.itertext()) for node in ElementTree.fromstring(svg).iter() if node.tag.endswith("text")
-    ]
+    words = ["".join(node.itertext()) for node in ElementTree.fromstring(svg).iter()]
     assert HOSTILE in words
     assert ("var(--" in svg) is on_page
 
@@ -256,7 +260,7 @@ def test_every_shipped_design_has_its_report(name: str) -> None:
     document = design_report(load_design(name))
     content = page(document)
     assert document["verdict"]["passed"]
-    assert content.count("<svg") == len(doc.figures(document)) > 5
+    assert content.count('<div class="chart"') == len(doc.figures(document)) > 5
 
 
 def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:

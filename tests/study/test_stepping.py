@@ -35,7 +35,7 @@ def test_rows_are_those_of_the_designs(name):
             reducers=Reducers(step_target_rad=STEP.amplitude_rad, extremes=True),
         )  # fmt: skip
         truth = simulate_many([run], threads=1).rows[0]
-        assert rows[k] == pytest.approx(truth, rel=1e-12, abs=1e-300)
+        assert rows.values[k] == pytest.approx(truth, rel=1e-12, abs=1e-300)
 
 
 def test_every_column_has_a_unit_and_a_value():

@@ -41,10 +41,10 @@ def test_pages_of_studies_stand_alone_and_show_every_figure(browser, name, tmp_p
         page.goto(file.as_uri())
         assert trouble == [file.as_uri()]
         assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
-        drawn = page.locator("figure svg")
-        assert drawn.count() == file.read_text(encoding="utf-8").count("<svg") > 0
+        drawn = page.locator("figure svg.plot")
+        assert drawn.count() == file.read_text(encoding="utf-8").count('<svg class="plot"') > 0
         for k in range(drawn.count()):
             box = drawn.nth(k).bounding_box()
             assert box is not None
-            assert box["width"] > 250
+            assert box["width"] > 200
             assert drawn.nth(k).locator("path").count() > 5

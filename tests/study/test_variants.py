@@ -191,6 +191,49 @@ def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
     assert [v.id for v in compared.variants[3].verdicts if v.passed is False] == ["output-rate"]
 
 
+def test_requirements_are_rows_and_designs_are_columns(compared):
+    from reports.sections.compare import sections
+
+    made = {part["id"]: part for part in sections(compared)}
+    table = made["verdicts"]["blocks"][0]
+    labels = [column["label"] for column in table["columns"]]
+    names = ["ilr33-amber", "same", "half the velocity gain", "two changes", "slower gear"]
+    assert labels == ["Requirement", "Limit", *names]
+    assert len(table["rows"]) == len(compared.base.verdicts)
+    rate = next(row for row in table["rows"] if row["what"].startswith("Drive: output rate"))
+    assert [rate[f"d{k}"]["status"] for k in range(5)] == ["pass"] * 4 + ["fail"]
+    assert made["verdicts"]["result"] == f"1 of {5 * len(compared.base.verdicts)} verdicts fail."
+
+
+def test_more_designs_than_fit_a_screen_make_more_tables_each_with_the_base(compared):
+    from dataclasses import replace
+
+    from reports.sections.compare import batches
+
+    many = replace(compared, variants=compared.variants * 3)
+    tables = batches(many)
+    assert all(table[0] is compared.base and len(table) <= 5 for table in tables)
+    assert sum(len(table) - 1 for table in tables) == 12
+
+
+def test_one_page_says_which_variant_is_best_for_what_and_what_it_gives_up(compared):
+    from reports.sections.compare_best import section
+
+    made = section(compared)
+    assert made["result"].startswith("4 of 5 designs meet every requirement;")
+    designs, best = (block["rows"] for block in made["blocks"])
+    half = next(row for row in designs if row["design"] == "half the velocity gain")
+    # 20 log10 2 dB of a limit of 6 dB: the gain margin of the velocity loop gains 100.3 %
+    assert half["gains"].startswith("Velocity loop: gain margin +100 %")
+    assert "Position loop" in half["gives"]
+    margin = next(row for row in best if row["what"] == "Velocity loop: gain margin")
+    most = max(compared.all, key=lambda one: one.figures["velocity.gain_margin"])
+    assert margin["best"] == most.variant.name != "ilr33-amber"
+    assert next(row for row in designs if row["design"] == "slower gear")["_status"] == "fail"
+    rate = next(row for row in best if row["what"].startswith("Drive: output rate"))
+    assert rate["worst"].startswith("slower gear")
+
+
 def test_slopes_are_those_of_closed_forms():
     """Gain margin falls 0.0864 dB per percent of the loop's own gain (20 log10 1.01)."""
     found = sensitivities(load_design("ilr33-amber"), ["control.velocity.gain"])
@@ -237,9 +280,9 @@ def test_the_ledger_of_every_design_stands_side_by_side(tmp_path):
     assert len(found.base.ledger) == len(found.variants[0].ledger) > 20
     (made,) = sections(found)
     assert made["status"] == "pass"
-    rows = made["blocks"][0]["rows"]
-    assert [row["design"] for row in rows] == ["ilr33-amber", "faster"]
-    assert rows[0]["e0"]["status"] == "pass"
+    first = made["blocks"][0]
+    assert [column["label"] for column in first["columns"]] == ["Prediction", "Unit", "ilr33-amber", "faster"]
+    assert first["rows"][0]["d0"]["status"] == first["rows"][0]["d1"]["status"] == "pass"
     assert sections(compare(study_of(load_design("ilr33-amber")))) == []
 
 

@@ -2,7 +2,6 @@
 (() => {
   const table = document.getElementById("designs");
   if (!table) {
-    addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((d) => (d.open = true)));
     return;
   }
   const body = table.tBodies[0];

@@ -1,0 +1,92 @@
+"""The result from its figures: verdict, delay margins, evidence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from actuator_lti.margins.results import (
+    Agreement,
+    DelayMargin,
+    DiskMargin,
+    Evidence,
+    GainMargin,
+    PhaseMargin,
+    StabilityMargins,
+    Verdict,
+)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What was found on the axis; (value, rad/s) of modulus margin and disk margin."""
+
+    gain_margins: tuple[GainMargin, ...]
+    phase_margins: tuple[PhaseMargin, ...]
+    modulus: tuple[float, float]
+    disk: tuple[float, float]
+
+
+def assembled(
+    period_s: float | None,
+    agreement: Agreement,
+    figures: Figures | None,
+    *,
+    method: str,
+    notes: tuple[str, ...],
+    evidence: Evidence,
+    reason: str,
+    delay_s: float = 0.0,
+    band_rad_s: tuple[float, float] | None = None,
+) -> StabilityMargins:
+    """Put a result together; without figures they are withheld."""
+    if band_rad_s is None:
+        band_rad_s = (0.0, math.inf if period_s is None else math.pi / period_s)
+    stable, verdict = verdict_of(agreement) if figures is not None else (None, "undecided")
+    if figures is None or stable is None:
+        return StabilityMargins(
+            None, "undecided", (), (), (), None, None, None, period_s, delay_s, band_rad_s, method, agreement,
+            notes, "withheld", reason,
+        )  # fmt: skip
+    return StabilityMargins(
+        stable=stable,
+        verdict=verdict,
+        gain_margins=figures.gain_margins,
+        phase_margins=figures.phase_margins,
+        delay_margins=delay_margins(figures.phase_margins, period_s),
+        modulus_margin=figures.modulus[0],
+        modulus_frequency_rad_s=figures.modulus[1],
+        disk_margin=DiskMargin(*figures.disk),
+        period_s=period_s,
+        delay_s=delay_s,
+        band_rad_s=band_rad_s,
+        method=method,
+        agreement=agreement,
+        notes=notes,
+        evidence=evidence,
+        evidence_reason=reason,
+    )
+
+
+def verdict_of(agreement: Agreement) -> tuple[bool | None, Verdict]:
+    """Verdict from the two ways; both are asked only where no pole is on the border."""
+    if not agreement.agree:
+        return None, "undecided"
+    counts = (agreement.unstable_poles, agreement.unstable_nyquist)
+    count = next((c for c in counts if c is not None), None)
+    if count is None:
+        return None, "undecided"
+    if count:
+        return False, "unstable"
+    return (False, "on the border") if agreement.border_poles else (True, "stable")
+
+
+def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None) -> tuple[DelayMargin, ...]:
+    """The delay that uses up each phase margin; a negative margin by way of a full turn."""
+    out = []
+    for margin in phase_margins:
+        lag = math.radians(margin.deg if margin.deg >= 0.0 else margin.deg + 360.0)
+        seconds = lag / margin.frequency_rad_s
+        samples = None if period_s is None else seconds / period_s
+        out.append(DelayMargin(seconds, samples, margin.frequency_rad_s))
+    return tuple(out)

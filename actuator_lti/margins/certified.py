@@ -1,0 +1,109 @@
+"""Margins by exact arithmetic on the given doubles: certified, or withheld with the reason."""
+
+from __future__ import annotations
+
+import math
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.assemble import Figures, assembled
+from actuator_lti.margins.determined import FAR_DB, Settled, settled
+from actuator_lti.margins.exact_extremes import disk_alpha, modulus_margin
+from actuator_lti.margins.exact_findings import Crossing, Findings, findings
+from actuator_lti.margins.exact_loop import ExactLoop, exact_loop
+from actuator_lti.margins.given import ULP, Given
+from actuator_lti.margins.results import (
+    Agreement,
+    GainMargin,
+    PhaseMargin,
+    StabilityMargins,
+)
+
+_METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
+_MOVED = 1e-9
+
+
+def certified_margins(given: Given) -> StabilityMargins:
+    """All margins of a rational loop from the exact values of its doubles, see `stability_margins`.
+
+    The answer is given where it is the same for neighbours of the data, each entry 8 ulp away.
+
+    Raises
+    ------
+    InputError
+        The closed loop is not well posed, or a pole on the border of stability is cancelled.
+    NumericalError
+        The gain is one at every frequency.
+    """
+    loop = exact_loop(given)
+    _refuse_ill_posed(loop)
+    others = [exact_loop(neighbour) for neighbour in given.neighbours()]
+    base, result = _compared(loop, others, merge=False)
+    if result.problem is not None:
+        base, result = _compared(loop, others, merge=True)
+    return _margins(given, base, result)
+
+
+def _compared(loop: ExactLoop, others: list[ExactLoop], merge: bool) -> tuple[Findings, Settled]:
+    base = findings(loop, merge)
+    return base, settled(base, [findings(other, merge) for other in others])
+
+
+def _refuse_ill_posed(loop: ExactLoop) -> None:
+    above, below = (loop.N(1), loop.D(1)) if loop.sampled else (loop.N[loop.degree], loop.D[loop.degree])
+    if below and abs(above + below) <= abs(below) * 2 * ULP // (1 << 53):
+        raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
+
+
+def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
+    T = given.period_s
+
+    def frequency(w: float) -> float:
+        return w if T is None else 2.0 * math.atan(w) / T
+
+    def gain_margin(c: Crossing) -> GainMargin:
+        return GainMargin(float(1.0 / abs(c.L)), frequency(c.w), c.touch)
+
+    def phase_margin(c: Crossing) -> PhaseMargin:
+        deg = math.degrees(math.atan2(-c.L.imag, -c.L.real))
+        return PhaseMargin((deg if deg > -180.0 else 180.0) + 0.0, frequency(c.w), c.touch)
+
+    figures = None
+    if result.problem is None:
+        modulus, disk = modulus_margin(base.loop), disk_alpha(base.loop)
+        figures = Figures(
+            tuple(map(gain_margin, result.reals)),
+            tuple(map(phase_margin, result.gains)),
+            (modulus[0], frequency(modulus[1])),
+            (disk[0], frequency(disk[1])),
+        )
+    return assembled(
+        T,
+        Agreement(result.unstable, None, result.border),
+        figures,
+        method=_METHOD,
+        notes=_notes(base, result),
+        evidence="certified" if result.problem is None else "withheld",
+        reason=result.problem or _reason(result),
+    )
+
+
+def _reason(result: Settled) -> str:
+    moved = f"move a crossing by {result.moved:.1g}" if result.moved > _MOVED else "change nothing"
+    return f"exact arithmetic on the given doubles, certified roots; {ULP} ulp of the entries {moved}"
+
+
+def _notes(base: Findings, result: Settled) -> tuple[str, ...]:
+    notes = []
+    if result.hidden_at_dc:
+        notes.append(
+            "one mode at zero frequency that the loop neither drives nor sees is left out "
+            "(it is no instability)"
+        )
+    if base.hidden.right:
+        notes.append(f"{base.hidden.right} unstable mode(s) that the loop neither drives nor sees")
+    if result.dropped:
+        notes.append(
+            f"{result.dropped} crossing(s) of the real axis more than {FAR_DB:g} dB from -1 are left out: "
+            f"{ULP} ulp of the entries decide about them"
+        )
+    return tuple(notes)

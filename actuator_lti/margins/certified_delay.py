@@ -1,0 +1,218 @@
+"""Margins under exact delays by certified intervals: crossings, unstable poles, distances to -1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+from flint import acb, arb, ctx, fmpq_poly
+from scipy.optimize import minimize_scalar
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.assemble import delay_margins, verdict_of
+from actuator_lti.margins.delay_form import DelayForm
+from actuator_lti.margins.delay_setting import FLOOR
+from actuator_lti.margins.determined import difference
+from actuator_lti.margins.exact_axis import Axis, Form, order_of, turn, zeros
+from actuator_lti.margins.exact_delay import ExactDelayLoop, exact_delay_loop, neighbour
+from actuator_lti.margins.exact_findings import Crossing
+from actuator_lti.margins.given import ULP
+from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
+
+_BITS = 128
+_GAIN = Form(arb(1), acb(0), arb(-1))
+_PHASE = Form(arb(0), acb(0, -1), arb(0))
+_UNDER_ONE = 0.9
+_SLACK = 1e-8  # relative: how much lower a smallest distance may be without being found
+_AT_END = (0.9, 0.99, 0.999, 0.9999)  # parts of the distance at infinity at which a smaller one is looked for
+_ROUNDS = 8
+_REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries change nothing"
+
+
+def certified_delayed_margins(
+    form: DelayForm, found: StabilityMargins, band: tuple[float, float] | None
+) -> StabilityMargins:
+    """Certify a result of `delayed_margins`: crossings, verdict and bounds of both distances anew.
+
+    Raises
+    ------
+    NumericalError
+        Something could not be told.
+    """
+    with ctx.workprec(_BITS):
+        gains, reals, unstable = _answer(form, band)
+        problem = None
+        for way in (1.0, -1.0):
+            near_gains, near_reals, near_unstable = _answer(neighbour(form, way), band)
+            if near_unstable != unstable:
+                problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+            problem = problem or difference(gains, near_gains, "|L| = 1")
+            problem = problem or difference(reals, near_reals, "the real axis")
+        if problem is None:
+            found = _with_distances(Axis(exact_delay_loop(form)), found)
+    agreement = Agreement(unstable, found.agreement.unstable_nyquist)
+    if problem is not None or not agreement.agree:
+        return withheld(replace(found, agreement=agreement), problem or "poles and Nyquist count disagree")
+    low, high = found.band_rad_s
+    phase_margins = tuple(
+        PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w) for c in gains if low <= c.w <= high
+    )
+    stable, verdict = verdict_of(agreement)
+    return replace(
+        found,
+        stable=stable,
+        verdict=verdict,
+        gain_margins=tuple(GainMargin(1.0 / abs(c.L), c.w) for c in reals if low <= c.w <= high),
+        phase_margins=phase_margins,
+        delay_margins=delay_margins(phase_margins, None),
+        agreement=agreement,
+        evidence="certified",
+        evidence_reason=_REASON,
+    )
+
+
+def _with_distances(axis: Axis, found: StabilityMargins) -> StabilityMargins:
+    """Both smallest distances, confirmed or corrected."""
+    assert found.modulus_margin is not None
+    assert found.modulus_frequency_rad_s is not None
+    assert found.disk_margin is not None
+    modulus = _distance(axis, (found.modulus_margin, found.modulus_frequency_rad_s), 1.0)
+    disk = _distance(axis, (found.disk_margin.alpha, found.disk_margin.frequency_rad_s), 2.0)
+    return replace(
+        found, modulus_margin=modulus[0], modulus_frequency_rad_s=modulus[1], disk_margin=DiskMargin(*disk)
+    )
+
+
+def withheld(found: StabilityMargins, reason: str) -> StabilityMargins:
+    """The same without any figure."""
+    return replace(
+        found, stable=None, verdict="undecided", gain_margins=(), phase_margins=(), delay_margins=(),
+        modulus_margin=None, modulus_frequency_rad_s=None, disk_margin=None,
+        evidence="withheld", evidence_reason=reason,
+    )  # fmt: skip
+
+
+def _answer(
+    form: DelayForm, band: tuple[float, float] | None
+) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...], int]:
+    """Gain crossovers, crossings of the negative real axis, unstable closed-loop poles."""
+    loop = exact_delay_loop(form)
+    axis = Axis(loop)
+    start = _lowest(loop)
+    top = _beyond(loop, _UNDER_ONE, start)
+    far = _beyond(loop, FLOOR, start) if band is None else max(band[1], top)
+    gains = [_crossing(axis, x) for x in zeros(axis, _GAIN, axis.edges(start, top))]
+    both = loop.N.series(20) * loop.D.series(20)(fmpq_poly([0, -1]))
+    order = order_of(list(both.coeffs()[:20]))
+    reals = [_crossing(axis, x) for x in zeros(axis, _PHASE, axis.edges(start, far), order)]
+    reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= FLOOR)]
+    N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
+    if D0 != 0 and N0 / D0 < 0:
+        reals = [Crossing(0.0, complex(float((N0 / D0).p) / float((N0 / D0).q))), *reals]
+    return tuple(gains), tuple(reals), _unstable(axis, axis.edges(start, top))
+
+
+def _crossing(axis: Axis, x: arb) -> Crossing:
+    N, D = axis.values(x)
+    L = N / D
+    if L.rel_accuracy_bits() < 56:
+        raise NumericalError(f"a crossing near {float(x.mid()):.10g} rad/s could not be told from a pole")
+    return Crossing(float(x.mid()), complex(L))
+
+
+def _unstable(axis: Axis, edges: list[float]) -> int:
+    """Zeros of N + D in the right half plane, from the turn of N + D along the axis (Mikhailov, retarded)."""
+    n = axis.loop.degree
+    end = sum(axis.values(arb(edges[-1])), acb(0)) / (acb(0, edges[-1]) ** n * _lead(axis.loop))
+    count = arb(n) / 2 - (turn(axis, edges) - end.log().imag) / arb.pi()
+    whole = count.unique_fmpz()
+    if whole is None:
+        raise NumericalError("the number of unstable poles could not be told")
+    return int(whole)
+
+
+def _lead(loop: ExactDelayLoop) -> arb:
+    return arb(loop.D.terms[0][0][loop.degree])
+
+
+def _lowest(loop: ExactDelayLoop) -> float:
+    """A frequency below the smallest root that any of the polynomials can have, or the turn of any delay."""
+    sizes = [1.0]
+    for p, tau in (*loop.D.terms, *loop.N.terms):
+        c = [abs(float(arb(x).mid())) for x in p.coeffs()]
+        first = next(k for k, x in enumerate(c) if x)
+        if len(c) > first + 1:
+            sizes.append(
+                min((c[first] / x) ** (1.0 / (k - first)) for k, x in enumerate(c) if k > first and x)
+            )
+        if tau != 0:
+            sizes.append(1.0 / float(arb(tau).mid()))
+    return 0.1 * min(sizes[1:] or sizes)
+
+
+def _beyond(loop: ExactDelayLoop, gain: float, start: float) -> float:
+    """A frequency above which |L| < gain: the leading power against all other coefficients together."""
+
+    def holds(x: float) -> bool:
+        above = sum((_size(p, x) for p, _ in loop.N.terms), arb(0))
+        rest = sum((_size(p, x) for p, _ in loop.D.terms), arb(0))
+        lead = abs(_lead(loop)) * arb(x) ** loop.degree
+        return bool(above < gain * (2 * lead - rest))
+
+    x = max(start, 1e-300)
+    while not holds(x):
+        x *= 2.0
+        if x > 1e300:
+            raise NumericalError("the gain of the loop does not fall off")
+    return x
+
+
+def _size(p: fmpq_poly, x: float) -> arb:
+    total, power = arb(0), arb(1)
+    for c in p.coeffs():
+        total += abs(arb(c)) * power
+        power = power * x
+    return total
+
+
+def _distance(axis: Axis, found: tuple[float, float], at_end: float) -> tuple[float, float]:
+    """The smallest distance and its place: no zero of the distance less that value, or a smaller one.
+
+    Under a delay 1 + L comes nearer than at infinity somewhere, however far; the last of `_AT_END` is how
+    small a difference is looked for.
+    """
+    start, (value, w) = _lowest(axis.loop), found
+    for level in (*_AT_END, 1.0 - _SLACK):
+        for _ in range(_ROUNDS):
+            below = min(value * (1.0 - _SLACK), level * at_end)
+            if below < _SLACK or (level == 1.0 - _SLACK and value == at_end):
+                return value, w
+            ratio = (
+                below / at_end
+            )  # |L| < (1 - r)/(1 + r) keeps both distances above r times that at infinity
+            top = _beyond(axis.loop, (1.0 - ratio) / (1.0 + ratio), start)
+            inside = zeros(axis, _nearer(below, at_end), axis.edges(start, top))
+            if not inside:
+                break
+            value, w = min(_least(axis, float(a.mid()), float(b.mid()), at_end) for a, b in pairwise(inside))
+        if value < level * at_end:
+            return value, w
+    return value, w
+
+
+def _nearer(distance: float, at_end: float) -> Form:
+    """Positive where L is farther than that: |N + D|^2 - m^2 |D|^2, or 4 |N + D|^2 - alpha^2 |D - N|^2."""
+    k = arb(distance) ** 2
+    return Form(arb(1), acb(2), 1 - k) if at_end == 1.0 else Form(4 - k, 8 + 2 * acb(k), 4 - k)
+
+
+def _least(axis: Axis, low: float, high: float, at_end: float) -> tuple[float, float]:
+    """Smallest distance between two places, and where."""
+
+    def distance(x: float) -> float:
+        N, D = (complex(value) for value in axis.values(arb(x)))
+        return abs(N + D) / abs(D) if at_end == 1.0 else 2.0 * abs(N + D) / abs(D - N)
+
+    best = minimize_scalar(distance, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
+    return float(best.fun), float(best.x)

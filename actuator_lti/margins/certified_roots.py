@@ -1,0 +1,136 @@
+"""Roots of polynomials with integer coefficients, each in an interval that is known to hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+from flint import acb, arb, arb_poly, ctx, fmpz, fmpz_poly
+
+from actuator_lti.errors import NumericalError
+
+_MOST_BITS = 1 << 15
+_SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
+V = fmpz_poly([0, 1])
+
+
+@dataclass(frozen=True)
+class Split:
+    """p(j w) = even(v) + j w odd(v) with v = w^2."""
+
+    even: fmpz_poly
+    odd: fmpz_poly
+
+    @cached_property
+    def square(self) -> fmpz_poly:
+        """|p(j w)|^2 as a polynomial in v."""
+        return self.even * self.even + V * self.odd * self.odd
+
+    def at(self, v: arb) -> acb:
+        """p(j w), at the working precision."""
+        return acb(arb_poly(self.even)(v), v.sqrt() * arb_poly(self.odd)(v))
+
+
+def split(p: fmpz_poly) -> Split:
+    """Even and odd part on the imaginary axis."""
+    c = p.coeffs()
+    return Split(_alternating(c[0::2]), _alternating(c[1::2]))
+
+
+def _alternating(c: list[fmpz]) -> fmpz_poly:
+    return fmpz_poly([-x if k % 2 else x for k, x in enumerate(c)])
+
+
+def free_of(p: fmpz_poly, q: fmpz_poly) -> fmpz_poly:
+    """p without any root that it has in common with q."""
+    while p.degree() > 0:
+        common = p.gcd(q)
+        if common.degree() < 1:
+            return p
+        p = p // common
+    return p
+
+
+def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
+    """Every root but zero, isolated, with its multiplicity; the real ones have no imaginary part at all."""
+    while p.degree() > 0 and p[0] == 0:
+        p = p.right_shift(1)
+    if p.degree() < 1:
+        return []
+    found: Any = (p // p.content()).complex_roots()
+    return [(acb(root), times) for root, times in found]
+
+
+def sign_changes(p: fmpz_poly) -> int:
+    """Descartes' bound of the number of positive roots."""
+    signs = [c > 0 for c in p.coeffs() if c != 0]
+    return sum(a != b for a, b in pairwise(signs))
+
+
+def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:
+    """The positive real ones among certified roots, in order."""
+    real = [(root.real, times) for root, times in roots if root.imag.is_zero() and root.real > 0]
+    return sorted(real, key=lambda pair: float(pair[0].mid()))
+
+
+@dataclass(frozen=True)
+class HalfPlanes:
+    """Where the roots of a polynomial lie.
+
+    Attributes
+    ----------
+    right : int
+        Roots with a positive real part, multiplicities counted.
+    at_zero : int
+        Multiplicity of the root zero.
+    border : tuple of (arb, int)
+        w > 0 of the roots +-j w, with their multiplicity.
+    """
+
+    right: int
+    at_zero: int
+    border: tuple[tuple[arb, int], ...]
+
+    @property
+    def on_border(self) -> int:
+        """Number of roots on the axis."""
+        return self.at_zero + 2 * sum(times for _, times in self.border)
+
+
+def half_planes(p: fmpz_poly) -> HalfPlanes:
+    """Sort the roots by the imaginary axis, exactly.
+
+    Roots that lie symmetrically to the origin, all those on the axis among them, are the common factor of
+    even and odd part; what is left has no root on the axis, and precision is doubled until each one is told.
+    """
+    at_zero = 0
+    while p.degree() > 0 and p[0] == 0:
+        p, at_zero = p.right_shift(1), at_zero + 1
+    parts = split(p)
+    symmetric = parts.even.gcd(parts.odd) if parts.odd.degree() >= 0 else parts.even
+    border = []
+    right = 0
+    if symmetric.degree() > 0:
+        border = [(v.sqrt(), times) for v, times in positive_roots(all_roots(symmetric))]
+        right = symmetric.degree() - sum(times for _, times in border)
+        p = p // _exact(symmetric(_SQUARE))
+    return HalfPlanes(right + _right(p), at_zero, tuple(border))
+
+
+def _exact(p: fmpz_poly) -> fmpz_poly:
+    return p // p.content()
+
+
+def _right(p: fmpz_poly) -> int:
+    if sign_changes(p) == 0 and p.degree() < 3:
+        return 0
+    bits = ctx.prec
+    while bits <= _MOST_BITS:
+        with ctx.workprec(bits):
+            roots = all_roots(p)
+            if all(root.real > 0 or root.real < 0 for root, _ in roots):
+                return sum(times for root, times in roots if root.real > 0)
+        bits *= 2
+    raise NumericalError("a closed-loop pole could not be told from the border of stability")

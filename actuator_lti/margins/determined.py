@@ -1,0 +1,169 @@
+"""What the data determine: the answer beside those of neighbours 8 ulp away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.margins.certified_roots import all_roots
+from actuator_lti.margins.exact_findings import Crossing, Findings
+from actuator_lti.margins.given import ULP
+from actuator_lti.margins.loop import Complex, Real
+
+FAR_DB = 30.0
+_FAR = 10.0 ** (FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
+_SAME_W = 0.05
+_SAME_GAIN = 0.5
+_SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
+_TOLD = 1e-6
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What stands, whichever of the neighbours is meant.
+
+    Attributes
+    ----------
+    unstable, border : int
+        Closed-loop poles outside the stable region, and on its border as far as the data tell.
+    hidden_at_dc : int
+        Modes at zero frequency that the loop does not show.
+    gains, reals : tuple of Crossing
+        The crossings that the data determine.
+    dropped : int
+        Crossings of the real axis, far from -1, that they do not.
+    moved : float
+        Largest relative change of a crossing among the neighbours.
+    problem : str or None
+        Why no answer is given.
+    """
+
+    unstable: int
+    border: int
+    hidden_at_dc: int
+    gains: tuple[Crossing, ...]
+    reals: tuple[Crossing, ...]
+    dropped: int
+    moved: float
+    problem: str | None
+
+
+def settled(base: Findings, others: list[Findings]) -> Settled:
+    """Compare the findings of the given doubles with those of their neighbours.
+
+    Raises
+    ------
+    InputError
+        A pole on the border of stability is cancelled by a zero.
+    """
+    unstable, border, hidden, problem = _poles(base, others)
+    reals, dropped = base.reals, 0
+    for other in others:
+        kept = tuple(c for c in reals if not _far(c) or _partner(c, other.reals))
+        dropped, reals = dropped + len(reals) - len(kept), kept
+    moved = 0.0
+    for other in others:
+        problem = problem or difference(base.gains, other.gains, "|L| = 1")
+        problem = problem or difference(reals, other.reals, "the real axis")
+        moved = max([moved, *[_movement(c, other.gains) for c in base.gains]])
+        moved = max([moved, *[_movement(c, other.reals) for c in reals]])
+    return Settled(unstable, border, hidden, base.gains, reals, dropped, moved, problem)
+
+
+def _far(c: Crossing) -> bool:
+    return not 1.0 / _FAR < abs(c.L) < _FAR
+
+
+def _partner(c: Crossing, others: tuple[Crossing, ...]) -> Crossing | None:
+    """The crossing that is the same one in another list."""
+    for other in others:
+        same_w = c.w == other.w or (0.0 < c.w * other.w < math.inf and abs(math.log(c.w / other.w)) < _SAME_W)
+        if same_w and c.touch == other.touch and _same_size(abs(c.L), abs(other.L)):
+            return other
+    return None
+
+
+def _same_size(a: float, b: float) -> bool:
+    return a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+
+
+def difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: str) -> str | None:
+    """Why two lists do not tell of the same crossings, those far from -1 left out."""
+    core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
+    if [c.touch for c in core] == [c.touch for c in their_core]:
+        return None
+    for some, others in ((core, theirs), (their_core, ours)):
+        for c in some:
+            if _partner(c, others) is None:
+                return (
+                    f"{ULP} ulp of the entries decide whether L meets {line} at w = {c.w:.6g} of the s-plane"
+                )
+    return None
+
+
+def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
+    other = min(others, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
+    if other is None or not 0.0 < c.w < math.inf or not c.L:
+        return 0.0
+    return max(abs(other.w / c.w - 1.0), abs(other.L / c.L - 1.0))
+
+
+def _poles(base: Findings, others: list[Findings]) -> tuple[int, int, int, str | None]:
+    hidden = base.hidden.at_zero
+    if hidden > 1 or base.hidden.border or base.loop.hidden_degree > base.loop.hidden.degree():
+        where = "at zero frequency are" if hidden > 1 else "on the border of stability are"
+        raise InputError(f"poles {where} cancelled by zeros: cancel them in the loop first")
+    counts = {(f.unstable, f.on_border, f.hidden.at_zero) for f in (base, *others)}
+    closed = _values(base, closed=True)
+    if len(counts) == 1 and not _some_near_zero(np.abs(closed)):
+        return base.unstable, base.on_border, hidden, None
+    return _by_movement(base, others, closed)
+
+
+def _some_near_zero(size: Real) -> bool:
+    return bool(size.size) and bool((size < _TOLD * np.median(size)).any())
+
+
+def _values(f: Findings, closed: bool) -> Complex:
+    """Poles in the s-plane, hidden ones and those at zero among them."""
+    p = (f.loop.closed if closed else f.loop.D) * f.loop.hidden
+    zeros = next(k for k in range(p.degree() + 1) if p[k] != 0)
+    found = [complex(root) for root, times in all_roots(p) for _ in range(times)]
+    return np.array([0j] * zeros + found)
+
+
+def _by_movement(base: Findings, others: list[Findings], closed: Complex) -> tuple[int, int, int, str | None]:
+    """Count with each pole's own error: how far it moves among the neighbours."""
+    radius = _movements(closed, [_values(f, closed=True) for f in others])
+    size = np.abs(closed)
+    near = np.abs(closed.real) <= 2.0 * radius
+    unstable = int(np.count_nonzero((closed.real > 0.0) & ~near))
+    border, at_dc = base.closed_at_end, 0
+    for k in np.flatnonzero(near):
+        beyond = size[size > 10.0 * max(radius[k], size[k])]
+        if radius[k] <= _SHARP * size[k] and size[k]:
+            border += 1
+        elif radius[k] <= _SHARP * beyond.min(initial=math.inf):
+            at_dc += 1
+        else:
+            return (
+                unstable,
+                0,
+                0,
+                f"{ULP} ulp of the entries move a closed-loop pole over the border of stability",
+            )
+    shown = _values(base, closed=False)
+    spread = _movements(shown, [_values(f, closed=False) for f in others])
+    hidden = min(at_dc, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread + 0.0 * shown.real)))
+    if hidden > 1:
+        return unstable, 0, 0, f"{ULP} ulp of the entries decide about several modes at zero frequency"
+    return unstable, border + at_dc - hidden, hidden, None
+
+
+def _movements(values: Complex, others: list[Complex]) -> Real:
+    if not values.size:
+        return np.zeros(0)
+    return np.max([np.abs(values[:, None] - other).min(axis=1) for other in others], axis=0)

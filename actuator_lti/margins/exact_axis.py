@@ -1,0 +1,246 @@
+"""Zeros of real functions of the axis and turns of a curve, by intervals in certified arithmetic."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+from flint import acb, arb
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.exact_delay import ExactDelayLoop, Quasi, at
+
+_MOST_CELLS = 60_000
+_NARROWEST = 1e-13
+_NEWTON_STEPS = 60
+_PER_DECADE = 5
+_HIGHEST_ORDER = 16
+_ODD = 0.9137236158
+J = acb(0, 1)
+Jet = tuple[acb, acb, acb]  # value and slope in the middle, second derivative over the cell, by x
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An interval of x, with N and D of the loop there."""
+
+    low: float
+    high: float
+    N: Jet
+    D: Jet
+
+    @property
+    def half(self) -> arb:
+        """Ball of radius half the width about zero."""
+        return arb(0, 0.5 * (self.high - self.low) * (1 + 1e-15))
+
+
+class Axis:
+    """A loop with delays on s = j x: enclosures of N and D on intervals."""
+
+    def __init__(self, loop: ExactDelayLoop) -> None:
+        self.loop = loop
+        self._N, self._D = ([f.balls() for f in _jet(Q)] for Q in (loop.N, loop.D))
+
+    def cell(self, low: float, high: float) -> Cell:
+        """Enclosures on [low, high]."""
+        middle = 0.5 * (arb(low) + arb(high))
+        wide = middle.union(arb(low)).union(arb(high))
+        point, ball = acb(0, middle), acb(0, wide)
+
+        def jet(f: list) -> Jet:
+            return at(f[0], point), J * at(f[1], point), -at(f[2], ball)
+
+        return Cell(low, high, jet(self._N), jet(self._D))
+
+    def values(self, x: arb) -> tuple[acb, acb]:
+        """N and D at one x."""
+        s = acb(0, x)
+        return at(self._N[0], s), at(self._D[0], s)
+
+    def slopes(self, x: arb) -> tuple[acb, acb]:
+        """dN/dx and dD/dx at one x."""
+        s = acb(0, x)
+        return J * at(self._N[1], s), J * at(self._D[1], s)
+
+    def edges(self, low: float, high: float) -> list[float]:
+        """Where to start: zero, then so many to the decade, at places where nothing happens by design."""
+        low *= _ODD
+        count = max(int(_PER_DECADE * math.log10(high / low)), 1)
+        return [0.0, *(low * (high / low) ** (k / count) for k in range(count)), high]
+
+
+def _jet(f: Quasi) -> tuple[Quasi, Quasi, Quasi]:
+    first = f.derivative()
+    return f, first, first.derivative()
+
+
+@dataclass(frozen=True)
+class Form:
+    """A real function q = Re(u N conj N + v N conj D + w D conj D) of the loop.
+
+    (1, 0, -1) is |L| - 1; (0, -j, 0) the imaginary part of L; (1, 2, 1 - m^2) is |1 + L| - m.
+    """
+
+    u: arb
+    v: acb
+    w: arb
+
+    def at(self, N: acb, D: acb) -> arb:
+        """The value."""
+        both = N * D.conjugate()
+        return self.u * (N * N.conjugate()).real + (self.v * both).real + self.w * (D * D.conjugate()).real
+
+    def slope(self, N: acb, D: acb, N1: acb, D1: acb) -> arb:
+        """The derivative by x."""
+        both = N1 * D.conjugate() + N * D1.conjugate()
+        return (
+            2 * (self.u * (N1 * N.conjugate()).real + self.w * (D1 * D.conjugate()).real)
+            + (self.v * both).real
+        )
+
+    def curvature(self, N: Jet, D: Jet) -> arb:
+        """The second derivative, from jets that hold over a whole cell."""
+        both = N[2] * D[0].conjugate() + 2 * N[1] * D[1].conjugate() + N[0] * D[2].conjugate()
+        own = [2 * ((f[2] * f[0].conjugate()).real + (f[1] * f[1].conjugate()).real) for f in (N, D)]
+        return self.u * own[0] + (self.v * both).real + self.w * own[1]
+
+
+def _over(f: Jet, half: arb) -> Jet:
+    """A jet in the middle made one over the cell."""
+    slope = f[1] + f[2] * half
+    return f[0] + f[1] * half + f[2] * (half * half) / 2, slope, f[2]
+
+
+def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> list[arb]:
+    """Every zero of q with 0 < x < edges[-1], each alone in its interval.
+
+    Parameters
+    ----------
+    order_at_zero : int
+        Multiplicity of the zero of q at x = 0, which is not listed.
+
+    Raises
+    ------
+    NumericalError
+        Some zero could not be told: a touch, or too many turns.
+    """
+    found: list[arb] = []
+    stack = [(a, b) for a, b in pairwise(edges)][::-1]
+    count = 0
+    while stack:
+        low, high = stack.pop()
+        count += 1
+        if low == 0.0 and order_at_zero:
+            if high < _NARROWEST * edges[-1]:
+                raise NumericalError("a crossing next to zero frequency could not be told")
+            if not _order_holds(axis, q, high, order_at_zero):
+                stack += [(0.5 * high, high), (0.0, 0.5 * high)]
+            continue
+        cell = axis.cell(low, high)
+        value, slope = _enclosed(q, cell)
+        if value > 0 or value < 0:
+            continue
+        if slope > 0 or slope < 0:
+            found += _root(axis, q, low, high)
+            continue
+        if count > _MOST_CELLS or high - low < _NARROWEST * high:
+            raise NumericalError(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
+        middle = 0.5 * (low + high)
+        stack += [(middle, high), (low, middle)]
+    return found
+
+
+def _enclosed(q: Form, cell: Cell) -> tuple[arb, arb]:
+    """The value and the slope over a cell."""
+    half = cell.half
+    N, D = _over(cell.N, half), _over(cell.D, half)
+    curvature = q.curvature(N, D)
+    slope = q.slope(cell.N[0], cell.D[0], cell.N[1], cell.D[1])
+    value = q.at(cell.N[0], cell.D[0]) + slope * half + curvature * (half * half) / 2
+    return value, slope + curvature * half
+
+
+def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
+    """The only zero of a monotone q on [low, high), if there is one; Newton, held by bisection."""
+    a, b = (q.at(*axis.values(arb(x))) for x in (low, high))
+    if not (a > 0 or a < 0) or not (b > 0 or b < 0):
+        raise NumericalError(f"a crossing at {low:.10g} rad/s itself could not be told")
+    if (a > 0) == (b > 0):
+        return []
+    rising = b > 0
+    x = 0.5 * (low + high)
+    for _ in range(_NEWTON_STEPS):
+        N, D = axis.values(arb(x))
+        value = q.at(N, D)
+        if (value > 0) == rising:
+            high = x
+        else:
+            low = x
+        ahead = x - float((value / q.slope(N, D, *axis.slopes(arb(x)))).mid())
+        if not low < ahead < high:
+            ahead = 0.5 * (low + high)
+        if abs(ahead - x) <= 2e-16 * x:
+            return [arb(ahead)]
+        x = ahead
+    raise NumericalError(f"a crossing near {x:.10g} rad/s did not settle")
+
+
+def order_of(series: list) -> int:
+    """Multiplicity of the zero of Im(N conj D) at x = 0, from the exact series of N(s) D(-s)."""
+    for k in range(1, _HIGHEST_ORDER, 2):
+        if k < len(series) and series[k] != 0:
+            return k
+    raise NumericalError("the phase of the loop does not leave the real axis at zero frequency")
+
+
+def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
+    """Whether the derivative of that order keeps its sign on [0, high]: no further zero there."""
+    ball = acb(0, arb(0).union(arb(high)))
+    derivatives = []
+    for f in (axis.loop.N, axis.loop.D):
+        part, row = f, []
+        for k in range(order + 1):
+            row.append(J**k * at(part.balls(), ball))
+            part = part.derivative()
+        derivatives.append(row)
+    N, D = derivatives
+    total = arb(0)
+    for k in range(order + 1):
+        total += math.comb(order, k) * (q.v * N[k] * D[order - k].conjugate()).real
+    return bool(total > 0 or total < 0)
+
+
+def turn(axis: Axis, edges: list[float]) -> arb:
+    """Change of the angle of N + D along the intervals, rad.
+
+    Raises
+    ------
+    NumericalError
+        It goes through zero, as far as can be told.
+    """
+    total = arb(0)
+    stack = [(a, b) for a, b in pairwise(edges)][::-1]
+    count = 0
+    last = sum(axis.values(arb(0)), acb(0))
+    while stack:
+        low, high = stack.pop()
+        count += 1
+        cell = axis.cell(low, high)
+        F: Jet = (cell.N[0] + cell.D[0], cell.N[1] + cell.D[1], cell.N[2] + cell.D[2])
+        ball = _over(F, cell.half)[0] / F[0] if not F[0].contains(0) else acb(0)
+        if ball.real > 0:
+            here = sum(axis.values(arb(high)), acb(0))
+            total += (
+                (here / last).log().imag
+                if (here / last).real > 0
+                else (F[0] / last).arg() + (here / F[0]).arg()
+            )
+            last = here
+            continue
+        if count > _MOST_CELLS or high - low < _NARROWEST * high:
+            raise NumericalError(f"1 + L could not be told from zero near {low:.10g} rad/s")
+        middle = 0.5 * (low + high)
+        stack += [(middle, high), (low, middle)]
+    return total

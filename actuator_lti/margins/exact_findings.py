@@ -1,0 +1,192 @@
+"""Crossings and closed-loop poles of an exact loop: every one, each from a certified root."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+from flint import acb, arb, ctx, fmpz, fmpz_poly
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.certified_roots import (
+    HalfPlanes,
+    Split,
+    all_roots,
+    free_of,
+    half_planes,
+    positive_roots,
+    split,
+)
+from actuator_lti.margins.crossings import TOUCH
+from actuator_lti.margins.exact_loop import ExactLoop
+
+_FIRST_BITS, _MOST_BITS = 96, 1 << 14
+_ACCURATE = 56  # bits of a figure
+_NEAR = 1e-3  # relative: a pair this close may be a touch
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where L meets the unit circle or the negative real axis: w of the s-plane, L there."""
+
+    w: float
+    L: complex
+    touch: bool = False
+
+
+@dataclass(frozen=True)
+class Findings:
+    """All crossings of an exact loop, ends included, and where its closed-loop poles lie."""
+
+    loop: ExactLoop
+    gains: tuple[Crossing, ...]
+    reals: tuple[Crossing, ...]
+
+    @cached_property
+    def closed(self) -> HalfPlanes:
+        """Closed-loop poles, hidden modes and those at infinity (z = -1) left out."""
+        return half_planes(self.loop.closed)
+
+    @cached_property
+    def hidden(self) -> HalfPlanes:
+        """Hidden modes; those at infinity left out."""
+        return half_planes(self.loop.hidden)
+
+    @property
+    def closed_at_end(self) -> int:
+        """Closed-loop poles at z = -1."""
+        return self.loop.degree - self.loop.closed.degree()
+
+    @property
+    def unstable(self) -> int:
+        """Closed-loop poles outside the stable region, hidden modes among them."""
+        return self.closed.right + self.hidden.right
+
+    @property
+    def on_border(self) -> int:
+        """Closed-loop poles exactly on the border, hidden modes left out."""
+        return self.closed.on_border + self.closed_at_end
+
+
+def findings(loop: ExactLoop, merge: bool = False) -> Findings:
+    """Find every crossing.
+
+    Parameters
+    ----------
+    merge : bool
+        Take a gain within `TOUCH` of one at an end of the axis for one, which is no crossing; between two
+        crossings L that stays so close to the line only touches it in any case.
+
+    Raises
+    ------
+    NumericalError
+        The gain is one at every frequency.
+    """
+    N, D = split(loop.N), split(loop.D)
+    gain = N.square - D.square
+    if gain.degree() < 0:
+        raise NumericalError("the gain of the loop is one at every frequency: it has no phase margin")
+    phase = N.odd * D.even - N.even * D.odd
+    if phase.degree() >= 0:
+        phase = free_of(free_of(phase, N.square), D.square)
+
+    def off_circle(v: arb) -> arb:
+        return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
+
+    def off_axis(v: arb) -> arb:
+        return v.sqrt() * phase(v) / (N.at(v) * D.at(v)).abs_lower()
+
+    ends = _touched_ends(loop, gain) if merge else (False, False)
+    gains = _crossings(N, D, gain, off_circle, ends)
+    reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
+    first, last = _end(0.0, loop.N[0], loop.D[0]), _end(math.inf, *loop.at_end)
+    reals = [*([first] if first else []), *reals, *([last] if last and loop.degree else [])]
+    return Findings(loop, tuple(gains), tuple(reals))
+
+
+def accurate(figure: Callable[[], arb | acb]) -> arb | acb:
+    """A figure to the full accuracy of a double, by doubling the precision in which it is worked out."""
+    bits = _FIRST_BITS
+    while bits <= _MOST_BITS:
+        with ctx.workprec(bits):
+            value = figure()
+            if value.rel_accuracy_bits() >= _ACCURATE:
+                return value
+        bits *= 2
+    raise NumericalError("a figure of the loop could not be told from zero")
+
+
+def _end(w: float, N: fmpz, D: fmpz) -> Crossing | None:
+    if N == 0 or D == 0 or (N > 0) == (D > 0):
+        return None
+    return Crossing(w, complex(float(arb(N) / arb(D))))
+
+
+def _touched_ends(loop: ExactLoop, gain: fmpz_poly) -> tuple[bool, bool]:
+    """Whether the gain is one at zero frequency, at the end of the axis: within `TOUCH`, and not exactly."""
+
+    def touched(N: fmpz, D: fmpz) -> bool:
+        return N != 0 and D != 0 and abs(float(abs(arb(N) / arb(D)).log())) <= TOUCH
+
+    first = gain[0] != 0 and touched(loop.N[0], loop.D[0])
+    return first, gain[loop.degree] != 0 and touched(*loop.at_end)
+
+
+def _crossings(
+    N: Split,
+    D: Split,
+    p: fmpz_poly,
+    off: Callable[[arb], arb],
+    touched_ends: tuple[bool, bool] = (False, False),
+) -> list[Crossing]:
+    """The positive roots of p, touches merged; ``off`` is the distance to the line."""
+    bits = _FIRST_BITS
+    while bits <= _MOST_BITS:
+        with ctx.workprec(bits):
+            roots = all_roots(p)
+            places = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
+            places = _merged(places, roots, off, touched_ends)
+            values = [N.at(v) / D.at(v) for v, _ in places]
+            if all(L.rel_accuracy_bits() >= _ACCURATE for L in values):
+                return [
+                    Crossing(float(v.sqrt().mid()), complex(L), touch)
+                    for (v, touch), L in zip(places, values, strict=True)
+                ]
+        bits *= 2
+    raise NumericalError("a crossing of the loop could not be told from a zero or a pole beside it")
+
+
+def _merged(
+    places: list[tuple[arb, bool]],
+    roots: list[tuple[acb, int]],
+    off: Callable[[arb], arb],
+    touched_ends: tuple[bool, bool],
+) -> list[tuple[arb, bool]]:
+    """Pairs of crossings, real or just missed, that count as one touch; and none at a touched end."""
+    sizes = [float(abs(root).mid()) for root, _ in roots]
+    out: list[tuple[arb, bool]] = []
+    for v, touch in places:
+        at = float(v.mid())
+        if (touched_ends[0] and at <= min(sizes)) or (touched_ends[1] and at >= max(sizes)):
+            continue
+        if out and not touch and not out[-1][1] and _close(out[-1][0], v):
+            between = (0.5 * (out[-1][0] + v)).mid()
+            if _touches(between, off):
+                out[-1] = (between, True)
+                continue
+        out.append((v, touch))
+    for root, _ in roots:
+        missed = root.imag > 0 and root.real > 0 and float((root.imag / root.real).mid()) < _NEAR
+        if missed and _touches(root.real.mid(), off):
+            out.append((root.real.mid(), True))
+    return sorted(out, key=lambda place: float(place[0].mid()))
+
+
+def _touches(v: arb, off: Callable[[arb], arb]) -> bool:
+    return abs(float(off(v).mid())) <= TOUCH
+
+
+def _close(a: arb, b: arb) -> bool:
+    return float(((b - a) / b).mid()) < _NEAR

@@ -1,0 +1,115 @@
+"""A loop as two polynomials with exact coefficients: its doubles, as the rationals they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from flint import fmpz, fmpz_mat, fmpz_poly
+
+from actuator_lti.margins.given import Given
+
+_S = fmpz_poly([0, 1])
+
+
+@dataclass(frozen=True)
+class ExactLoop:
+    """L = N/D without common factors, and the hidden modes that were cancelled; integers, lowest power first.
+
+    A sampled loop is held in the s-plane of z = (1 + s)/(1 - s), exactly: the unit circle is the imaginary
+    axis, z = -1 lies at infinity.
+
+    Attributes
+    ----------
+    N, D : fmpz_poly
+        Coprime numerator and denominator in s.
+    hidden : fmpz_poly
+        What they had in common: modes that the loop does not drive or does not see.
+    degree : int
+        Number of poles of L, those at infinity (z = -1) counted.
+    hidden_degree : int
+        The same for the hidden modes.
+    sampled : bool
+        Whether s comes from z.
+    """
+
+    N: fmpz_poly
+    D: fmpz_poly
+    hidden: fmpz_poly
+    degree: int
+    hidden_degree: int
+    sampled: bool
+
+    @property
+    def closed(self) -> fmpz_poly:
+        """Characteristic polynomial of the closed loop, hidden modes left out."""
+        return self.N + self.D
+
+    @property
+    def at_end(self) -> tuple[fmpz, fmpz]:
+        """Numerator and denominator of L at infinity (z = -1)."""
+        return self.N[self.degree], self.D[self.degree]
+
+
+def exact_loop(given: Given) -> ExactLoop:
+    """Bring the given doubles into the exact form; no rounding anywhere."""
+    N, D = _by_coefficients(given) if given.A is None else _by_matrices(given)
+    if given.samples:
+        D = D * _S**given.samples
+    n = D.degree()
+    if given.period_s is not None:
+        N, D = _warped(N, n), _warped(D, n)
+    common = N.gcd(D) if N.degree() >= 0 else D
+    hidden = _primitive(common)
+    at_end = min(n - N.degree(), n - D.degree()) if N.degree() >= 0 else 0  # common poles at z = -1
+    N, D = N // hidden, D // hidden
+    both = N.content().gcd(D.content()) if N.degree() >= 0 else D.content()
+    hidden_degree = hidden.degree() + at_end
+    return ExactLoop(
+        N // both, D // both, hidden, n - hidden_degree, hidden_degree, given.period_s is not None
+    )
+
+
+def _integers(*arrays: Any) -> tuple[list[list[int]], int]:
+    """All entries times one power of two, as integers, and that power."""
+    ratios = [[float(x).as_integer_ratio() for x in np.ravel(array)] for array in arrays]
+    shift = max((below.bit_length() - 1 for part in ratios for _, below in part), default=0)
+    return [[above << (shift - below.bit_length() + 1) for above, below in part] for part in ratios], shift
+
+
+def _by_coefficients(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
+    (num, den), _ = _integers(given.numerator, given.denominator)
+    return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
+
+
+def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
+    """D = det(sI - A), N = det(sI - A + b c) - D + d D: the matrix determinant lemma."""
+    n = given.b.size
+    (A, d), shift = _integers(given.A, given.d)
+    (b,), shift_b = _integers(given.b)
+    (c,), shift_c = _integers(given.c)
+    if not n:
+        return fmpz_poly(d), fmpz_poly([1 << shift])
+    scale = max(shift, shift_b + shift_c)
+    whole = fmpz_mat(n, n, A) * (1 << (scale - shift))
+    product = fmpz_mat(n, 1, b) * fmpz_mat(1, n, c) * (1 << (scale - shift_b - shift_c))
+    D = _unscaled(whole.charpoly(), scale)
+    N = _unscaled((whole - product).charpoly(), scale) - D
+    return N * (1 << shift) + D * d[0], D * (1 << shift)
+
+
+def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:
+    """From det(sI - 2^shift A) to 2^(shift n) det(sI - A)."""
+    return fmpz_poly([c * (1 << (shift * k)) for k, c in enumerate(p.coeffs())])
+
+
+def _warped(p: fmpz_poly, degree: int) -> fmpz_poly:
+    """(1 - s)^degree p((1 + s)/(1 - s)), by way of z = -1 + 2/(1 - s)."""
+    about: list[Any] = list(p(fmpz_poly([-1, 2])).coeffs())
+    about += [0] * (degree + 1 - len(about))
+    return fmpz_poly(about[::-1])(fmpz_poly([1, -1]))
+
+
+def _primitive(p: fmpz_poly) -> fmpz_poly:
+    return p // p.content() if p.content() else p

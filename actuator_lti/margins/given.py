@@ -1,0 +1,97 @@
+"""The doubles by which a rational loop was given, untouched, and their neighbours a few ulp away."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+
+Real = NDArray[np.floating[Any]]
+ULP = 8  # by how much the entries may be wrong: what this changes the data do not determine
+
+
+def _nothing() -> Real:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class Given:
+    """Coefficients (highest power first, leading zeros trimmed), or a state space where ``A`` is not None.
+
+    ``samples`` whole samples of delay stand behind a sampled loop.
+    """
+
+    period_s: float | None
+    numerator: Real = field(default_factory=_nothing)
+    denominator: Real = field(default_factory=_nothing)
+    A: Real | None = None
+    b: Real = field(default_factory=_nothing)
+    c: Real = field(default_factory=_nothing)
+    d: float = 0.0
+    samples: int = 0
+
+    def neighbours(self) -> tuple[Given, Given]:
+        """The same with every entry moved by 8 ulp, up or down at random, and the other way; zeros stay.
+
+        To first order whatever the one does the other undoes: between them lies what the data decide.
+        """
+        return self._moved(1.0), self._moved(-1.0)
+
+    def _moved(self, way: float) -> Given:
+        rng = np.random.default_rng(0)
+
+        def moved(entries: Any) -> Real:
+            x = np.asarray(entries, dtype=float)
+            return x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
+
+        if self.A is None:
+            return replace(self, numerator=moved(self.numerator), denominator=moved(self.denominator))
+        return replace(self, A=moved(self.A), b=moved(self.b), c=moved(self.c), d=float(moved(self.d)))
+
+
+def given_of(system: Any) -> Given:
+    """Read a SISO python-control state space or transfer function.
+
+    Raises
+    ------
+    InputError
+        More than one input or output, an improper transfer function, or a value that is not finite.
+    """
+    if system.ninputs != 1 or system.noutputs != 1:
+        raise InputError(
+            f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
+        )
+    period_s = _period(system.dt)
+    if hasattr(system, "num"):
+        num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
+        den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
+        given = Given(period_s, num, den)
+        _refuse_coefficients(num, den)
+    else:
+        A = np.asarray(system.A, dtype=float)
+        b = np.asarray(system.B, dtype=float)[:, 0]
+        given = Given(period_s, A=A, b=b, c=np.asarray(system.C, dtype=float)[0], d=float(system.D[0, 0]))
+    parts = (given.numerator, given.denominator, given.A, given.b, given.c, given.d)
+    if not all(np.isfinite(part).all() for part in parts if part is not None):
+        raise InputError("the loop holds a value that is not finite")
+    return given
+
+
+def _refuse_coefficients(num: Real, den: Real) -> None:
+    if not den.size:
+        raise InputError("the denominator of the loop is zero")
+    if num.size > den.size:
+        raise InputError(
+            f"the loop is improper (numerator of degree {num.size - 1} over {den.size - 1}): "
+            "it needs at least as many poles as zeros"
+        )
+
+
+def _period(dt: Any) -> float | None:
+    if dt is None or (dt == 0 and dt is not True):
+        return None
+    return 1.0 if dt is True else float(dt)

@@ -1,0 +1,67 @@
+"""Several records against one design: the figures of each, and of all together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analyses.correlation.closed_loop import CorrelationResult
+from analyses.correlation.compare import SignalComparison
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalSummary:
+    """One signal over all records that hold it.
+
+    ``mean_error`` and ``rms_error`` are over all samples together, ``max_error`` the largest of all,
+    ``relative_error`` the norm of all differences over the norm of all that was measured. ``worst`` is the
+    record with the largest relative error.
+    """
+
+    name: str
+    unit: str
+    records: int
+    samples: int
+    mean_error: float
+    rms_error: float
+    max_error: float
+    relative_error: float
+    worst: str
+
+
+def summarise(results: Sequence[CorrelationResult]) -> tuple[SignalSummary, ...]:
+    """The figures of every signal over all records, in the order in which the signals first occur."""
+    names = list(dict.fromkeys(signal.name for result in results for signal in result.signals))
+    return tuple(_of_signal(name, results) for name in names)
+
+
+def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
+    found = [(result, signal) for result in results for signal in result.signals if signal.name == name]
+    signals = [signal for _, signal in found]
+    samples = np.array([signal.samples for signal in signals])
+    squared = np.array([signal.rms_error**2 for signal in signals]) * samples
+    measured = np.array([float(np.sum(signal.measured**2)) for signal in signals])
+    worst = max(found, key=lambda pair: pair[1].relative_error)
+    return SignalSummary(
+        name=name,
+        unit=signals[0].unit,
+        records=len(signals),
+        samples=int(samples.sum()),
+        mean_error=float(np.array([signal.mean_error for signal in signals]) @ samples / samples.sum()),
+        rms_error=float(np.sqrt(squared.sum() / samples.sum())),
+        max_error=max(signal.max_error for signal in signals),
+        relative_error=float(np.sqrt(squared.sum() / measured.sum())),
+        worst=worst[0].record,
+    )
+
+
+def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, SignalComparison]:
+    """The record whose motion is furthest off, and the signal: the output's place where it is recorded."""
+    for name in ("output_angle", "position", "angle", "speed", "velocity"):
+        held = [(result, signal) for result in results for signal in result.signals if signal.name == name]
+        if len(held) == len(results):
+            return max(held, key=lambda pair: pair[1].relative_error)
+    every = [(result, signal) for result in results for signal in result.signals]
+    return max(every, key=lambda pair: pair[1].relative_error)

@@ -1,0 +1,196 @@
+"""From bench records to a design that may be written: inputs, joint fit, refinement, verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.friction_map import LawChoice, fit_map
+from analyses.identification.inverse import JointModel, fit_records, held_out_residual
+from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.refinement import refine_records
+from analyses.identification.resimulation import Resimulated, resimulate
+from analyses.identification.rows import recipe_for
+from analyses.identification.to_design import (
+    INERTIAS,
+    KEYS,
+    design_with_estimate,
+    joint_estimate,
+    refined_estimate,
+    with_fixed,
+    with_structure,
+)
+from analyses.identification.verdict import (
+    RESIDUAL_LIMIT,
+    Item,
+    held_out_item,
+    inputs_item,
+    residual_item,
+    rows_item,
+    simulated_item,
+    size_item,
+)
+from analyses.identification.verdict import passed as all_passed
+from analyses.records.consistency import Finding, check_record
+from analyses.records.prepare import prepared
+from analyses.records.record import Record
+
+NAMES_OF_KEYS = {
+    ("symmetric", key): name for name, key in KEYS.items() if not name.endswith(("_forward", "_reverse"))
+} | {("per-direction", key): name for name, key in KEYS.items() if name not in ("viscous", "dry", "offset")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchSettings:
+    """What was asked of an identification; ``fixed`` by key of the design, in SI.
+
+    ``form`` "map": friction maps with break points are tried, and one is taken where it is clearly better.
+    ``gravity``: a pendulum at the output is looked for (it is where the design has one).
+    """
+
+    form: FrictionForm | Literal["map"] = "symmetric"
+    gravity: bool = False
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    inertia_to: str = INERTIAS[0]
+    refine: bool = False
+    residual_limit: float = RESIDUAL_LIMIT
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchResult:
+    """Everything that the records told: the fit, the design that would be written, and whether it may be."""
+
+    records: tuple[Record, ...]
+    validation: tuple[Record, ...]
+    findings: Mapping[str, tuple[Finding, ...]]
+    model: JointModel
+    refined: OutputErrorResult | None
+    design: Design
+    text: str
+    resimulated: tuple[Resimulated, ...]
+    items: tuple[Item, ...]
+    settings: BenchSettings
+    laws: tuple[LawChoice, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all_passed(self.items)
+
+
+def identify_bench(
+    design: Design,
+    records: Sequence[Record],
+    *,
+    validation: Sequence[Record] = (),
+    settings: BenchSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> BenchResult:
+    """Identify a drive from records of its motion, and hold the design that comes of it against them.
+
+    Raises
+    ------
+    InputError
+        If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
+    """
+    settings = BenchSettings() if settings is None else settings
+    used = tuple(prepared(record) for record in records)
+    unseen = tuple(prepared(record) for record in validation)
+    findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
+    start = with_fixed(design, settings.fixed)
+    model, laws = _fitted(start, used, settings)
+    source = f"identified from {', '.join(record.name for record in records)}"
+    items = _fit_items(design, findings, model, settings.residual_limit)
+    try:
+        estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
+        made = design_with_estimate(with_structure(start, model), estimate)
+    except InputError as error:
+        reasons = "; ".join(item.reason for item in items if item.passed is False)
+        raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
+    refined = None
+    if settings.refine:
+        refined = refine_records(made, used, estimate.paths, progress=progress)
+        made = design_with_estimate(made, refined_estimate(refined, f"{source}, refined by simulation"))
+    text = write_design(made)
+    again = resimulate(read_design_text(text), (*used, *unseen), model.form)
+    return BenchResult(
+        records=used,
+        validation=unseen,
+        findings=findings,
+        model=model,
+        refined=refined,
+        design=made,
+        text=text,
+        resimulated=again,
+        items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
+        settings=settings,
+        laws=laws,
+    )
+
+
+def _fitted(
+    start: Design, used: Sequence[Record], settings: BenchSettings
+) -> tuple[JointModel, tuple[LawChoice, ...]]:
+    """The joint model, and the friction laws that were tried."""
+    recipe, fixed = _recipe(used[0], settings), _held(start, settings)
+    gravity = settings.gravity or start.load.gravity is not None
+    if settings.form == "map":
+        found = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
+        return found.model, found.laws
+    model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
+    return model, ()
+
+
+def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:
+    if settings.cutoff_hz is None and settings.decimation is None:
+        return None
+    return recipe_for(record, settings.cutoff_hz, settings.decimation)
+
+
+def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
+    """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
+    held = {}
+    form = "symmetric" if settings.form == "map" else settings.form
+    for path, value in settings.fixed.items():
+        name = NAMES_OF_KEYS.get((form, path))
+        if path in INERTIAS:
+            held["inertia"] = design.inertia_kgm2
+        elif name is not None:
+            held[name] = value
+        else:
+            known = sorted({key for own, key in NAMES_OF_KEYS if own == form} | set(INERTIAS))
+            raise InputError(f"--fix {path}: can be fixed here: {', '.join(known)}")
+    return held
+
+
+def _fit_items(
+    design: Design, findings: Mapping[str, tuple[Finding, ...]], model: JointModel, limit: float
+) -> tuple[Item, ...]:
+    return (
+        *(inputs_item(name, found) for name, found in findings.items()),
+        size_item(design, model),
+        rows_item(model.rows_used, len(model.names)),
+        residual_item(model.relative_residual, limit),
+    )
+
+
+def _held_out(
+    start: Design, model: JointModel, unseen: Sequence[Record], settings: BenchSettings
+) -> tuple[Item, ...]:
+    fit, limit = model.relative_residual, settings.residual_limit
+    return tuple(
+        held_out_item(record.name, held_out_residual(start, model, record), fit, limit) for record in unseen
+    )
+
+
+def _again(again: Sequence[Resimulated], settings: BenchSettings) -> tuple[Item, ...]:
+    return tuple(
+        simulated_item(one.record, one.relative_error, settings.residual_limit, one.how) for one in again
+    )

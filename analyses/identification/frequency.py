@@ -1,0 +1,155 @@
+"""Frequency response of a drive from a record of a periodic excitation: lines, means, noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+MIN_PERIODS = 4
+EXCITED = 25.0
+"""A line counts as excited where its power is this many times that of its noise."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lines:
+    """Spectral lines of several signals at the excited frequencies.
+
+    Attributes
+    ----------
+    omega_rad_s : array, shape (lines,)
+    means : array, shape (signals, lines)
+        Complex amplitudes, the mean over all periods.
+    noise : array, shape (lines, signals, signals)
+        Covariance of these means, from the scatter between periods.
+    names : tuple of str
+    periods : int
+    """
+
+    omega_rad_s: FloatArray
+    means: ComplexArray
+    noise: ComplexArray
+    names: tuple[str, ...]
+    periods: int
+
+
+def excited_lines(
+    record: Record,
+    names: tuple[str, ...],
+    period_s: float,
+    *,
+    skip_periods: int = 1,
+    top_hz: float | None = None,
+) -> Lines:
+    """The lines of a periodic excitation.
+
+    A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Signals; the first is the one that shows which lines are excited.
+    period_s : float
+        Period of the excitation; a whole number of samples.
+    skip_periods : int
+        Periods left out at the start, for the transient.
+    top_hz : float, optional
+        Highest frequency looked at; 0.4 of the sampling frequency otherwise.
+
+    Raises
+    ------
+    InputError
+        If the period is no whole number of samples, too few periods are there, or nothing is excited.
+    """
+    samples = round(period_s / record.period_s)
+    if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
+        raise InputError(
+            f"period {period_s:g} s: must be a whole number (8 or more) of samples of {record.period_s:g} s",
+            where=record.name,
+        )
+    periods = len(record) // samples - skip_periods
+    if periods < MIN_PERIODS:
+        raise InputError(
+            f"{periods} periods of {period_s:g} s after the first {skip_periods}: at least {MIN_PERIODS}",
+            where=record.name,
+        )
+    start = len(record) - periods * samples
+    spectra = np.array([_spectra(record[name][start:], periods, samples) for name in names])
+    means = spectra.mean(axis=1)
+    rest = spectra - means[:, None, :]
+    noise = np.einsum("apk,bpk->kab", rest, rest.conj()) / (periods * (periods - 1))
+    hertz = np.arange(means.shape[1]) / period_s
+    limit = 0.4 / record.period_s if top_hz is None else top_hz
+    power = np.abs(means[0]) ** 2
+    floor = np.maximum(np.real(noise[:, 0, 0]), 1e-24 * float(np.max(power[1:], initial=0.0)))
+    strong = power > 1e-6 * float(np.max(power[1:], initial=0.0))
+    chosen = (power > EXCITED * floor) & strong & (hertz > 0.0) & (hertz <= limit)
+    if np.count_nonzero(chosen) < MIN_PERIODS:
+        raise InputError(f"{names[0]}: no lines of a period of {period_s:g} s are excited", where=record.name)
+    return Lines(
+        omega_rad_s=np.asarray(2.0 * np.pi * hertz[chosen]),
+        means=means[:, chosen],
+        noise=noise[chosen],
+        names=names,
+        periods=periods,
+    )
+
+
+def _spectra(values: FloatArray, periods: int, samples: int) -> ComplexArray:
+    """Amplitudes of every line in every period, shape (periods, lines); the mean rate is taken off."""
+    block = values[: periods * samples].reshape(periods, samples)
+    rate = (block[-1].mean() - block[0].mean()) / max((periods - 1) * samples, 1)
+    straight = rate * np.arange(periods * samples).reshape(periods, samples)
+    return np.asarray(np.fft.rfft(block - straight, axis=1) * (2.0 / samples))
+
+
+def response(lines: Lines, output: str, by: str) -> tuple[ComplexArray, FloatArray]:
+    """Frequency response from one signal to another, and its relative standard error, line by line."""
+    k, j = lines.names.index(output), lines.names.index(by)
+    g = lines.means[k] / lines.means[j]
+    n = lines.noise
+    relative = (
+        np.real(n[:, k, k]) / np.abs(lines.means[k]) ** 2
+        + np.real(n[:, j, j]) / np.abs(lines.means[j]) ** 2
+        - 2.0 * np.real(n[:, k, j] / (lines.means[k] * lines.means[j].conj()))
+    )
+    return g, np.sqrt(np.maximum(relative, 0.0))
+
+
+def period_of_excitation(record: Record, name: str) -> float:
+    """The period with which a recorded command repeats itself.
+
+    Raises
+    ------
+    InputError
+        If it does not repeat itself at least five times.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
+    n = len(values)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = rfft(values, size)
+    correlation = irfft(np.abs(spectrum) ** 2, size)[:n]
+    power = np.cumsum(values[::-1] ** 2)[::-1]
+    early = np.cumsum(values**2)
+    lags = np.arange(1, n // (MIN_PERIODS + 1))
+    alike = correlation[lags] / np.sqrt(np.maximum(power[lags] * early[n - 1 - lags], 1e-300))
+    fallen = int(np.argmax(alike < 0.5))
+    peaks = np.flatnonzero(alike[fallen:] > 0.98) + fallen
+    if not len(alike) or not fallen or not len(peaks):
+        raise InputError(
+            f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation",
+            where=record.name,
+        )
+    first = peaks[0]
+    group = peaks[peaks <= first * 1.02 + 2]
+    best = group[int(np.argmax(alike[group]))]
+    return float(lags[best] * record.period_s)

@@ -1,0 +1,167 @@
+"""Friction as a map over the speed: break points found, and judged against the plain law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Design
+from analyses.identification.dynamic import Recipe
+from analyses.identification.hats import hats
+from analyses.identification.inverse import JointModel, fit_records
+from analyses.identification.means import correlation_time
+from analyses.identification.rows import Rows, record_rows
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+MOST_BREAKS = 4
+GRID = 24
+LEAST_SHARE = 0.005
+CLEARLY_BETTER = 6.0
+"""A law is taken where its criterion is lower by this much (strong evidence; Kass and Raftery 1995)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LawChoice:
+    """One law: its break points (rad/s at the motor), parameters, residual, and Bayesian criterion.
+
+    ``criterion`` is ``n ln(mean square) + p ln n`` with n the number of rows worth one independent one, less
+    that of the plain law: below -6 the law is taken.
+    """
+
+    name: str
+    breaks_rad_s: tuple[float, ...]
+    parameters: int
+    relative_residual: float
+    criterion: float
+    taken: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapResult:
+    """All laws that were tried, and the model of the one that is taken."""
+
+    laws: tuple[LawChoice, ...]
+    model: JointModel
+    knots_rad_s: tuple[float, ...] | None
+
+
+def fit_map(
+    design: Design,
+    records: Sequence[Record],
+    *,
+    recipe: Recipe | None = None,
+    fixed: Mapping[str, float] | None = None,
+    gravity: bool = False,
+) -> MapResult:
+    """Fit friction maps with one to four break points, and take one only where it is clearly better.
+
+    The break points are found one after the other, each where it lowers the residual most among 24 speeds
+    (evenly spaced in the logarithm), and then moved in turn.
+    """
+
+    def fitted(knots: tuple[float, ...] | None) -> JointModel:
+        return fit_records(design, records, recipe=recipe, fixed=fixed, gravity=gravity, knots_rad_s=knots)
+
+    plain = fitted(None)
+    rows = [record_rows(design, record, "symmetric", recipe, gravity=gravity) for record in records]
+    speed, rest = _plain_residual(rows, plain)
+    top = float(np.max(np.abs(speed)))
+    n = len(rest) / correlation_time(plain.residual)
+    best: tuple[float, JointModel, tuple[float, ...] | None] = (_bic(plain, n), plain, None)
+    laws = [_law("plain, C0 + Cv |w|", None, plain, 0.0, taken=False)]
+    found: tuple[float, ...] = ()
+    for count in range(1, MOST_BREAKS + 1):
+        found = _one_more(speed, rest, top, found)
+        if len(found) < count:
+            break
+        knots = (0.0, *found, top)
+        model = fitted(knots)
+        own = _bic(model, n)
+        gain = own - _bic(plain, n)
+        laws.append(_law(f"map, {count} break points", found, model, gain, taken=False))
+        if own < best[0] - (CLEARLY_BETTER if best[2] is None else 0.0):
+            best = (own, model, knots)
+    chosen = 0 if best[2] is None else len(best[2]) - 2
+    marked = tuple(LawChoice(**{**vars(law), "taken": k == chosen}) for k, law in enumerate(laws))
+    return MapResult(laws=marked, model=best[1], knots_rad_s=best[2])
+
+
+def _law(
+    name: str, breaks: tuple[float, ...] | None, model: JointModel, gain: float, *, taken: bool
+) -> LawChoice:
+    return LawChoice(
+        name=name,
+        breaks_rad_s=breaks or (),
+        parameters=len(model.names) + len(breaks or ()),
+        relative_residual=model.relative_residual,
+        criterion=gain,
+        taken=taken,
+    )
+
+
+def _bic(model: JointModel, independent: float) -> float:
+    """The Bayesian criterion; break points count as parameters."""
+    breaks = max(sum(name.startswith("map_") for name in model.names) - 2, 0)
+    square = float(np.mean(model.residual**2))
+    return independent * float(np.log(square)) + (len(model.names) + breaks) * float(np.log(independent))
+
+
+def _plain_residual(rows: Sequence[Rows], plain: JointModel) -> tuple[FloatArray, FloatArray]:
+    """Speeds of all rows, and what is left of the drive once all but the friction is taken off.
+
+    Rows beside a reversal are left out: the decimation's filter mixes both directions there.
+    """
+    speeds, rests = [], []
+    for block in rows:
+        other = [k for k, name in enumerate(block.names) if name not in ("viscous", "dry")]
+        values = np.array([plain[block.names[k]] for k in other])
+        speed = block.w[:, block.names.index("viscous")]
+        turns = np.concatenate([[False], np.sign(speed[1:]) != np.sign(speed[:-1]), [False]])
+        clear = ~(turns[1:] | turns[:-1])
+        clear[1:-1] &= clear[2:] & clear[:-2]
+        speeds.append(speed[clear])
+        rests.append((block.y - block.w[:, other] @ values)[clear])
+    return np.concatenate(speeds), np.concatenate(rests)
+
+
+def _one_more(speed: FloatArray, rest: FloatArray, top: float, found: tuple[float, ...]) -> tuple[float, ...]:
+    """The break points with the best one more, then each moved in turn."""
+    grid = np.geomspace(LEAST_SHARE * top, 0.95 * top, GRID)
+    size, side = np.abs(speed), np.sign(speed)
+
+    def misfit(breaks: Sequence[float]) -> float:
+        w = hats(size, (0.0, *sorted(breaks), top)) * side[:, None]
+        w = np.column_stack([w, np.ones(len(w))])
+        left = rest - w @ np.linalg.lstsq(w, rest, rcond=None)[0]
+        return float(left @ left)
+
+    free = [v for v in grid if all(abs(np.log(v / b)) > 0.1 for b in found)]
+    if not free:
+        return found
+    chosen = [*found, min(free, key=lambda v: misfit([*found, v]))]
+    for k in range(len(chosen)):
+        chosen[k] = _moved(chosen, k, top, misfit)
+    return tuple(sorted(float(v) for v in chosen))
+
+
+def _moved(
+    chosen: Sequence[float], place: int, top: float, misfit: Callable[[Sequence[float]], float]
+) -> float:
+    """One break point, refined between the grid's neighbours."""
+    from scipy.optimize import minimize_scalar
+
+    others = [v for k, v in enumerate(chosen) if k != place]
+    here = float(np.log(chosen[place]))
+    step = float(np.log(0.95 / LEAST_SHARE)) / (GRID - 1)
+    low, high = here - step, min(here + step, float(np.log(0.97 * top)))
+    result = minimize_scalar(
+        lambda x: misfit([*others, float(np.exp(x))]), bounds=(low, high), method="bounded"
+    )
+    new = float(np.exp(result.x))
+    apart = all(abs(np.log(new / v)) > 0.1 for v in others)
+    return new if apart and result.fun < misfit(chosen) else float(chosen[place])

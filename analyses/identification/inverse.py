@@ -1,0 +1,334 @@
+"""The inverse dynamic model of one or several records: inertia, friction, load, by joint least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.least_squares import NotTold, Solution, by_record, solve, told_apart
+from analyses.identification.rows import Rows, record_rows
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+GRAVITY_ROUNDS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed:
+    """A parameter that was not fitted: its value (SI, at the motor) and why."""
+
+    value: float
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFit:
+    """One record's part: rows, its relative residual under the joint model, what was used and noted."""
+
+    name: str
+    rows_in: int
+    rows_used: int
+    rows_at_rest: int
+    relative_residual: float
+    used: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointModel:
+    """The inverse dynamic model of all records together.
+
+    ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
+    and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor. With
+    ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry.
+
+    Attributes
+    ----------
+    names, values
+        What was fitted. ``fixed`` holds the rest with the reason.
+    standard_errors : array
+        As if the residual were white, as published for EMPS.
+    covariance : array
+        With the correlation of the residual in time, and with the scatter between records where there are
+        several; ``between`` is that scatter alone, by name, as a standard deviation of one record.
+    relative_residual : float
+        Norm of the residual over norm of the drive signal, after decimation, all records.
+    """
+
+    form: FrictionForm
+    names: tuple[str, ...]
+    values: FloatArray
+    standard_errors: FloatArray
+    covariance: FloatArray
+    between: Mapping[str, float]
+    fixed: Mapping[str, Fixed]
+    relative_residual: float
+    residual: FloatArray
+    records: tuple[RecordFit, ...]
+    recipe: Recipe
+    condition: float
+    singles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    knots_rad_s: tuple[float, ...] | None = None
+
+    def __getitem__(self, name: str) -> float:
+        if name in self.names:
+            return float(self.values[self.names.index(name)])
+        return self.fixed[name].value
+
+    @property
+    def rows_in(self) -> int:
+        """Rows of all records."""
+        return sum(record.rows_in for record in self.records)
+
+    @property
+    def rows_used(self) -> int:
+        """Rows of the regression."""
+        return sum(record.rows_used for record in self.records)
+
+
+def fit_records(
+    design: Design,
+    records: Sequence[Record],
+    *,
+    form: FrictionForm = "symmetric",
+    recipe: Recipe | None = None,
+    fixed: Mapping[str, float] | None = None,
+    gravity: bool = False,
+    knots_rad_s: Sequence[float] | None = None,
+) -> JointModel:
+    """Fit one inverse dynamic model to all records.
+
+    Each record counts with the inverse of its own residual variance. What the records do not tell apart is
+    kept at the design's value, and said.
+
+    Parameters
+    ----------
+    design : Design
+        Its constants make torques of currents or voltages; its values are kept for what is not told.
+    records : sequence of Record
+    form : {"symmetric", "per-direction"}
+    recipe : Recipe, optional
+        Filtering, skipping, decimation; by default that of each record's own period.
+    fixed : mapping, optional
+        Parameters held at a value (by the names of the model).
+    gravity : bool
+        Whether a moment ``m g l sin(output angle + offset)`` is to be found.
+    knots_rad_s : sequence of float, optional
+        Speeds (from 0) of a friction map in the place of dry and viscous friction.
+
+    Raises
+    ------
+    InputError
+        If a record lacks a signal, or nothing is left to fit.
+    NumericalError
+        If the rows are singular all the same.
+    """
+    if not records:
+        raise InputError("no record to identify from")
+    held = dict(fixed or {})
+    moments: Sequence[FloatArray | None] = [None] * len(records)
+    model: JointModel | None = None
+    for _ in range(GRAVITY_ROUNDS if gravity else 1):
+        blocks = [
+            record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots_rad_s)
+            for record, moment in zip(records, moments, strict=True)
+        ]
+        model = replace(_fitted(design, blocks, form, held), knots_rad_s=_as_knots(knots_rad_s))
+        if gravity:
+            moments = [
+                model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine for block in blocks
+            ]
+    assert model is not None
+    return model
+
+
+def _as_knots(knots_rad_s: Sequence[float] | None) -> tuple[float, ...] | None:
+    return None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
+
+
+def _fitted(
+    design: Design, blocks: Sequence[Rows], form: FrictionForm, held: Mapping[str, float]
+) -> JointModel:
+    names = blocks[0].names
+    unknown = sorted(set(held) - set(names))
+    if unknown:
+        raise InputError(f"{unknown[0]}: no parameter of this model; there are: {', '.join(names)}")
+    fixed = {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
+    free = tuple(name for name in names if name not in fixed)
+    w = np.concatenate([block.w for block in blocks])
+    kept, left = told_apart(w[:, [names.index(name) for name in free]], free)
+    for one in left:
+        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=_kept(one))
+    free = tuple(free[k] for k in kept)
+    if not free:
+        raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].record)
+    weights = np.ones(len(blocks))
+    solution = _joint(blocks, free, fixed, weights)
+    for _ in range(3 if len(blocks) > 1 else 0):
+        weights = _weights(blocks, solution, weights)
+        solution = _joint(blocks, free, fixed, weights)
+    negative = _negative(free, solution)
+    if negative:
+        again = {name: default_value(design, name) for name in negative}
+        model = _fitted(design, blocks, form, {**held, **again})
+        said = {
+            name: Fixed(
+                value=again[name], reason="would come out negative: not told, the design's value kept"
+            )
+            for name in negative
+        }
+        return replace(model, fixed={**model.fixed, **said})
+    return _model(blocks, free, fixed, form, solution, weights)
+
+
+def _kept(one: NotTold) -> str:
+    return f"{one}: the design's value kept"
+
+
+def _negative(names: tuple[str, ...], solution: Solution) -> list[str]:
+    """Parameters that no drive has negative, where the records give them so."""
+    signed = ("offset", "gravity_sin", "gravity_cos")
+    return [
+        name for name, value in zip(names, solution.values, strict=True) if value < 0.0 and name not in signed
+    ]
+
+
+def default_value(design: Design, name: str) -> float:
+    """The design's own value of a parameter of the model, at the motor."""
+    friction = design.friction
+    own = {
+        "inertia": design.inertia_kgm2,
+        "viscous": friction.viscous(1),
+        "dry": friction.dry_Nm(0.0, 1),
+        "offset": friction.offset_torque_Nm,
+        "viscous_forward": friction.viscous(1),
+        "dry_forward": friction.dry_Nm(0.0, 1),
+        "viscous_reverse": friction.viscous(-1),
+        "dry_reverse": friction.dry_Nm(0.0, -1),
+        "load_coefficient": friction.load_coefficient,
+    }
+    gravity = design.load.gravity
+    if gravity is not None:
+        own["gravity_sin"] = gravity.peak_Nm * float(np.cos(gravity.offset_rad))
+        own["gravity_cos"] = gravity.peak_Nm * float(np.sin(gravity.offset_rad))
+    own |= {f"map_{k}": point.torque_Nm for k, point in enumerate(friction.map(1))}
+    return own.get(name, 0.0)
+
+
+def _target(block: Rows, fixed: Mapping[str, Fixed]) -> FloatArray:
+    """The drive signal less what fixed parameters explain."""
+    y = block.y
+    for name, one in fixed.items():
+        y = y - one.value * block.w[:, block.names.index(name)]
+    return np.asarray(y)
+
+
+def _joint(
+    blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed], weights: FloatArray
+) -> Solution:
+    columns = [blocks[0].names.index(name) for name in free]
+    w = np.concatenate([g * block.w[:, columns] for g, block in zip(weights, blocks, strict=True)])
+    y = np.concatenate([g * _target(block, fixed) for g, block in zip(weights, blocks, strict=True)])
+    ends = tuple(np.cumsum([len(block.y) for block in blocks]).tolist())
+    try:
+        return solve(w, y, ends)
+    except np.linalg.LinAlgError:
+        raise NumericalError(f"the records do not tell {', '.join(free)} apart") from None
+
+
+def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) -> FloatArray:
+    """Inverse residual of each record, against the median so that the size of things stays."""
+    ends = np.cumsum([len(block.y) for block in blocks])
+    parts = np.split(solution.residual, ends[:-1])
+    sizes = np.array([np.sqrt(np.mean(part**2)) for part in parts]) / weights
+    middle = float(np.median(sizes))
+    if middle == 0.0:
+        return weights
+    return np.asarray(middle / np.maximum(sizes, 0.05 * middle))
+
+
+def _singles(
+    blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed], values: FloatArray
+) -> list[dict[str, tuple[float, float]]]:
+    """Each record fitted alone: value and standard error of what it tells, the rest held at ``values``."""
+    out = []
+    for block in blocks:
+        columns = [block.names.index(name) for name in free]
+        kept, _ = told_apart(block.w[:, columns], free)
+        own = tuple(free[k] for k in kept)
+        rest = {
+            name: Fixed(value=float(value), reason="told by other records")
+            for name, value in zip(free, values, strict=True)
+            if name not in own
+        }
+        found = _joint([block], own, {**fixed, **rest}, np.ones(1))
+        std = np.sqrt(np.diag(found.correlated))
+        out.append({n: (float(v), float(s)) for n, v, s in zip(own, found.values, std, strict=True)})
+    return out
+
+
+def _model(
+    blocks: Sequence[Rows],
+    free: tuple[str, ...],
+    fixed: Mapping[str, Fixed],
+    form: FrictionForm,
+    solution: Solution,
+    weights: FloatArray,
+) -> JointModel:
+    covariance, between, singles = solution.correlated, dict.fromkeys(free, 0.0), []
+    if len(blocks) > 1:
+        singles = _singles(blocks, free, fixed, solution.values)
+        scatter = by_record(singles, free)
+        between = {name: scatter[name][0] for name in free}
+        extra = [scatter[name][1] ** 2 for name in free]
+        covariance = covariance + np.diag(extra)
+    columns = [blocks[0].names.index(name) for name in free]
+    rests = [_target(block, fixed) - block.w[:, columns] @ solution.values for block in blocks]
+    residual = np.concatenate(rests)
+    drive = np.concatenate([block.y for block in blocks])
+    return JointModel(
+        form=form,
+        names=free,
+        values=solution.values,
+        standard_errors=np.sqrt(np.diag(solution.white)),
+        covariance=covariance,
+        between=between,
+        fixed=dict(fixed),
+        relative_residual=float(np.linalg.norm(residual) / np.linalg.norm(drive)),
+        residual=residual,
+        records=tuple(_part(block, rest) for block, rest in zip(blocks, rests, strict=True)),
+        recipe=blocks[0].recipe,
+        condition=solution.condition,
+        singles={name: tuple(one[name][0] if name in one else np.nan for one in singles) for name in free},
+    )
+
+
+def _part(block: Rows, rest: FloatArray) -> RecordFit:
+    return RecordFit(
+        name=block.record,
+        rows_in=block.rows_in,
+        rows_used=len(block.y),
+        rows_at_rest=block.rows_at_rest,
+        relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(block.y)),
+        used=block.used,
+        notes=block.notes,
+    )
+
+
+def held_out_residual(design: Design, model: JointModel, record: Record) -> float:
+    """Relative residual of a record that the model has not seen."""
+    gravity = "gravity_sin" in (*model.names, *model.fixed)
+    knots = model.knots_rad_s
+    block = record_rows(design, record, model.form, None, gravity=gravity, knots_rad_s=knots)
+    if gravity:
+        moment = model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine
+        block = record_rows(design, record, model.form, None, gravity=True, moment=moment, knots_rad_s=knots)
+    rest = block.y - block.w @ np.array([model[name] for name in block.names])
+    return float(np.linalg.norm(rest) / np.linalg.norm(block.y))

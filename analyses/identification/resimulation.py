@@ -1,0 +1,60 @@
+"""The design as it was written, read again and held against the records that it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.correlation.closed_loop import correlate_record
+from analyses.identification.dynamic import FrictionForm
+from analyses.identification.inverse import default_value
+from analyses.identification.refinement import has_command, output_name
+from analyses.identification.rows import record_rows
+from analyses.records.record import Record
+
+MOST_TICKS = 2_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resimulated:
+    """The relative error of one record's signal under the written design, and how it was found."""
+
+    record: str
+    signal: str
+    relative_error: float
+    how: str
+
+
+def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) -> tuple[Resimulated, ...]:
+    """Simulate a design with each record's own command, and compare the signal that tells most.
+
+    A record without a command is held against the torque that the design's own inertia and friction need for
+    its motion.
+    """
+    return tuple(
+        _simulated(design, record) if has_command(design, record) else _needed(design, record, form)
+        for record in records
+    )
+
+
+def _simulated(design: Design, record: Record) -> Resimulated:
+    name = output_name(design, record)
+    rows = int(MOST_TICKS * design.controller.period_s / record.period_s)
+    part = record if len(record) <= rows else record.slice(0, max(rows, 2))
+    how = f"{name}, simulated" if part is record else f"{name}, its first {len(part)} rows simulated"
+    found = correlate_record(design, part)[name]
+    return Resimulated(record=record.name, signal=name, relative_error=found.relative_error, how=how)
+
+
+def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:
+    points = design.friction.map(1)
+    knots = [point.speed_rad_s for point in points] if points else None
+    rows = record_rows(design, record, form, None, knots_rad_s=knots)
+    values = np.array([default_value(design, name) for name in rows.names])
+    error = float(np.linalg.norm(rows.y - rows.w @ values) / np.linalg.norm(rows.y))
+    return Resimulated(
+        record=record.name, signal="drive", relative_error=error, how="torque needed for its motion"
+    )

@@ -1,0 +1,256 @@
+"""The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.differentiation import Motion, decimated, filtered_motion
+from analyses.identification.dynamic import NAMES, FrictionForm, Recipe, base_columns
+from analyses.identification.hats import hats
+from analyses.records.consistency import place_of
+from analyses.records.prepare import period_of, prepared
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+REST_SHARE = 0.005
+REST_TIME_S = 0.03
+END_SHARE = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """Regressors ``w`` by ``names`` and drive ``y`` after decimation, rows at rest left out.
+
+    ``sine`` and ``cosine`` of the output angle keep all rows. ``used`` tells what each signal was
+    used for.
+    """
+
+    record: str
+    names: tuple[str, ...]
+    w: FloatArray
+    y: FloatArray
+    sine: FloatArray
+    cosine: FloatArray
+    rows_in: int
+    rows_at_rest: int
+    recipe: Recipe
+    used: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
+    """The published recipe, moved to another sampling period.
+
+    100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
+    at the start and, where a record ends in motion, at the end. The record of the EMPS benchmark has the
+    published recipe to the letter, which keeps the end.
+    """
+    period = period_of(record)
+    if cutoff_hz is None and decimation is None and is_benchmark(record):
+        return Recipe()
+    cutoff = min(100.0, 0.1 / period) if cutoff_hz is None else cutoff_hz
+    factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation
+    skip = max(round(0.049 / period), 5)
+    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip)
+
+
+def is_benchmark(record: Record) -> bool:
+    """Whether a record is that of the EMPS benchmark, which carries its force gain."""
+    return "gtau" in record.constants
+
+
+def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool]:
+    """The drive torque (force) of a record: values, signal, in words, and whether kE w is still to be taken
+    off.
+
+    Raises
+    ------
+    InputError
+        If the record holds no drive signal that the design makes a torque of.
+    """
+    motor, signals = design.effective_motor, record.signals
+    constant, gain, ohm = motor.torque_constant_Nm_A, motor.source_gain_Nm_V, motor.resistance_ohm
+    if "force" in signals and design.axis == "linear":
+        return record["force"], "force", "recorded force", False
+    for name in ("current", "current_reference"):
+        if name in signals and constant is not None:
+            return (
+                np.asarray(constant * record[name]),
+                name,
+                f"torque kM i, kM = {constant:g} N m/A",
+                False,
+            )
+    for name in ("voltage", "voltage_reference"):
+        if name in signals and gain is not None:
+            told = f"source gain {gain:g} times the {name.replace('_', ' ')}"
+            return np.asarray(gain * record[name]), name, told, False
+        if name in signals and constant is not None and ohm is not None:
+            told = f"kM (u - kE w)/R of the {name.replace('_', ' ')}, without the inductance"
+            return np.asarray(constant / ohm * record[name]), name, told, True
+    raise InputError(
+        "no drive signal: force, current (with kM), or voltage (with a source gain, or kM and R)",
+        where=record.name,
+    )
+
+
+def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
+    """Position, speed and acceleration at the motor, from the position or, without one, from the speed."""
+    period = period_of(record)
+    place = place_of(design, record)
+    if place is not None:
+        made = filtered_motion(place[1], period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order)
+        return made, place[0]
+    rate = "velocity" if design.axis == "linear" else "speed"
+    if rate not in record.signals:
+        wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
+        raise InputError(f"no motion: {wanted} is needed", where=record.name)
+    made = filtered_motion(record[rate], period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order)
+    whole = np.concatenate([[0.0], np.cumsum(made.position[:-1] * period)])
+    return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
+
+
+def moment_of(
+    design: Design, record: Record, output_angle: FloatArray, *, gravity: bool = True
+) -> tuple[FloatArray, str]:
+    """The moment at the output and the signal that it comes from.
+
+    Without a recorded one, that of the design's own slope and (with ``gravity``) pendulum at the recorded
+    angle; the signal is then empty.
+    """
+    name = "load_force" if design.axis == "linear" else "torque"
+    if name in record.signals:
+        return record[name], name
+    load = design.load
+    moment = load.moment_slope_Nm_rad * output_angle
+    if gravity and load.gravity is not None:
+        moment = moment + load.gravity.peak_Nm * np.sin(output_angle + load.gravity.offset_rad)
+    return np.asarray(moment), ""
+
+
+def _friction_columns(
+    motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
+) -> tuple[list[str], FloatArray]:
+    """Names and columns of inertia, friction and offset."""
+    if knots_rad_s is None:
+        return list(NAMES[form]), base_columns(motion, form)
+    side = np.sign(motion.velocity)
+    table = hats(np.abs(motion.velocity), knots_rad_s) * side[:, None]
+    names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
+    return names, np.column_stack([motion.acceleration, table, np.ones_like(side)])
+
+
+def record_rows(
+    design: Design,
+    record: Record,
+    form: FrictionForm,
+    recipe: Recipe | None,
+    *,
+    gravity: bool = False,
+    moment: FloatArray | None = None,
+    knots_rad_s: Sequence[float] | None = None,
+) -> Rows:
+    """Make the rows of one record.
+
+    Parameters
+    ----------
+    gravity : bool
+        Adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output.
+    knots_rad_s : sequence of float, optional
+        Speeds of a friction map, which takes the place of the form's dry and viscous friction.
+    moment : array, optional
+        That moment after decimation, as found so far, for the load's share of the friction.
+    """
+    record = prepared(record)
+    recipe = recipe_for(record) if recipe is None else recipe
+    motion, place = motion_of(design, record, recipe)
+    drive, driven_by, told, back_emf = drive_of(design, record)
+    names, columns = _friction_columns(motion, form, knots_rad_s)
+    used = {place: "motion", driven_by: f"drive: {told}"}
+    if back_emf:
+        drive = drive - _damping(design) * motion.velocity
+    angle = motion.position / design.total_ratio
+    free = design.load.path == "back-drivable"
+    if gravity and not free:
+        raise InputError(
+            'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
+        )
+    known, source = moment_of(design, record, angle, gravity=not gravity)
+    if source:
+        used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
+    if free:
+        drive = drive + known / design.total_ratio
+    sines = np.column_stack([np.sin(angle), np.cos(angle)])
+    table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
+    moving = ~_at_rest(motion.velocity, period_of(record))
+    used_part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
+    table, moving = table[used_part], moving[used_part]
+    rows = decimated(table, recipe.decimation)
+    keep = _kept_rows(moving, recipe.decimation)
+    width = columns.shape[1]
+    sine, cosine, side, known, y = rows[:, width:].T
+    whole = known if moment is None else known + moment
+    w = np.column_stack([rows[:, :width], np.abs(whole) * side])
+    names.append("load_coefficient")
+    if gravity:
+        names += ["gravity_sin", "gravity_cos"]
+        share = -1.0 / design.total_ratio if free else 0.0
+        w = np.column_stack([w, share * sine, share * cosine])
+    return Rows(
+        record=record.name,
+        names=tuple(names),
+        w=w[keep],
+        y=y[keep],
+        sine=sine,
+        cosine=cosine,
+        rows_in=len(record),
+        rows_at_rest=int(np.count_nonzero(~keep)),
+        recipe=recipe,
+        used=used,
+        notes=(*record.notes, f"{place} and {told}"),
+    )
+
+
+def _end_skip(motion: Motion, recipe: Recipe) -> int:
+    """Samples to leave out at the end: those of the recipe, where the record ends in motion."""
+    speed = np.abs(motion.velocity)
+    moving = float(speed[-1]) > END_SHARE * float(np.max(speed))
+    return recipe.skip_end_samples if moving and len(speed) > 4 * recipe.skip_end_samples else 0
+
+
+def _damping(design: Design) -> float:
+    """What the back-EMF of a motor on a voltage adds to the viscous friction, kM kE / R."""
+    motor = design.effective_motor
+    constant, back, ohm = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad, motor.resistance_ohm
+    assert constant is not None
+    assert ohm is not None
+    return constant * (constant if back is None else back) / ohm
+
+
+def _at_rest(velocity: FloatArray, period_s: float) -> NDArray[np.bool_]:
+    """Stretches of 30 ms or more below 0.5 % of the largest speed: there the friction is not that of
+    sliding."""
+    slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int8), [0]])))
+    out = np.zeros(len(velocity), dtype=bool)
+    least = max(round(REST_TIME_S / period_s), 6)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if stop - start >= least:
+            out[start:stop] = True
+    return out
+
+
+def _kept_rows(moving: NDArray[np.bool_], factor: int) -> NDArray[np.bool_]:
+    """Rows after decimation that no sample at rest lies close to."""
+    count = -(-len(moving) // factor)
+    first = len(moving) - factor * (count - 1) - 1
+    ends = first + factor * np.arange(count)
+    rest = np.concatenate([[0], np.cumsum(~moving)])
+    low, high = np.clip(ends - factor, 0, len(moving)), np.clip(ends + factor + 1, 0, len(moving))
+    return np.asarray(rest[high] == rest[low])

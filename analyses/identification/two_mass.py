@@ -1,0 +1,208 @@
+"""A two-mass drive from its frequency response: inertias, stiffness, damping, and their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError, NumericalError
+from analyses.identification.frequency import ComplexArray, Lines
+
+FloatArray = NDArray[np.float64]
+
+NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
+"""J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
+FLOORS = {"damping": 1e-6, "viscous": 1e-6, "load_viscous": 1e-6}
+COVERAGE = 1.959963984540054
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoMass:
+    """The two-mass drive that fits the lines best, with 95 % intervals.
+
+    ``misfit`` is the root of the mean squared residual over its noise: near 1 the model explains the lines.
+    Where it is larger the errors are widened by it. ``resonance_rad_s`` and ``antiresonance_rad_s`` are those
+    without damping.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    fixed: Mapping[str, float]
+    reduction: float
+    misfit: float
+    lines: int
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)]) if name in self.names else self.fixed[name]
+
+    def std(self, name: str) -> float:
+        """Standard error of a parameter; 0 where it was held."""
+        if name not in self.names:
+            return 0.0
+        k = self.names.index(name)
+        return float(np.sqrt(self.covariance[k, k]))
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of a parameter."""
+        half = COVERAGE * self.std(name)
+        return self[name] - half, self[name] + half
+
+    @property
+    def antiresonance_rad_s(self) -> tuple[float, float]:
+        """sqrt(k/J_l), and its standard error."""
+        return self._derived(lambda p: float(np.sqrt(p["stiffness"] / p["load_inertia"])))
+
+    @property
+    def resonance_rad_s(self) -> tuple[float, float]:
+        """sqrt(k (1/J_l + 1/(J_m N_c^2))), and its standard error."""
+        n2 = self.reduction**2
+        return self._derived(
+            lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + 1 / (p["motor_inertia"] * n2))))
+        )
+
+    def _derived(self, of) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+        own = {name: self[name] for name in NAMES}
+        middle = of(own)
+        slopes = []
+        for name in self.names:
+            step = 1e-6 * max(abs(own[name]), 1e-300)
+            slopes.append((of({**own, name: own[name] + step}) - middle) / step)
+        g = np.array(slopes)
+        return middle, float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
+
+
+def angle_responses(omega: FloatArray, p: Mapping[str, float], n: float) -> tuple[ComplexArray, ComplexArray]:
+    """Motor angle and load angle over motor torque (model.md section 6, without play).
+
+    ``J_m s^2 th + Cv s th + T/n = torque``, ``J_l s^2 phi + Cv_l s phi = T``, ``T = (k + c s)(th/n - phi)``.
+    """
+    s = 1j * omega
+    spring = p["stiffness"] + p["damping"] * s
+    load = p["load_inertia"] * s**2 + p["load_viscous"] * s
+    motor = p["motor_inertia"] * s**2 + p["viscous"] * s
+    both = motor * (load + spring) + spring * load / n**2
+    return np.asarray((load + spring) / both), np.asarray(spring / n / both)
+
+
+def fit_two_mass(
+    lines: Lines,
+    start: Mapping[str, float],
+    reduction: float,
+    *,
+    torque: str = "torque",
+    motor: str = "angle",
+    load: str | None = None,
+    fixed: Mapping[str, float] | None = None,
+) -> TwoMass:
+    """Fit the two-mass drive to the lines, by maximum likelihood with noise on all signals.
+
+    Each line's residual ``th - G torque`` is divided by its own standard deviation, which the scatter between
+    periods gives (errors in variables; Pintelon and Schoukens, System Identification, 2nd ed., section 9.11).
+
+    Parameters
+    ----------
+    lines : Lines
+        Of the motor torque, the motor angle and, where recorded, the load's angle.
+    start : mapping
+        Starting values by the names of ``NAMES``.
+    reduction : float
+        N_c, up to the coupling.
+    fixed : mapping, optional
+        Parameters that are held.
+
+    Raises
+    ------
+    InputError
+        For a start that is not positive.
+    NumericalError
+        If the fit does not converge or the lines do not tell a parameter.
+    """
+    from scipy.optimize import least_squares
+
+    held = dict(fixed or {})
+    names = tuple(name for name in NAMES if name not in held)
+    scale = _scales(start, names, reduction)
+    outputs = [(motor, 0)] + ([(load, 1)] if load is not None else [])
+
+    def unpacked(q: FloatArray) -> dict[str, float]:
+        own = dict(zip(names, np.abs(q * scale).tolist(), strict=True))
+        return {**held, **own}
+
+    def residual(q: FloatArray) -> FloatArray:
+        g = angle_responses(lines.omega_rad_s, unpacked(q), reduction)
+        parts = [_line_residual(lines, output, torque, g[k]) for output, k in outputs]
+        both = np.concatenate(parts)
+        return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
+
+    begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
+    found = least_squares(residual, begin, x_scale="jac", max_nfev=400, method="lm")
+    if not found.success:
+        raise NumericalError(f"the two-mass fit does not converge: {found.message}")
+    size = np.linalg.norm(found.jac, axis=0)
+    if np.any(size == 0.0):
+        raise NumericalError(f"the lines do not tell {names[int(np.argmin(size))]}; hold it with --fix")
+    freedom = max(len(found.fun) - len(names), 1)
+    misfit = float(np.sqrt(2.0 * found.cost / freedom))
+    inverse = np.linalg.inv((found.jac / size).T @ (found.jac / size)) / np.outer(size, size)
+    few = (lines.periods - 1) / max(lines.periods - 2, 1)
+    covariance = inverse * few * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
+    own = unpacked(found.x)
+    return TwoMass(
+        names=names,
+        values=np.array([own[name] for name in names]),
+        covariance=np.asarray(covariance),
+        fixed=held,
+        reduction=reduction,
+        misfit=misfit,
+        lines=len(lines.omega_rad_s) * len(outputs),
+    )
+
+
+def _scales(start: Mapping[str, float], names: tuple[str, ...], n: float) -> FloatArray:
+    """What each parameter is measured by: its start, or a small part of what the others make critical."""
+    for name in ("motor_inertia", "load_inertia", "stiffness"):
+        if not start.get(name, 0.0) > 0.0:
+            raise InputError(f"{name} = {start.get(name)}: the fit needs a positive start")
+    natural = np.sqrt(start["stiffness"] / start["load_inertia"])
+    size = {
+        "damping": 0.01 * start["stiffness"] / natural,
+        "viscous": 0.01 * start["motor_inertia"] * natural,
+        "load_viscous": 0.01 * start["load_inertia"] * natural,
+    }
+    return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
+
+
+def _line_residual(lines: Lines, output: str, by: str, g: ComplexArray) -> ComplexArray:
+    k, j = lines.names.index(output), lines.names.index(by)
+    n = lines.noise
+    variance = (
+        np.real(n[:, k, k]) + np.abs(g) ** 2 * np.real(n[:, j, j]) - 2.0 * np.real(n[:, k, j] * g.conj())
+    )
+    floor = 1e-24 * np.abs(lines.means[k]) ** 2
+    return np.asarray((lines.means[k] - g * lines.means[j]) / np.sqrt(np.maximum(variance, floor)))
+
+
+def start_of(
+    lines: Lines, reduction: float, *, torque: str = "torque", motor: str = "angle"
+) -> dict[str, float]:
+    """Starting values from the response itself: its lowest and highest part, its valley and its peak.
+
+    Below the antiresonance the whole inertia moves, above the resonance the motor's alone.
+    """
+    k, j = lines.names.index(motor), lines.names.index(torque)
+    inertia = np.abs(lines.means[j] / (lines.omega_rad_s**2 * lines.means[k]))
+    order = np.argsort(lines.omega_rad_s)
+    inertia, omega = inertia[order], lines.omega_rad_s[order]
+    third = max(len(omega) // 8, 2)
+    whole, own = float(np.median(inertia[:third])), float(np.median(inertia[-third:]))
+    valley = float(omega[int(np.argmax(inertia))])
+    behind = max(whole - own, 0.05 * whole) * reduction**2
+    return {
+        "motor_inertia": min(own, 0.95 * whole),
+        "load_inertia": behind,
+        "stiffness": behind * valley**2,
+    }

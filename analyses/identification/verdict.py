@@ -1,0 +1,141 @@
+"""What an identification is held to before it may become a design, item by item."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from actuator_lti.design.model import Design
+from analyses.identification.inverse import JointModel, default_value
+from analyses.records.consistency import Finding
+from analyses.records.factors import named_factor
+
+RESIDUAL_LIMIT = 0.20
+"""Largest relative residual that is taken without being told to."""
+LARGEST_FACTOR = 3.0
+ROWS_EACH = 10
+HELD_OUT_FACTOR = 1.5
+HELD_OUT_EXTRA = 0.02
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    """One thing that must hold: a share of the drive signal against its limit, or a statement."""
+
+    id: str
+    label: str
+    passed: bool | None
+    value: float | None = None
+    limit: float | None = None
+    reason: str = ""
+
+
+def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
+    """Whether a record agrees with itself and with the design's limits."""
+    wrong = [one for one in findings if one.passed is False]
+    reason = "; ".join(f"{one.subject}: {one.text}" for one in wrong)
+    return Item(
+        id=f"inputs-{record}",
+        label=f"{record} agrees with itself and the design",
+        passed=not wrong if findings else None,
+        reason=reason or ("" if findings else "nothing to hold it against"),
+    )
+
+
+def residual_item(residual: float, limit: float) -> Item:
+    """The relative residual of the fit."""
+    return Item(
+        id="residual",
+        label="Relative residual of the fit",
+        passed=residual <= limit,
+        value=residual,
+        limit=limit,
+        reason="" if residual <= limit else "the model does not explain these records",
+    )
+
+
+def rows_item(rows: int, parameters: int) -> Item:
+    """Whether there are enough rows for an error that can be trusted."""
+    enough = rows >= ROWS_EACH * parameters
+    why = f"{rows} rows for {parameters} parameters, {ROWS_EACH * parameters} wanted: take a longer record"
+    label = "Rows enough for the parameters"
+    return Item(id="rows", label=label, passed=enough, reason="" if enough else why)
+
+
+def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:
+    """The relative residual of a record that the fit has not seen, against that of the fit."""
+    allowed = min(HELD_OUT_FACTOR * fit + HELD_OUT_EXTRA, limit)
+    return Item(
+        id=f"held-out-{record}",
+        label=f"Relative residual of {record}, not seen by the fit",
+        passed=residual <= allowed,
+        value=residual,
+        limit=allowed,
+        reason="" if residual <= allowed else "the fit does not carry over to it",
+    )
+
+
+def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
+    """How far the written design is from a record."""
+    return Item(
+        id=f"written-{record}",
+        label=f"Written design against {record}, {how}",
+        passed=error <= limit,
+        value=error,
+        limit=limit,
+        reason="" if error <= limit else "the written design does not drive as the record does",
+    )
+
+
+def size_item(design: Design, model: JointModel) -> Item:
+    """Identified values against those that the design had: a common factor is no drive's doing."""
+    ratios = {}
+    for name in model.names:
+        before = default_value(design, name)
+        if name.partition("_")[0] in ("inertia", "viscous", "dry") and before > 0.0:
+            ratios[name] = model[name] / before
+    return sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
+
+
+def sizes_item(ratios: Mapping[str, float], more: Mapping[float, str], leading: str) -> Item:
+    """Identified values over those that the design had.
+
+    Parameters
+    ----------
+    more : mapping
+        Further factors that may explain a common ratio.
+    leading : str
+        The value that may not be off by more than a factor of three on its own.
+    """
+    common = _common(ratios, more)
+    own = ratios.get(leading, 1.0)
+    reason = ""
+    if common:
+        reason = f"all identified values are about {common[0]:.4g} times the design's: factor {common[1]}"
+    elif not 1.0 / LARGEST_FACTOR <= own <= LARGEST_FACTOR:
+        factor = named_factor(own) if own else None
+        told = f": factor {factor}" if factor else ""
+        reason = f"{leading} is {own:.3g} times the design's{told}"
+    return Item(
+        id="size",
+        label="Identified values are of the design's size",
+        passed=(not reason) if ratios else None,
+        reason=reason,
+    )
+
+
+def _common(ratios: Mapping[str, float], more: Mapping[float, str]) -> tuple[float, str] | None:
+    """A named factor that two or more ratios share."""
+    found = {name: named_factor(ratio, more) for name, ratio in ratios.items()}
+    names = {one for one in found.values() if one}
+    if len(ratios) >= 2 and len(names) == 1 and all(found.values()):
+        product = 1.0
+        for ratio in ratios.values():
+            product *= ratio
+        return product ** (1.0 / len(ratios)), names.pop()
+    return None
+
+
+def passed(items: Sequence[Item]) -> bool:
+    """Whether nothing failed."""
+    return all(item.passed is not False for item in items)

@@ -1,0 +1,265 @@
+"""Does a record agree with itself and with the drive it is said to come from?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.records.factors import explaining, named_factor
+from analyses.records.record import FloatArray, Record
+
+RATE_TOLERANCE = 0.02
+ALIKE = 0.9
+OVER = 1.2
+ELECTRICAL_FACTOR = 2.0
+SMOOTH_HZ = 20.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One thing that was looked at: what, whether it agrees (None: it could not be told), and in words."""
+
+    subject: str
+    passed: bool | None
+    text: str
+
+
+def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
+    """Hold a record against itself and against the limits of the design.
+
+    Looked at, where recorded: the speed against the rate of the angle (this also tells a clock that is off),
+    angle and output angle against the reduction, voltage against ``R i + kE w``, the command against what
+    followed it, and current, speed, voltage, supply and load against the design's limits. A ratio that a
+    known factor explains is named.
+    """
+    checks: tuple[Callable[[Design, Record], Finding | None], ...] = (
+        _rate,
+        _reduction,
+        _electrical,
+        _command,
+        _current_limit,
+        _speed_limit,
+        _voltage_limit,
+        _supply,
+        _load,
+    )
+    return tuple(found for check in checks if (found := check(design, record)) is not None)
+
+
+def place_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
+    """The position at the motor and the signal that it comes from; None where none is recorded."""
+    if design.axis == "linear":
+        return ("position", record["position"]) if "position" in record.signals else None
+    if "angle" in record.signals:
+        return "angle", record["angle"]
+    if "output_angle" in record.signals:
+        return "output_angle", design.total_ratio * record["output_angle"]
+    return None
+
+
+def _smooth(record: Record, values: FloatArray) -> FloatArray:
+    """A signal without its fast part, no phase; the same filter for all signals that are compared."""
+    from scipy.signal import butter, sosfiltfilt
+
+    share = 2.0 * SMOOTH_HZ * record.period_s
+    if share >= 0.5 or len(values) < 60:
+        return values
+    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values), dtype=np.float64)
+
+
+def _inner(values: FloatArray) -> FloatArray:
+    """Without the twentieth part at both ends, where a filter starts and stops."""
+    cut = len(values) // 20
+    return values[cut : len(values) - cut] if cut else values
+
+
+def _ratio(y: FloatArray, x: FloatArray) -> tuple[float, float]:
+    """Slope of y over x through zero, and how alike they are (cosine); zeros for a flat signal."""
+    xx, yy = float(x @ x), float(y @ y)
+    if xx == 0.0 or yy == 0.0:
+        return 0.0, 0.0
+    return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
+
+
+def _rate(design: Design, record: Record) -> Finding | None:
+    place = place_of(design, record)
+    name = "velocity" if design.axis == "linear" else "speed"
+    if place is None or name not in record.signals:
+        return None
+    rate = _inner(np.gradient(_smooth(record, place[1]), record.time_s))
+    if not np.any(rate):
+        return None
+    ratio, alike = _ratio(_inner(_smooth(record, record[name])), rate)
+    subject = f"{name} against the rate of the {place[0]}"
+    if abs(alike) < ALIKE:
+        return Finding(
+            subject=subject,
+            passed=False,
+            text=f"they are not alike (cosine {alike:.2f}){_other(record, name, rate)}",
+        )
+    off = abs(ratio - 1.0)
+    said = f"the {name} is {ratio:.4g} times the rate of the {place[0]}"
+    if off <= RATE_TOLERANCE:
+        return Finding(subject=subject, passed=True, text=f"{said}: one clock, one scale")
+    factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
+    if factor is not None:
+        return Finding(subject=subject, passed=False, text=f"{said}: factor {factor}")
+    return Finding(
+        subject=subject,
+        passed=False,
+        text=f"{said}: a clock {100.0 * (ratio - 1.0):+.2g} % off, or the scale of one of them",
+    )
+
+
+def _other(record: Record, name: str, rate: FloatArray) -> str:
+    """The signal that is more like the rate, if there is one: two columns are swapped."""
+    for other, values in record.signals.items():
+        if other in (name, "angle", "output_angle", "position"):
+            continue
+        if abs(_ratio(_inner(_smooth(record, values)), rate)[1]) > 0.97:
+            return f"; {other} is: are the columns of {name} and {other} swapped?"
+    return ""
+
+
+def _reduction(design: Design, record: Record) -> Finding | None:
+    if not {"angle", "output_angle"} <= set(record.signals) or design.axis == "linear":
+        return None
+    a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
+    ratio, alike = _ratio(a, design.total_ratio * b)
+    if abs(alike) < ALIKE:
+        return Finding(subject="angle against output angle", passed=False, text="they are not alike")
+    passed = abs(ratio - 1.0) <= RATE_TOLERANCE
+    factor = None if passed else named_factor(ratio, {design.total_ratio: "the reduction, counted twice"})
+    text = f"the motor angle is {ratio:.4g} times the output angle and the reduction" + (
+        f": factor {factor}" if factor else ""
+    )
+    return Finding(subject="angle against output angle", passed=passed, text=text)
+
+
+def _electrical(design: Design, record: Record) -> Finding | None:
+    motor = design.effective_motor
+    if motor.resistance_ohm is None or motor.back_emf_constant_Vs_rad is None:
+        return None
+    if not {"voltage", "current", "speed"} <= set(record.signals):
+        return None
+    u, i, w = (_inner(_smooth(record, record[name])) for name in ("voltage", "current", "speed"))
+    table = np.column_stack([motor.resistance_ohm * i, motor.back_emf_constant_Vs_rad * w])
+    size = np.linalg.norm(table, axis=0)
+    if not np.all(size > 0.03 * np.linalg.norm(u)) or np.linalg.cond(table / size) > 100.0:
+        return _electrical_size(u, table)
+    found = np.linalg.lstsq(table, u, rcond=None)[0]
+    parts = []
+    for name, ratio in zip(("R i", "kE w"), found, strict=True):
+        if not 1.0 / ELECTRICAL_FACTOR < ratio < ELECTRICAL_FACTOR:
+            factor = named_factor(1.0 / ratio) if ratio else None
+            parts.append(f"{name} counts {ratio:.3g} times" + (f": factor {factor}" if factor else ""))
+    told = "; ".join(parts) or f"R counts {found[0]:.3g} times, kE {found[1]:.3g} times"
+    return Finding(subject="voltage against R i + kE w", passed=not parts, text=told)
+
+
+def _electrical_size(u: FloatArray, table: FloatArray) -> Finding | None:
+    """Where the record does not tell R from kE: whether their sum is of the size of the voltage."""
+    ratio, alike = _ratio(table.sum(axis=1), u)
+    if not abs(alike) > 0.5:
+        return None
+    passed = 1.0 / 3.0 < ratio < 3.0
+    factor = None if passed else named_factor(ratio)
+    text = f"R i + kE w is {ratio:.3g} times the voltage" + (f": factor {factor}" if factor else "")
+    return Finding(subject="voltage against R i + kE w", passed=passed, text=text)
+
+
+def _command(design: Design, record: Record) -> Finding | None:
+    """A command that is followed at all is followed about one to one, unless a factor is wrong."""
+    followed = (
+        ("position_reference", "position"),
+        ("reference", "output_angle"),
+        ("reference", "angle"),
+        ("speed_reference", "speed"),
+        ("velocity_reference", "velocity"),
+        ("current_reference", "current"),
+        ("voltage_reference", "voltage"),
+    )
+    for command, answer in followed:
+        if command not in record.signals or answer not in record.signals:
+            continue
+        values = record[answer]
+        if (command, answer) == ("reference", "angle"):
+            values = values / design.total_ratio
+        a, b = (part - part[0] for part in (values, record[command]))
+        ratio, alike = _ratio(a, b)
+        if abs(alike) < 0.7:
+            return Finding(
+                subject=f"{answer} against its command", passed=None, text=f"cosine {alike:.2f}: not followed"
+            )
+        factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
+        wrong = factor is not None and not 0.5 < ratio < 1.5
+        text = f"{answer} is {ratio:.4g} times {command}" + (f": factor {factor}" if wrong else "")
+        return Finding(subject=f"{answer} against its command", passed=not wrong, text=text)
+    return None
+
+
+def _within(subject: str, what: str, found: float, limit: float, unit: str) -> Finding | None:
+    """A largest value against a limit of the design."""
+    if not isfinite(limit) or limit <= 0.0:
+        return None
+    passed = found <= OVER * limit
+    text = f"{what} up to {found:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
+    if not passed:
+        factor = explaining(found / limit, unit)
+        times = f", {found / limit:.3g} times"
+        text += times + (f": factor {factor}" if factor else "; is the unit right?")
+    return Finding(subject=subject, passed=passed, text=text)
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.quantile(np.abs(values), 0.999))
+
+
+def _current_limit(design: Design, record: Record) -> Finding | None:
+    if "current" not in record.signals:
+        return None
+    motor, limits = design.effective_motor, design.limits
+    limit = limits.peak_current_A
+    if not isfinite(limit) and motor.resistance_ohm is not None:
+        limit = 2.0 * limits.voltage_V / motor.resistance_ohm
+    return _within("current against its limit", "current", _largest(record["current"]), limit, "A")
+
+
+def _speed_limit(design: Design, record: Record) -> Finding | None:
+    name, unit = ("velocity", "m/s") if design.axis == "linear" else ("speed", "rad/s")
+    if name not in record.signals:
+        return None
+    kE = design.effective_motor.back_emf_constant_Vs_rad
+    limit = min(design.limits.speed_rad_s, inf if kE is None else design.limits.voltage_V / kE)
+    return _within(f"{name} against its limit", name, _largest(record[name]), limit, unit)
+
+
+def _voltage_limit(design: Design, record: Record) -> Finding | None:
+    if "voltage" not in record.signals:
+        return None
+    limit = design.limits.voltage_V
+    if "supply" in record.signals:
+        limit = float(np.max(record["supply"]))
+    return _within("voltage against the supply", "voltage", _largest(record["voltage"]), limit, "V")
+
+
+def _supply(design: Design, record: Record) -> Finding | None:
+    if "supply" not in record.signals:
+        return None
+    level, nominal = float(np.median(record["supply"])), design.limits.voltage_V
+    ratio = level / nominal if isfinite(nominal) else 1.0
+    passed = 0.4 < ratio < 1.6
+    factor = None if passed else named_factor(ratio)
+    text = f"supply {level:.4g} V, the design's {nominal:.4g} V" + (f": factor {factor}" if factor else "")
+    return Finding(subject="supply", passed=passed, text=text)
+
+
+def _load(design: Design, record: Record) -> Finding | None:
+    name, unit = ("load_force", "N") if design.axis == "linear" else ("torque", "N m")
+    if name not in record.signals:
+        return None
+    return _within("load", "load", _largest(record[name]), design.load.moment_max_Nm, unit)

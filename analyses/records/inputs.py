@@ -1,0 +1,81 @@
+"""The account of a file's columns, and the layout that their names tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from analyses.records.naming import MEANINGS, NOT_NEEDED, is_time, signal_of, taken_apart
+from analyses.records.record import InputColumn
+from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
+
+NO_SIGNAL = "not named as a signal"
+
+
+def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ...]:
+    """Every column that was read, the time first, and those that were not."""
+
+    def name(column: str | int) -> str:
+        return columns[column - 1] if isinstance(column, int) and column <= len(columns) else str(column)
+
+    time = spec.time
+    found = []
+    if time.column is not None:
+        unit = f"ticks of {time.tick_s:g} s" if time.tick_s else time.unit
+        found.append(InputColumn(column=name(time.column), signal="time", unit=unit))
+    found += [
+        InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals
+    ]
+    read = {one.column for one in found}
+    return (*found, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
+
+
+def spec_of_names(
+    columns: Sequence[str], layout: CsvFormat | None = None
+) -> tuple[RecordSpec | None, Mapping[str, str]]:
+    """The layout that column names such as ``time_s`` and ``Motor speed [rpm]`` tell.
+
+    Returns
+    -------
+    RecordSpec or None
+        None without a time or without any signal that is known.
+    mapping
+        For each column that is not read: why.
+    """
+    layout = CsvFormat() if layout is None else layout
+    time: str | None = None
+    signals: dict[str, SignalColumn] = {}
+    why: dict[str, str] = {}
+    for column in columns:
+        if is_time(column):
+            if time is None:
+                time = column
+            else:
+                why[column] = f"the time is read from {time}"
+            continue
+        found = _signal(column, why)
+        if found is not None and found.name in signals:
+            why[column] = f"{MEANINGS[found.name]} is read from {signals[found.name].column}"
+        elif found is not None:
+            signals[found.name] = found
+    if time is None or not signals:
+        return None, why
+    unit = taken_apart(time).unit or "s"
+    read = TimeColumn(column=time, unit=unit)
+    return RecordSpec(format=layout, time=read, signals=tuple(signals.values())), why
+
+
+def _signal(column: str, why: dict[str, str]) -> SignalColumn | None:
+    """The signal of one column; where there is none, the reason is noted."""
+    parts = taken_apart(column)
+    if parts.unit is None:
+        known = parts.base in MEANINGS or any(signal_of(parts.base, u) for u in ("rad", "A", "V", "N*m"))
+        why[column] = "has no unit in its name" if known else "no name that is known"
+        return None
+    if NOT_NEEDED.get(parts.base) == parts.unit:
+        why[column] = "the position once more"
+        return None
+    found = signal_of(parts.base, parts.unit)
+    if found is None:
+        why[column] = "no name and unit that are known together"
+        return None
+    return SignalColumn(name=found.name, column=column, unit=parts.unit, value="rms" if parts.rms else "dc")

@@ -1,0 +1,49 @@
+"""Parquet files as records."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from analyses.records.record import FloatArray, Record
+from analyses.records.spec import RecordSpec
+from analyses.records.table_record import record_of_columns
+
+
+def read_parquet_record(path: str | Path, spec: RecordSpec, *, name: str | None = None) -> Record:
+    """Read columns of a Parquet file into a record; columns that hold no numbers are left out.
+
+    Raises
+    ------
+    InputError
+        Names the file, the column and the reason.
+    """
+    path = Path(path)
+    return record_of_columns(parquet_columns(path), spec, path, _digest(path), name=name)
+
+
+def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
+    """The columns of numbers by name; a value that is missing is NaN."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.ParquetFile(path, memory_map=False).read()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", where=str(path)) from None
+    except pa.ArrowException as error:
+        raise InputError(f"is no Parquet file: {error}", where=str(path)) from None
+    found = {}
+    for field in table.schema:
+        if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
+            column = table.column(field.name).cast(pa.float64(), safe=False)
+            found[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
+    return found
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

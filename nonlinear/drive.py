@@ -1,0 +1,131 @@
+"""The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.call import parameters
+from nonlinear._kernels.control import control_tick
+from nonlinear._kernels.tick import tick
+from nonlinear.parameters import design_row
+from nonlinear.setup import put_state
+from nonlinear.trajectory import ADVICE, STATUS, State
+
+Floats = npt.NDArray[np.float64]
+STATE_NAMES = {name[2:].lower(): place for name, place in vars(at).items() if name in at.STATE_NAMES}
+"""Numbers of the state by name."""
+
+
+class Drive:
+    """A drive with its whole state in one array of floats.
+
+    Parameters
+    ----------
+    design : Design
+    initial : State, optional
+        Default: everything at rest at zero.
+    load_Nm : float
+        Constant hinge moment, beside slope and gravity of the design.
+    friction_on, limits_on : bool
+        As in `nonlinear.simulate`.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> drive = Drive(load_design("ilr33-amber"))
+    >>> for _ in range(100):
+    ...     drive.step(0.01)
+    >>> twin = Drive(load_design("ilr33-amber"))
+    >>> twin.set(drive.get())
+    >>> drive.step(0.01), twin.step(0.01)
+    (None, None)
+    >>> bool((drive.get() == twin.get()).all())
+    True
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        initial: State | None = None,
+        load_Nm: float = 0.0,
+        *,
+        friction_on: bool = True,
+        limits_on: bool = True,
+    ) -> None:
+        row = design_row(design, friction_on=friction_on, limits_on=limits_on)
+        put_state(row, initial or State())
+        row[at.LOAD] = load_Nm
+        self.design = design
+        self._p, self._s = parameters(row)
+        self._io = np.zeros(at.IO_SIZE)
+
+    def step(self, command: float, load_Nm: float = 0.0, torque_Nm: float = 0.0) -> None:
+        """One tick of controller and plant.
+
+        Parameters
+        ----------
+        command : float
+            Of the outermost stage: rad or rad/s at the output shaft, A or V.
+        load_Nm : float
+            Hinge moment added to the constant one, held over the tick.
+        torque_Nm : float
+            Extra torque at the motor shaft.
+
+        Raises
+        ------
+        NumericalError
+            If the drive has failed: too many events in a tick, or a state without bound.
+        """
+        self._io[at.IN_COMMAND] = command
+        if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
+            self._p[at.RARE_LOAD] = 1.0
+            self._io[at.IN_LOAD], self._io[at.IN_TORQUE] = load_Nm, torque_Nm
+        status = STATUS[int(tick(self._p, self._s, self._io))]
+        if status != "ok":
+            raise NumericalError(f"tick {self.value('tick'):.0f} ({status}): {ADVICE[status]}")
+
+    def control(
+        self,
+        command: float,
+        current_A: float,
+        speed_rad_s: float,
+        angle_rad: float,
+        output_angle_rad: float | None = None,
+        bus_V: float | None = None,
+        output_speed_rad_s: float | None = None,
+    ) -> float:
+        """One tick of the controller alone on measured values (motor side); returns the voltage.
+
+        ``output_angle_rad`` and ``output_speed_rad_s`` are needed where the output's sensor is used,
+        ``bus_V`` where the supply is modelled.
+        """
+        if output_angle_rad is None:
+            output_angle_rad = angle_rad / self.design.total_ratio
+        if output_speed_rad_s is None:
+            output_speed_rad_s = speed_rad_s / self.design.total_ratio
+        measured = (current_A, speed_rad_s, angle_rad, output_angle_rad, output_speed_rad_s)
+        self._io[at.IN_COMMAND] = command
+        self._io[at.IN_CURRENT : at.IN_OUTPUT_SPEED + 1] = measured
+        self._io[at.IN_BUS] = self.design.limits.voltage_V if bus_V is None else bus_V
+        return float(control_tick(self._p, self._s, self._io))
+
+    def get(self) -> Floats:
+        """A copy of the whole state."""
+        return self._s.copy()
+
+    def set(self, state: Floats) -> None:
+        """Go on from a state that `get` of a drive of the same design returned."""
+        if state.shape != self._s.shape:
+            message = f"state of {state.size} numbers: this drive has {self._s.size}"
+            raise InputError(message, where=self.design.name)
+        self._s[:] = state
+
+    def value(self, name: str) -> float:
+        """A number of the state by its name in `STATE_NAMES`."""
+        if name not in STATE_NAMES:
+            raise InputError(f"state {name!r}: one of {', '.join(STATE_NAMES)}")
+        return float(self._s[STATE_NAMES[name]])

@@ -1,0 +1,141 @@
+"""An axis: from values to a place between 0 and 1, and the ticks that a reader can name.
+
+Tick labels are whole numbers to be read alone: no offset and no common factor beside the axis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from reports.numbers import plain_decade, short, to_minus
+
+MARGIN = 0.05
+MAX_SPAN_DECADES = 40.0
+
+
+@dataclass(kw_only=True)
+class Axis:
+    """One axis of a panel; limits that are not set follow the values drawn."""
+
+    log: bool = False
+    label: str = ""
+    low: float | None = None
+    high: float | None = None
+    ticks: Sequence[tuple[float, str]] | None = None
+    grid: bool = True
+    unit: str = ""
+    name: str = ""
+    reversed: bool = False
+    seen: list[float] = field(default_factory=list)
+
+    def limits(self, low: float | None = None, high: float | None = None) -> None:
+        """Set one or both ends."""
+        self.low = self.low if low is None else float(low)
+        self.high = self.high if high is None else float(high)
+
+    def see(self, values: Sequence[float] | np.ndarray) -> None:
+        """Let the limits take these values in, where they are not set."""
+        array = np.asarray(values, dtype=float)
+        array = array[np.isfinite(array) & (array > 0.0)] if self.log else array[np.isfinite(array)]
+        if len(array):
+            self.seen += [float(array.min()), float(array.max())]
+
+    def span(self) -> tuple[float, float]:
+        """Give both ends: those set, or the values with some room."""
+        low, high = min(self.seen, default=1.0 if self.log else 0.0), max(self.seen, default=1.0)
+        if self.log:
+            room = (high / low) ** MARGIN if high > low else 2.0
+            ends = (low / room, high * room)
+        else:
+            room = MARGIN * (high - low) or max(0.05 * abs(high), 1e-9)
+            ends = (low - room, high + room)
+        first = ends[0] if self.low is None else self.low
+        last = ends[1] if self.high is None else self.high
+        if not last > first:
+            last = first * 2.0 if self.log else first + max(abs(first), 1.0)
+        return first, last
+
+    def place(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Give the places of values, 0 at the low end and 1 at the high one; NaN where there is none."""
+        low, high = self.span()
+        array = np.asarray(values, dtype=float)
+        if self.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found = np.log(array / low) / math.log(high / low)
+            found = np.where(array > 0.0, found, np.where(array <= 0.0, -1e3, np.nan))
+        else:
+            found = (array - low) / (high - low)
+        return np.asarray(1.0 - found if self.reversed else found)
+
+    def named_ticks(self, room: int = 6) -> list[tuple[float, str]]:
+        """Give about ``room`` ticks with their labels."""
+        low, high = self.span()
+        if self.ticks is not None:
+            reach = 1e-9 * (high - low)
+            return [(v, words) for v, words in self.ticks if low - reach <= v <= high + reach]
+        return log_ticks(low, high, room) if self.log else linear_ticks(low, high, room)
+
+
+def linear_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]:
+    """Give ticks at multiples of 1, 2, 2.5 or 5 times a power of ten.
+
+    Examples
+    --------
+    >>> [words for _, words in linear_ticks(0.0, 1.0)]
+    ['0', '0.2', '0.4', '0.6', '0.8', '1']
+    >>> [words for _, words in linear_ticks(19.66001, 19.66009, 4)]
+    ['19.66002', '19.66004', '19.66006', '19.66008']
+    """
+    rough = (high - low) / max(room, 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(f * power for f in (1.0, 2.0, 2.5, 5.0, 10.0) if f * power >= rough * (1.0 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    values = [k * step for k in range(first, last + 1)]
+    return [(value, plain(value, step)) for value in values]
+
+
+def plain(value: float, step: float) -> str:
+    """Write a tick with the decimals that its step needs."""
+    if abs(value) < 1e-9 * step:
+        return "0"
+    largest = max(abs(value), step)
+    if largest >= 1e6 or largest < 1e-3:
+        return short(float(f"{value:.12g}"), 4)
+    power = math.floor(math.log10(step) + 1e-9)
+    decimals = max(0, -power + (round(step / 10.0**power, 6) == 2.5))
+    text = f"{value:.{decimals}f}"
+    return to_minus(text.rstrip("0").rstrip(".") if "." in text and decimals < 3 else text)
+
+
+def log_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]:
+    """Give ticks at decades, or at 1, 2 and 5 times a decade where there are few.
+
+    Examples
+    --------
+    >>> [words for _, words in log_ticks(0.3, 5000.0)]
+    ['1', '10', '100', '1k']
+    >>> [words for _, words in log_ticks(3.0, 60.0)]
+    ['5', '10', '20', '50']
+    """
+    decades = math.log10(high / low)
+    if decades < 0.7:
+        return [(v, words) for v, words in linear_ticks(low, high, max(room - 1, 3)) if v > 0.0]
+    every = max(1, math.ceil(decades / max(room, 1)))
+    mantissas = (1.0,) if decades > 2.2 else (1.0, 2.0, 5.0)
+    first, last = math.floor(math.log10(low) - 1e-9), math.ceil(math.log10(high) + 1e-9)
+    values = [m * 10.0**k for k in range(first, last + 1) if k % every == 0 for m in mantissas]
+    inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
+    return [(v, plain_decade(v)) for v in inside]
+
+
+def minor_ticks(axis: Axis) -> list[float]:
+    """Give the unnamed ticks of a logarithmic axis."""
+    low, high = axis.span()
+    if not axis.log or axis.ticks is not None or math.log10(high / low) > 5.5:
+        return []
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return [m * 10.0**k for k in powers for m in range(2, 10) if low < m * 10.0**k < high]

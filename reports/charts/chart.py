@@ -1,0 +1,219 @@
+"""A chart as data: columns of panels, each panel a list of items in the units of its axes.
+
+Whoever draws a figure puts items into panels; `reports.charts.svg` writes them.  Nothing here draws.
+A column is a picture of its own, so that columns stack where the screen is narrow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from reports.charts.axis import Axis
+
+Values = Sequence[float | None] | Sequence[float] | np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How an item is painted; ``colour`` is a key of `reports.charts.paint.COLOURS`."""
+
+    colour: str = "c1"
+    dash: int = 0
+    width: float = 1.9
+    opacity: float = 1.0
+    marker: str = ""
+    size: float = 5.0
+    hollow: bool = False
+    fill: str = ""
+    hatch: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curve:
+    """A line, its points, or both; None and NaN are gaps. ``label`` puts it into the legend."""
+
+    x: np.ndarray
+    y: np.ndarray
+    look: Look
+    label: str = ""
+    line: bool = True
+    stairs: bool = False
+    every: int = 1
+    read: bool = True
+    parameter: np.ndarray | None = None
+    id: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """A closed outline: a bar, an area, a region."""
+
+    rings: Sequence[tuple[np.ndarray, np.ndarray]]
+    look: Look
+    label: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """A line across the whole panel, at an x or a y; ``words`` stand at its end, inside the frame."""
+
+    at: float
+    across: Literal["x", "y"]
+    look: Look
+    words: str = ""
+    label: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band:
+    """A stretch of an axis, over the whole panel."""
+
+    low: float
+    high: float
+    across: Literal["x", "y"]
+    look: Look
+    label: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Note:
+    """Words near a point (kept off curves and inside the frame), or at a corner of the frame.
+
+    ``over``: on the point itself where that is free; ``pinned``: there in any case.
+    """
+
+    words: str
+    at: tuple[float, float] | None = None
+    corner: str = ""
+    colour: str = "ink"
+    bold: bool = False
+    pinned: bool = False
+    over: bool = False
+
+
+Item = Curve | Shape | Rule | Band | Note
+
+
+@dataclass(kw_only=True)
+class Panel:
+    """Axes with what stands in them."""
+
+    x: Axis = field(default_factory=Axis)
+    y: Axis = field(default_factory=Axis)
+    title: str = ""
+    equal: bool = False
+    by_point: bool = False
+    items: list[Item] = field(default_factory=list)
+
+    def curve(self, x: Values, y: Values, label: str = "", **options: Any) -> Curve:
+        """Draw a line; options are those of `Curve` and `Look`."""
+        own = {key: options.pop(key) for key in ("line", "stairs", "every", "read", "id") if key in options}
+        parameter = options.pop("parameter", None)
+        made = Curve(
+            x=numbers(x), y=numbers(y), look=Look(**options), label=label,
+            parameter=None if parameter is None else numbers(parameter), **own,
+        )  # fmt: skip
+        self.x.see(made.x[np.isfinite(made.y)])
+        self.y.see(made.y)
+        self.items.append(made)
+        return made
+
+    def points(self, x: Values, y: Values, label: str = "", **options: Any) -> Curve:
+        """Draw points only."""
+        return self.curve(x, y, label, **{"marker": "o", "line": False, **options})
+
+    def rule_x(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
+        """Draw an upright line."""
+        look = {"colour": "muted", "width": 1.0, **look}
+        self.items.append(Rule(at=float(at), across="x", look=Look(**look), words=words, label=label))
+
+    def rule_y(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
+        """Draw a level."""
+        look = {"colour": "muted", "width": 1.0, **look}
+        self.items.append(Rule(at=float(at), across="y", look=Look(**look), words=words, label=label))
+
+    def band_x(self, low: float, high: float, label: str = "", **look: Any) -> None:
+        """Shade a stretch of x."""
+        self.items.append(Band(low=low, high=high, across="x", look=Look(**_shade(look)), label=label))
+
+    def band_y(self, low: float, high: float, label: str = "", **look: Any) -> None:
+        """Shade a stretch of y."""
+        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look)), label=label))
+
+    def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
+        """Fill outlines."""
+        made = [(numbers(x), numbers(y)) for x, y in rings]
+        self.items.append(Shape(rings=made, look=Look(**_shade(look)), label=label))
+
+    def bar(self, row: float, start: float, stop: float, label: str = "", **look: Any) -> None:
+        """Draw a bar that lies along x."""
+        half = 0.3
+        self.x.see([start, stop])
+        self.y.see([row - 0.6, row + 0.6])
+        ring = ([start, stop, stop, start], [row - half, row - half, row + half, row + half])
+        self.shape([ring], label, **{"opacity": 0.85, **look})
+
+    def note(self, words: str, at: tuple[float, float] | None = None, **options: Any) -> None:
+        """Write near a point or, without one, into a corner such as ``"top left"``."""
+        self.items.append(Note(words=words, at=at, **options))
+
+
+@dataclass(kw_only=True)
+class Column:
+    """Panels one below the other; their x axes are one unless said otherwise."""
+
+    panels: list[Panel]
+    heights: Sequence[float]
+    width: float = 1.0
+    title: str = ""
+
+
+@dataclass(kw_only=True)
+class Chart:
+    """Columns side by side, in the units of the view box (a page shows about one pixel for each)."""
+
+    width: float = 420.0
+    height: float = 300.0
+    columns: list[Column] = field(default_factory=list)
+    title: str = ""
+    legend: bool | None = None
+    legend_title: str = ""
+    loop: str = ""
+
+    def column(
+        self, *heights: float, width: float = 1.0, title: str = "", shared: bool = True
+    ) -> list[Panel]:
+        """Add a column with a panel for each height (one, without any) and give its panels."""
+        sizes = heights or (1.0,)
+        axis = Axis()
+        panels = [Panel(x=axis if shared else Axis()) for _ in sizes]
+        self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title))
+        return panels
+
+    def panel(self, **options: Any) -> Panel:
+        """Add a column of one panel."""
+        return self.column(**options)[0]
+
+    def labels(self) -> list[tuple[str, Item]]:
+        """Give every legend entry once, in the order drawn."""
+        found: dict[str, Item] = {}
+        for column in self.columns:
+            for panel in column.panels:
+                for item in panel.items:
+                    if not isinstance(item, Note) and item.label:
+                        found.setdefault(item.label, item)
+        return list(found.items())
+
+
+def numbers(values: Values) -> np.ndarray:
+    """Turn plain values into floats; None is NaN."""
+    return np.asarray(values, dtype=float)
+
+
+def _shade(look: dict[str, Any]) -> dict[str, Any]:
+    """Fill with the colour, faintly, without an edge."""
+    return {"fill": look.get("colour", "c1"), "opacity": 0.13, "width": 0.0, **look}

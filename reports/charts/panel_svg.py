@@ -1,0 +1,189 @@
+"""One panel as SVG: grid, ticks, curves, marks, words."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from reports.charts.axis import minor_ticks
+from reports.charts.chart import Band, Curve, Item, Note, Panel, Rule, Shape
+from reports.charts.labels import Room
+from reports.charts.notes_svg import by_need, note_svg
+from reports.charts.paint import MARKER_PATHS
+from reports.charts.pen import FAR, Frame, Pen
+
+TICK, LABEL, TITLE = 10.5, 11.5, 12.0
+REACH = 3000  # of rules; longer ones cost a browser dear where they are dashed
+
+
+def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
+    """Write a panel with its axes."""
+    room = Room((frame.left + 2, frame.top + 2, frame.right - 2, frame.bottom - 2))
+    world, marks = [], []
+    for k, item in enumerate(panel.items):
+        drawn, dots = _item(item, panel, frame, pen.within(k), room)
+        world.append(drawn)
+        marks.append(dots)
+    clip = f"{pen.prefix}c"
+    notes = "".join(note_svg(item, panel, frame, pen, room) for item in by_need(panel.items))
+    inside = (
+        f'<clipPath id="{clip}"><rect x="{frame.left:.1f}" y="{frame.top:.1f}" width="{frame.width:.1f}" '
+        f'height="{frame.height:.1f}"/></clipPath><g clip-path="url(#{clip})">'
+        f'<g class="world">{"".join(world)}</g><g class="marks">{"".join(marks)}</g></g>'
+    )
+    axes = _axes(panel, frame, pen, hide_x=hide_x)
+    known = _data(panel, frame, hide_x) if pen.page else ""
+    return f'<g class="panel"{known}>{axes}{inside}<g class="notes">{notes}</g></g>'
+
+
+def _data(panel: Panel, frame: Frame, hide_x: bool) -> str:
+    """Write what the script must know of the axes."""
+    parts = []
+    for key, axis, ends in (
+        ("x", panel.x, (frame.left, frame.right)),
+        ("y", panel.y, (frame.bottom, frame.top)),
+    ):
+        low, high = axis.span()
+        a, b = ends[::-1] if axis.reversed else ends
+        kind = "log" if axis.log else "lin"
+        parts.append(f' data-{key}="{kind} {low:.9g} {high:.9g} {a:.2f} {b:.2f}"')
+        parts.append(f' data-{key}l="{escape(axis.name or axis.label.replace(chr(10), " "))}"')
+        if axis.ticks is not None:
+            parts.append(f' data-{key}fixed="1"')
+    parts.append(' data-hide="1"' if hide_x else "")
+    parts.append(' data-equal="1"' if panel.equal else "")
+    parts.append(' data-mode="xy"' if panel.by_point else "")
+    return "".join(parts)
+
+
+def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
+    """Write grid, ticks, labels and title."""
+    xs, ys = (
+        panel.x.named_ticks(max(3, int(frame.width / (40 if panel.x.log else 58)))),
+        panel.y.named_ticks(room_y(panel, frame.height)),
+    )
+    px, py = frame.x(panel.x, [v for v, _ in xs]), frame.y(panel.y, [v for v, _ in ys])
+    across = "".join(f"M{x:.1f} {frame.top:.1f}V{frame.bottom:.1f}" for x in px) if panel.x.grid else ""
+    up = "".join(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}" for y in py) if panel.y.grid else ""
+    small = "".join(
+        f"M{x:.1f} {frame.bottom:.1f}v-3" for x in frame.x(panel.x, minor_ticks(panel.x))
+    ) + "".join(f"M{frame.left:.1f} {y:.1f}h3" for y in frame.y(panel.y, minor_ticks(panel.y)))
+    thin = pen.style(fill="none", stroke="grid", stroke_width="0.8")
+    edge = pen.style(fill="none", stroke="muted", stroke_width="0.9")
+    box = f"M{frame.left:.1f} {frame.top:.1f}V{frame.bottom:.1f}H{frame.right:.1f}"
+    rotated = (frame.top + frame.bottom) / 2.0
+    parts = [f'<path class="grid" d="{across}{up}" {thin}/>', f'<path class="edge" d="{box}{small}" {edge}/>']
+    low = frame.bottom + 14.0
+    named = [] if hide_x else list(zip(px, xs, strict=True))
+    x_words = "".join(pen.words(words, x, low, size=TICK, anchor="middle") for x, (_, words) in named)
+    y_words = "".join(
+        pen.words(w, frame.left - 5.0, y + 3.7, size=TICK, anchor="end")
+        for y, (_, w) in zip(py, ys, strict=True)
+    )
+    parts += [f'<g class="xt">{x_words}</g>', f'<g class="yt">{y_words}</g>']
+    if panel.x.label and not hide_x:
+        middle = (frame.left + frame.right) / 2.0
+        low = frame.bottom + (17.0 if xs else 3.0) + LABEL
+        parts.append(pen.words(panel.x.label, middle, low, size=LABEL, anchor="middle"))
+    if panel.y.label:
+        turn = f' transform="rotate(-90 11 {rotated:.1f})"'
+        parts.append(pen.words(panel.y.label, 11.0, rotated, size=LABEL, anchor="middle", more=turn))
+    if panel.title:
+        parts.append(pen.words(panel.title, frame.left, frame.top - 7.0, size=TITLE, bold=True))
+    return "".join(parts)
+
+
+def room_y(panel: Panel, height: float) -> int:
+    """Say how many ticks a panel of that height has room for."""
+    return min(max(2, int(height / 24)), 7) if panel.y.ticks is None else 99
+
+
+def _item(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> tuple[str, str]:
+    """Write what scales with the axes, and the markers, which only move."""
+    key = "" if isinstance(item, Note) or not item.label else f' data-k="{pen.keys[item.label]}"'
+    if isinstance(item, Curve):
+        return _curve(item, panel, frame, pen, room, key)
+    if isinstance(item, Rule):
+        return _rule(item, panel, frame, pen, room, key), ""
+    if isinstance(item, Band):
+        if item.across == "x":
+            a, b = frame.x(panel.x, [item.low, item.high])
+            path = f"M{a:.2f} -{FAR:.0f}V{FAR:.0f}H{b:.2f}V-{FAR:.0f}z"
+        else:
+            a, b = frame.y(panel.y, [item.low, item.high])
+            path = f"M-{FAR:.0f} {a:.2f}H{FAR:.0f}V{b:.2f}H-{FAR:.0f}z"
+        return pen.filled(path, item.look, key), ""
+    if isinstance(item, Shape):
+        rings = [(frame.x(panel.x, x), frame.y(panel.y, y)) for x, y in item.rings]
+        if item.look.opacity > 0.5 or item.look.hatch:
+            for x, y in rings:  # bars: words keep off them
+                room.add_line(np.append(x, x[0]), np.append(y, y[0]))
+                room.add_line(np.array([x.min(), x.max()]), np.array([y.mean(), y.mean()]))
+        return pen.filled("".join(_path(x, y) + "z" for x, y in rings), item.look, key), ""
+    return "", ""
+
+
+def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> tuple[str, str]:
+    x, y = frame.x(panel.x, item.x), frame.y(panel.y, item.y)
+    drawn, dots = "", ""
+    if item.line:
+        px, py = _stairs(x, y) if item.stairs else (x, y)
+        more = f' class="curve{"" if item.read else " mute"}"{key}' + (
+            ' data-stairs="1"' if item.stairs else ""
+        )
+        more += f' data-id="{escape(item.id)}"' if item.id else ""
+        if item.parameter is not None and pen.page:
+            more += (
+                f' data-p="{" ".join(f"{v:.5g}" for v in item.parameter[np.isfinite(x) & np.isfinite(y)])}"'
+            )
+        drawn = pen.line(_path(px, py), item.look, more if pen.page else "")
+        room.add_line(px, py)
+    if item.look.marker:
+        keep = np.isfinite(x) & np.isfinite(y)
+        keep &= np.arange(len(x)) % item.every == 0
+        keep &= (x > frame.left - 9) & (x < frame.right + 9) & (y > frame.top - 9) & (y < frame.bottom + 9)
+        dots = _dots(x[keep], y[keep], item, pen, key)
+        room.add_points(x[keep], y[keep], item.look.size / 2.0 + 1.0)
+    return drawn, dots
+
+
+def _dots(x: np.ndarray, y: np.ndarray, item: Curve, pen: Pen, key: str) -> str:
+    """Write markers: one drawn, the others refer to it."""
+    look = item.look
+    if not len(x):
+        return ""
+    name = f"{pen.prefix}m"
+    shape = f'<path id="{name}" d="{MARKER_PATHS[look.marker]}" transform="scale({look.size / 2:g})"/>'
+    uses = "".join(f'<use href="#{name}" x="{a:.2f}" y="{b:.2f}"/>' for a, b in zip(x, y, strict=True))
+    mute = "" if item.read and not item.line else " mute"
+    own = f' class="dots{mute}"{key}' if pen.page else ""
+    return f"<g{own} {pen.marker_style(look)}><defs>{shape}</defs>{uses}</g>"
+
+
+def _rule(item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> str:
+    axis = panel.x if item.across == "x" else panel.y
+    if item.across == "x":
+        (at,) = frame.x(axis, [item.at])
+        path, ends = f"M{at:.2f} -{REACH}V{REACH}", ([at, at], [frame.top, frame.bottom])
+    else:
+        (at,) = frame.y(axis, [item.at])
+        path, ends = f"M-{REACH} {at:.2f}H{REACH}", ([frame.left, frame.right], [at, at])
+    room.add_line(np.array(ends[0]), np.array(ends[1]))
+    return pen.line(path, item.look, f' class="rule"{key}' if pen.page else "")
+
+
+def _stairs(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Hold each value until the next."""
+    return np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
+
+
+def _path(x: np.ndarray, y: np.ndarray) -> str:
+    """Write a line with gaps; a third decimal along y keeps the read-out exact."""
+    good = np.isfinite(x) & np.isfinite(y)
+    parts, pen_down = [], False
+    for a, b, there in zip(x.tolist(), y.tolist(), good.tolist(), strict=True):
+        if there:
+            parts.append(f"{'L' if pen_down else 'M'}{a:.2f} {b:.3f}")
+        pen_down = there
+    return "".join(parts)

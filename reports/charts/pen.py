@@ -1,0 +1,129 @@
+"""Elements of SVG in the colours of a page or of paper."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+
+import numpy as np
+
+from reports.charts.axis import Axis
+from reports.charts.chart import Look
+from reports.charts.labels import LINE_EM
+from reports.charts.paint import COLOURS, DASHES, HATCH_PATHS, MARKER_PATHS, paint
+
+FAR = 1e5
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The rectangle of a panel's axes, in units of the view box."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    @property
+    def width(self) -> float:
+        """Width."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """Height."""
+        return self.bottom - self.top
+
+    def x(self, axis: Axis, values: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Give pixels of values along x."""
+        return np.clip(self.left + self.width * axis.place(values), -FAR, FAR)
+
+    def y(self, axis: Axis, values: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Give pixels of values along y."""
+        return np.clip(self.bottom - self.height * axis.place(values), -FAR, FAR)
+
+
+@dataclass(frozen=True)
+class Pen:
+    """Writes elements in the colours of a page or of paper; ids begin with the prefix."""
+
+    prefix: str
+    page: bool
+    keys: Mapping[str, int]
+
+    def within(self, k: int) -> Pen:
+        """Give a pen for the k-th part: its ids begin with another letter or number."""
+        return replace(self, prefix=f"{self.prefix}-{k}")
+
+    def style(self, **wanted: str) -> str:
+        """Write colours and widths: as style on a page, where variables count, else as attributes."""
+        resolved = {
+            key.replace("_", "-"): paint(value, self.page) if value in COLOURS else value
+            for key, value in wanted.items()
+            if value != ""
+        }
+        if self.page:
+            return 'style="' + ";".join(f"{key}:{value}" for key, value in resolved.items()) + '"'
+        return " ".join(f'{key}="{value}"' for key, value in resolved.items())
+
+    def stroke(self, look: Look) -> str:
+        """Give the style of a line."""
+        return self.style(
+            fill="none", stroke=look.colour, stroke_width=f"{look.width:g}",
+            stroke_dasharray=DASHES[look.dash % len(DASHES)],
+            stroke_opacity="" if look.opacity == 1.0 else f"{look.opacity:g}", stroke_linejoin="round",
+        )  # fmt: skip
+
+    def line(self, path: str, look: Look, more: str = "") -> str:
+        """Write a line."""
+        return f'<path{more} d="{path}" {self.stroke(look)}/>'
+
+    def filled(self, path: str, look: Look, more: str = "") -> str:
+        """Write a filled outline, hatched where asked for."""
+        fill = look.fill or look.colour
+        opacity = "" if look.opacity == 1.0 else f"{look.opacity:g}"
+        edge = (
+            {"stroke": look.colour, "stroke_width": f"{look.width:g}"} if look.width else {"stroke": "none"}
+        )
+        body = f'<path{more} d="{path}" {self.style(fill=fill, fill_opacity=opacity, **edge)}/>'
+        if not look.hatch:
+            return body
+        name = f"{self.prefix}h"
+        over = "paper" if fill != "none" else look.colour
+        lines = self.style(stroke=over, stroke_width="1", fill="none")
+        pattern = (
+            f'<pattern id="{name}" width="6" height="6" patternUnits="userSpaceOnUse">'
+            f'<path d="{HATCH_PATHS[look.hatch]}" {lines}/></pattern>'
+        )
+        return f'{body}{pattern}<path{more} d="{path}" fill="url(#{name})"/>'
+
+    def marker(self, look: Look, x: float, y: float) -> str:
+        """Write one marker."""
+        place = f"translate({x:.2f} {y:.2f}) scale({look.size / 2:g})"
+        return f'<path d="{MARKER_PATHS[look.marker]}" transform="{place}" {self.marker_style(look)}/>'
+
+    def marker_style(self, look: Look) -> str:
+        """Give the style of a marker; its lines keep their width whatever its size."""
+        open_sign = look.marker in "+x2"
+        fill = "none" if open_sign else "paper" if look.hollow else look.colour
+        width = 3.2 / look.size if (look.hollow or open_sign) else 1.0 / look.size
+        return self.style(fill=fill, stroke=look.colour, stroke_width=f"{width:.3g}")
+
+    def words(
+        self, words: str, x: float, y: float, *, size: float, anchor: str = "start", colour: str = "ink",
+        bold: bool = False, more: str = "",
+    ) -> str:  # fmt: skip
+        """Write text, its first base line at y."""
+        lines = words.split("\n")
+        weight = ' font-weight="600"' if bold else ""
+        side = "" if anchor == "start" else f' text-anchor="{anchor}"'
+        painted = self.style(fill=colour)
+        head = f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}"{side}{weight}{more} {painted}>'
+        if len(lines) == 1:
+            return f"{head}{escape(words)}</text>"
+        spans = "".join(
+            f'<tspan x="{x:.1f}" dy="{0 if k == 0 else LINE_EM * size:.1f}">{escape(line)}</tspan>'
+            for k, line in enumerate(lines)
+        )
+        return f"{head}{spans}</text>"

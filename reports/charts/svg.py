@@ -1,0 +1,186 @@
+"""A chart as SVG: each column a picture on a page, all in one picture on paper.
+
+What stands here is all that ``templates/live.js`` needs to zoom, read out and redraw: every panel carries
+its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from itertools import accumulate
+
+from reports.charts.chart import Chart, Column, Curve, Item, Look, Note, Panel
+from reports.charts.labels import LINE_EM, text_width
+from reports.charts.panel_svg import LABEL, TICK, TITLE, panel_svg, room_y
+from reports.charts.pen import Frame, Pen
+
+FONT = "DejaVu Sans"
+GAP = 10.0
+KEY_ROW, KEY_GAP, SWATCH = 18.0, 18.0, 26.0
+
+
+def page_svg(chart: Chart, prefix: str, alt: str) -> str:
+    """Write a chart for a page: a picture a column, and the legend as a list that can be worked."""
+    keys = _keys(chart)
+    total = sum(column.width for column in chart.columns)
+    plots = []
+    for k, column in enumerate(chart.columns):
+        width = chart.width * column.width / total
+        pen = Pen(prefix=f"{prefix}{chr(97 + k)}", page=True, keys=keys)
+        label = alt if k == 0 else f"{column.title or column.panels[0].title or 'continued'}, part {k + 1}"
+        bounds = f"flex:{width:.0f} 1 {min(0.74 * width, 640):.0f}px;max-width:{1.4 * width:.0f}px"
+        if width > 560:
+            bounds += f";min-width:{0.72 * width:.0f}px"
+        plots.append(
+            f'<svg class="plot" xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(label)}" '
+            f'viewBox="0 0 {width:.0f} {chart.height:.0f}" style="{bounds}">'
+            f"{_column(column, width, chart.height, pen)}</svg>"
+        )
+    title = f'<p class="chart-title">{escape(chart.title)}</p>' if chart.title else ""
+    loop = f' data-loop="{escape(chart.loop)}"' if chart.loop else ""
+    body = f'{title}<div class="plots">{"".join(plots)}</div>{_legend(chart, prefix)}'
+    return f'<div class="chart"{loop}>{body}</div>'
+
+
+def paper_svg(chart: Chart, prefix: str) -> str:
+    """Write a chart as one picture with plain colours and its legend below."""
+    keys = _keys(chart)
+    total = sum(column.width for column in chart.columns)
+    rows = list(_key_rows(chart))
+    head = 18.0 if chart.title else 0.0
+    foot = KEY_ROW * len(rows) + (6.0 if rows else 0.0)
+    parts, left = [], 0.0
+    pen = Pen(prefix=f"{prefix}k", page=False, keys=keys)
+    for k, column in enumerate(chart.columns):
+        width = chart.width * column.width / total
+        own = Pen(prefix=f"{prefix}{chr(97 + k)}", page=False, keys=keys)
+        body = _column(column, width, chart.height, own)
+        parts.append(f'<g transform="translate({left:.1f} {head:g})">{body}</g>')
+        left += width
+    if chart.title:
+        parts.append(pen.words(chart.title, 4.0, 13.0, size=TITLE, bold=True))
+    parts += _paper_keys(rows, head + chart.height + 14.0, pen)
+    height = head + chart.height + foot
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{0.75 * chart.width:.1f}pt" '
+        f'height="{0.75 * height:.1f}pt" viewBox="0 0 {chart.width:.0f} {height:.0f}" '
+        f'font-family="{FONT}">{"".join(parts)}</svg>'
+    )
+
+
+def _column(column: Column, width: float, height: float, pen: Pen) -> str:
+    """Write the panels of a column on common edges."""
+    above = [_above(panel) for panel in column.panels]
+    below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
+    head = 16.0 if column.title else 0.0
+    free = height - head - sum(above) - sum(below)
+    tall = [free * share / sum(column.heights) for share in column.heights]
+    left = max((_left(panel, high) for panel, high in zip(column.panels, tall, strict=True)), default=30.0)
+    parts = []
+    if column.title:
+        parts.append(pen.words(column.title, left, 12.0, size=TITLE, bold=True))
+    tops = accumulate((a + t + b for a, t, b in zip(above, tall, below, strict=True)), initial=head)
+    for k, (panel, top) in enumerate(zip(column.panels, tops, strict=False)):
+        frame = Frame(left, top + above[k], width - GAP, top + above[k] + tall[k])
+        if panel.equal:
+            _make_equal(panel, frame)
+        body = panel_svg(panel, frame, pen.within(k), hide_x=_hides(column, k))
+        parts.append(body)
+    return "".join(parts)
+
+
+def _hides(column: Column, k: int) -> bool:
+    """Whether the x ticks stand at a panel further down."""
+    return k + 1 < len(column.panels) and column.panels[k].x is column.panels[-1].x
+
+
+def _left(panel: Panel, height: float) -> float:
+    ticks = panel.y.named_ticks(room_y(panel, height))
+    widest = max((text_width(words, TICK) for _, words in ticks), default=0.0)
+    lines = panel.y.label.count("\n") + 1 if panel.y.label else 0
+    return 8.0 + widest + lines * LINE_EM * LABEL + (4.0 if lines else 0.0)
+
+
+def _above(panel: Panel) -> float:
+    return 22.0 if panel.title else 8.0
+
+
+def _below(panel: Panel, hidden: bool) -> float:
+    if hidden:
+        return 4.0
+    return (17.0 if panel.x.named_ticks() else 3.0) + (LABEL * LINE_EM + 3.0 if panel.x.label else 3.0)
+
+
+def _make_equal(panel: Panel, frame: Frame) -> None:
+    """Widen one axis so that a unit is as long on both."""
+    (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
+    scale = min(frame.width / (x1 - x0), frame.height / (y1 - y0))
+    for axis, size, (low, high) in ((panel.x, frame.width, (x0, x1)), (panel.y, frame.height, (y0, y1))):
+        middle, half = (low + high) / 2.0, size / scale / 2.0
+        axis.low, axis.high = middle - half, middle + half
+
+
+def _keys(chart: Chart) -> dict[str, int]:
+    return {label: k for k, (label, _) in enumerate(chart.labels())}
+
+
+def _shown(chart: Chart) -> list[tuple[str, Item]]:
+    labels = chart.labels()
+    wanted = len(labels) > 1 if chart.legend is None else chart.legend
+    return labels if wanted else []
+
+
+def _legend(chart: Chart, prefix: str) -> str:
+    """Write the legend as a list; the script makes switches of its items."""
+    items = _shown(chart)
+    if not items:
+        return ""
+    keys = _keys(chart)
+    title = f'<span class="keys-title">{escape(chart.legend_title)}</span>' if chart.legend_title else ""
+    rows = "".join(
+        f'<li data-k="{keys[label]}"><svg class="swatch" aria-hidden="true" viewBox="0 0 {SWATCH:.0f} 12">'
+        f"{_swatch(item, Pen(prefix=f'{prefix}k{k}', page=True, keys={}))}</svg>{escape(label)}</li>"
+        for k, (label, item) in enumerate(items)
+    )
+    return f'<div class="keys">{title}<ul>{rows}</ul></div>'
+
+
+def _key_rows(chart: Chart) -> Iterator[list[tuple[str, Item, float]]]:
+    """Break the legend into lines of the chart's width."""
+    row: list[tuple[str, Item, float]] = []
+    x = 4.0
+    for label, item in _shown(chart):
+        size = SWATCH + 6.0 + text_width(label, TICK) + KEY_GAP
+        if row and x + size > chart.width:
+            yield row
+            row, x = [], 4.0
+        row.append((label, item, x))
+        x += size
+    if row:
+        yield row
+
+
+def _paper_keys(rows: list[list[tuple[str, Item, float]]], top: float, pen: Pen) -> list[str]:
+    parts = []
+    for r, row in enumerate(rows):
+        for k, (label, item, x) in enumerate(row):
+            own = Pen(prefix=f"{pen.prefix}{r}x{k}", page=False, keys={})
+            y = top + KEY_ROW * r
+            parts.append(f'<g transform="translate({x:.1f} {y - 9:.1f})">{_swatch(item, own)}</g>')
+            parts.append(own.words(label, x + SWATCH + 5.0, y, size=TICK))
+    return parts
+
+
+def _swatch(item: Item, pen: Pen) -> str:
+    """Draw the sample of a legend entry, 26 by 12."""
+    look: Look = getattr(item, "look")  # noqa: B009
+    if isinstance(item, Curve):
+        line = pen.line("M1 6H25", look) if item.line else ""
+        return line + (pen.marker(look, 13.0, 6.0) if look.marker else "")
+    if isinstance(item, Note):
+        return ""
+    if hasattr(item, "rings") or hasattr(item, "low"):
+        return pen.filled("M3 1H23V11H3z", look)
+    upright = getattr(item, "across", "y") == "x"
+    return pen.line("M13 0V12" if upright else "M1 6H25", look)

@@ -1,0 +1,104 @@
+"""`actuator-lti identify A.csv B.csv`: records of a motion, together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reports.cli.identify_common import Common, finish, fixed_values, say
+
+if TYPE_CHECKING:
+    from analyses.identification.bench import BenchResult
+
+
+def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: Mapping[str, Any]) -> None:
+    """Identify from records, print or write the result, and end with the verdict's status."""
+    from actuator_lti.design import load_design
+    from analyses.identification.bench import BenchSettings, identify_bench
+    from analyses.records import open_record
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json
+    from reports.cli.progress import progress
+    from reports.sections import dynamic_identification as pages
+
+    drive = load_design(common.design or "emps")
+    settings = BenchSettings(
+        fixed=fixed_values(drive, common.fixed), residual_limit=common.residual_limit, **options
+    )
+    records = named_apart([open_record(path) for path in paths])
+    held_out = named_apart([open_record(path) for path in unseen], [r.name for r in records])
+    with progress("identifying", quiet=common.quiet) as bar:
+        result = identify_bench(drive, records, validation=held_out, settings=settings, progress=bar)
+    made = pages.section(result, drive.axis)
+    written = finish(common, drive, result.design, result.text, made, result.items)
+    if common.as_json:
+        print_json(as_data(result, written))
+    else:
+        say(common, made, written, result.items)
+    leave_with(result.passed)
+
+
+def named_apart(records: Sequence[Any], taken: Sequence[str] = ()) -> list[Any]:
+    """Records with names of their own, where files of one name lie in several folders."""
+    from dataclasses import replace
+
+    seen: list[str] = list(taken)
+    out = []
+    for record in records:
+        name, k = record.name, 2
+        while name in seen:
+            name, k = f"{record.name} ({k})", k + 1
+        seen.append(name)
+        out.append(record if name == record.name else replace(record, name=name))
+    return out
+
+
+def as_data(result: BenchResult, written: Path | None) -> dict[str, Any]:
+    """The result as plain data, in SI."""
+    from dataclasses import asdict
+
+    from reports.identification_json import inputs_json, items_json
+
+    model, refined = result.model, result.refined
+    deviations = model.covariance.diagonal() ** 0.5
+    values = zip(model.names, model.values, model.standard_errors, deviations, strict=True)
+    return {
+        "record": result.records[0].name,
+        "rows_in": sum(record.counts.rows_in for record in result.records),
+        "rows_out": sum(record.counts.rows_out for record in result.records),
+        "parameters": {
+            n: {
+                "value": v,
+                "standard_error": s,
+                "standard_error_correlated": d,
+                "between_records": model.between[n],
+            }
+            for n, v, s, d in values
+        },
+        "laws": [asdict(law) for law in result.laws],
+        "fixed": {name: asdict(one) for name, one in model.fixed.items()},
+        "covariance": model.covariance,
+        "relative_residual": model.relative_residual,
+        "records": [
+            {
+                "name": part.name,
+                "relative_residual": part.relative_residual,
+                "rows_in": part.rows_in,
+                "rows_used": part.rows_used,
+                "inputs": inputs_json(record, part.used),
+                "findings": [asdict(one) for one in result.findings[record.name]],
+            }
+            for part, record in zip(model.records, result.records, strict=True)
+        ],
+        "validation": [
+            {"name": record.name, "findings": [asdict(one) for one in result.findings[record.name]]}
+            for record in result.validation
+        ],
+        "written_design_against": [asdict(one) for one in result.resimulated],
+        "refined": None if refined is None else dict(refined.values),
+        "refined_standard_errors": None if refined is None else dict(refined.standard_errors),
+        "checks": items_json(result.items),
+        "passed": result.passed,
+        "design": None if written is None else str(written),
+    }

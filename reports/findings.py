@@ -1,0 +1,40 @@
+"""What a reader has to know of a drive beside its verdicts: findings, the gravest first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Severity = Literal["fail", "warn", "info"]
+ORDER: tuple[Severity, ...] = ("fail", "warn", "info")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One sentence that the reader of a drive must know.
+
+    Attributes
+    ----------
+    severity : str
+        ``"fail"``: unfit as it is; ``"warn"``: to be watched; ``"info"``: good to know.
+    text : str
+        A whole sentence, with the figure that it is about.
+    where : str
+        The id of the section of the report that shows it.
+    """
+
+    severity: Severity
+    text: str
+    where: str
+
+
+def plain(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """Give findings as a section carries them."""
+    return [asdict(item) for item in findings]
+
+
+def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
+    """Collect what the sections of a report carry, the gravest first, each once."""
+    found = [Finding(**item) for part in sections for item in part.get("findings", ())]
+    return sorted(dict.fromkeys(found), key=lambda item: ORDER.index(item.severity))

@@ -1,0 +1,101 @@
+"""The first screen: is the drive fit for use, what is its weakest point, and what is to be watched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from analyses.loop_figures import LoopFigures
+from reports import document as doc
+from reports.findings import Finding, gathered, plain
+from reports.numbers import short
+from reports.sections import loop as loop_section
+from reports.sections.margins import margin_row, response_row, worst_status
+from reports.sections.names import LOOPS
+
+# key of the row, quantity of a requirement, words, unit, decimals
+FIGURES = (
+    ("gain_margin_db", "gain_margin", "Gain margin", "dB", "fix:1"),
+    ("phase_margin_deg", "phase_margin", "Phase margin", "deg", "fix:1"),
+    ("delay_margin_ms", "delay_margin", "Delay margin", "ms", "sig:3"),
+    ("s_peak_db", "sensitivity_peak", "Peak of S", "dB", "fix:2"),
+    ("minus3db_hz", "bandwidth", "Bandwidth, −3 dB", "Hz", "sig:3"),
+)
+SHOWN = 5
+
+
+def section(
+    figures: Mapping[str, LoopFigures],
+    items: Sequence[Mapping[str, Any]],
+    sections: Sequence[Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Make the first screen from the loops, the verdicts on the requirements and all other sections."""
+    found = gathered(sections)
+    glance = {
+        "kind": "glance",
+        "loops": [_loop(name, one, items) for name, one in figures.items()],
+        "weakest": weakest(items),
+        "findings": plain(found[:SHOWN]),
+        "more": max(len(found) - SHOWN, 0),
+    }
+    status = worst_status([one.margins.stable for one in figures.values()])
+    if any(item["passed"] is False for item in items) or any(item.severity == "fail" for item in found):
+        status = "fail"
+    return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
+
+
+def _loop(name: str, found: LoopFigures, items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Give the five figures of a loop, each with the requirement that is nearest to it."""
+    row = {**margin_row(found), **response_row(found)}
+    cells = []
+    for key, quantity, label, unit, form in FIGURES:
+        own = [item for item in items if item.get("quantity") == quantity and item.get("loop") == name]
+        nearest = min(own, key=_nearness, default=None)
+        cells.append({"label": label, "value": row[key], "unit": unit, "format": form, **_limit(nearest)})
+    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": row["stable"], "figures": cells}
+
+
+def _limit(item: Mapping[str, Any] | None) -> dict[str, Any]:
+    if item is None:
+        return {"limit": None, "comparison": "", "distance": None, "passed": None}
+    return {key: item[key] for key in ("limit", "comparison", "distance", "passed")}
+
+
+def weakest(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+    """Give the requirement that is nearest to its limit, or furthest beyond it, as part of the limit."""
+    ranked = [item for item in items if item.get("distance") is not None and item.get("limit")]
+    item = min(ranked, key=_nearness, default=None)
+    if item is None:
+        return None
+    share = 100.0 * abs(_nearness(item))
+    side = "inside" if item["distance"] >= 0.0 else "beyond"
+    value, unit = short(item["value"], 4), item["unit"]
+    limit = f"{item['comparison']} {short(item['limit'], 6)}".strip()
+    words = f"{value} {unit}, limit {limit} {unit}: {share:.0f} % {side} its limit"
+    return {"label": item["label"], "words": " ".join(words.split()), "passed": item["passed"]}
+
+
+def _nearness(item: Mapping[str, Any]) -> float:
+    """Distance to the limit over the limit; without a distance the requirement is as good as far away."""
+    if item["distance"] is None or not item["limit"]:
+        return 1e9
+    return float(item["distance"]) / abs(float(item["limit"]))
+
+
+def _pictures(figures: Mapping[str, LoopFigures]) -> list[dict[str, Any]]:
+    """Make one Bode and one step figure, of the outermost loop."""
+    from analyses.responses import frequency_grid
+
+    name, found = list(figures.items())[-1]
+    blocks = [loop_section.open_bode(LOOPS[name], found, frequency_grid(found), name=name)]
+    if found.step is not None:
+        blocks.append(loop_section.step(LOOPS[name], found, None, name=name))
+    for block in blocks:
+        block["data"]["small"] = True
+    return blocks
+
+
+def unchecked() -> Finding:
+    """Give the finding of a report that no simulation stands behind."""
+    text = "No simulation stands behind this report: friction, limits and large commands are not checked."
+    return Finding(severity="warn", text=text, where="provenance")

@@ -1,0 +1,166 @@
+"""One page of a comparison: which variant is best for what, and what each gives up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.numbers import significant
+from reports.sections.requirements import label
+
+if TYPE_CHECKING:
+    from analyses.requirements import RequirementVerdict
+    from analyses.variants import Compared, Comparison
+
+_SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
+_MOST = 3
+Changes = list[tuple[str, float]]
+
+
+def section(comparison: Comparison) -> dict[str, Any]:
+    """Make the section: the best design of each requirement, and each variant's gains and losses."""
+    wanted = comparison.base.verdicts
+    if not wanted:
+        return doc.section("best", "Which variant for what", [], result="The base states no requirement.")
+    blocks = [_designs(comparison), _best(comparison)]
+    met = [one for one in comparison.all if _failed(one) == 0]
+    failed = len(met) < len(comparison.all) or bool(comparison.refused)
+    return doc.section(
+        "best", "Which variant for what", blocks, result=_result(comparison, met),
+        intro=(
+            "Distance is what is left to the limit, as part of the limit. The smallest one is the weakest "
+            "point."
+        ),
+        status="fail" if failed else "pass",
+    )  # fmt: skip
+
+
+def _result(comparison: Comparison, met: Sequence[Compared]) -> str:
+    """Say how many designs meet everything, and which has the most room."""
+    count = len(comparison.all)
+    if not met:
+        return f"None of the {count} designs meets every requirement."
+    best = max(met, key=lambda one: _weakest(one)[0])
+    nearness, verdict = _weakest(best)
+    room = "" if verdict is None else f": {100.0 * nearness:.0f} % to its nearest limit ({label(verdict)})"
+    return (
+        f"{len(met)} of {count} designs meet every requirement; {best.variant.name} has the most room{room}."
+    )
+
+
+def _failed(one: Compared) -> int:
+    return sum(v.passed is False for v in one.verdicts)
+
+
+def nearness(verdict: RequirementVerdict) -> float | None:
+    """Distance to the limit as part of the limit; ``None`` where either is missing."""
+    low, high = verdict.requirement.minimum, verdict.requirement.maximum
+    limits = [abs(limit) for limit in (low, high) if limit]
+    if verdict.distance is None or not math.isfinite(verdict.distance) or not limits:
+        return None
+    return verdict.distance / min(limits)
+
+
+def _weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
+    known = [(near, v) for v in one.verdicts if (near := nearness(v)) is not None]
+    return min(known, key=lambda pair: pair[0], default=(math.inf, None))
+
+
+def _designs(comparison: Comparison) -> dict[str, Any]:
+    """One row a design: what it meets, its weakest point, what it gains and gives up against the base."""
+    columns = [
+        doc.column("design", "Design"),
+        doc.column("met", "Requirements met"),
+        doc.column("weakest", "Weakest point"),
+        doc.column("gains", "Gains most"),
+        doc.column("gives", "Gives up most"),
+    ]
+    rows = []
+    for one in comparison.all:
+        near, verdict = _weakest(one)
+        gains, losses = _changes(one, comparison)
+        rows.append({
+            "design": one.variant.name,
+            "met": f"{sum(v.passed is True for v in one.verdicts)} of {len(one.verdicts)}",
+            "weakest": "" if verdict is None else f"{label(verdict)}, {_percent(near)}",
+            "gains": "the base" if one is comparison.base else _words(gains),
+            "gives": "" if one is comparison.base else _words(losses),
+            "_status": "fail" if _failed(one) else "pass",
+        })  # fmt: skip
+    note = "Gains and losses are changes of the distance to the limit, in percent of the limit."
+    return doc.table("Each design", columns, rows, note)
+
+
+def _changes(
+    one: Compared, comparison: Comparison
+) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
+    """Give what a variant gains and loses of each distance, the most first."""
+    base = {v.id: nearness(v) for v in comparison.base.verdicts}
+    moved = [
+        (label(v), near - before)
+        for v in one.verdicts
+        if (near := nearness(v)) is not None
+        and (before := base.get(v.id)) is not None
+        and abs(near - before) > _SEEN
+    ]
+    moved.sort(key=lambda pair: -abs(pair[1]))
+    return [pair for pair in moved if pair[1] > 0.0], [pair for pair in moved if pair[1] < 0.0]
+
+
+def _words(moved: Sequence[tuple[str, float]]) -> str:
+    shown = "; ".join(f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST])
+    more = len(moved) - _MOST
+    return (shown + (f"; {more} more" if more > 0 else "")) or "nothing"
+
+
+def _percent(part: float, *, signed: bool = False) -> str:
+    sign = "+" if signed and part > 0 else ""
+    return f"{sign}{significant(100.0 * part, 2)} %"
+
+
+def _best(comparison: Comparison) -> dict[str, Any]:
+    """One row a requirement: the design with the most room, beside the base."""
+    columns = [
+        doc.column("what", "Requirement"),
+        doc.column("limit", "Limit"),
+        doc.column("best", "Best"),
+        doc.column("value", "Value", align="right"),
+        doc.column("base", "Base", align="right"),
+        doc.column("worst", "Worst"),
+    ]
+    rows = []
+    for wanted in comparison.base.verdicts:
+        ranked = [
+            (near, one.variant.name, v)
+            for one in comparison.all
+            for v in one.verdicts
+            if v.id == wanted.id and (near := nearness(v)) is not None
+        ]
+        row = {"what": label(wanted), "limit": limit_words(wanted), "base": number(wanted.value)}
+        if ranked:
+            high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
+            same = high[0] - low[0] <= _SEEN * max(abs(high[0]), 1e-9)
+            row |= {
+                "best": "all alike" if same else high[1],
+                "value": number(high[2].value),
+                "worst": "" if same else f"{low[1]}: {number(low[2].value)}",
+            }
+        rows.append(row)
+    return doc.table("Best design of each requirement", columns, rows)
+
+
+def limit_words(verdict: RequirementVerdict) -> str:
+    """Write both limits of a requirement as the design file has them, with the unit."""
+    r = verdict.requirement
+    parts = [f"≥ {r.minimum:g}"] if r.minimum is not None else []
+    parts += [f"≤ {r.maximum:g}"] if r.maximum is not None else []
+    return f"{' and '.join(parts)} {'' if r.unit == '1' else r.unit}".rstrip()
+
+
+def number(value: float | None) -> str | None:
+    """Write a value that may have no bound."""
+    if value is None:
+        return None
+    return significant(value, 4) if math.isfinite(value) else "unlimited"

@@ -1,0 +1,138 @@
+"""Attack every loader and command: ``python -m tests.hardness.fuzz --seconds 600 --seed 1``.
+
+Each input is damaged on purpose, reproducible from seed and number. A good end is a result, or a refusal in
+one printable line. Everything else is a find: it is kept in --keep and named; exit status 1 then.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "nightly")]
+
+from targets import Target, targets  # noqa: E402 - needs the path
+
+from actuator_lti.errors import InputError, NumericalError  # noqa: E402
+
+LIMIT_S = 60
+
+
+@dataclass(frozen=True)
+class Find:
+    """An input that ended badly."""
+
+    target: str
+    number: int
+    what: str
+    where: str
+    data: bytes
+
+
+class TooSlow(BaseException):
+    """Not finished within the limit."""
+
+
+def attack(target: Target, seed: int, number: int) -> Find | None:
+    """Try input ``number`` of a target."""
+    draw = random.Random(f"{seed}/{target.name}/{number}")
+    data = target.fault(draw.choice(target.seeds), draw)
+    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
+        path = Path(folder) / f"input{target.suffix}"
+        path.write_bytes(data)
+        try:
+            with limited(), warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                target.attack(path)
+        except InputError as error:
+            line = str(error)
+            if line.isprintable() and len(line) < 2000:
+                return None
+            return Find(target.name, number, "no printable line", repr(line[:300]), data)
+        except NumericalError:
+            return None
+        except TooSlow:
+            return Find(target.name, number, f"more than {LIMIT_S} s", place(sys.exc_info()[1]), data)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is a find
+            return Find(
+                target.name, number, f"{type(error).__name__}: {str(error)[:300]}", place(error), data
+            )
+    return None
+
+
+@contextmanager
+def limited() -> Iterator[None]:
+    """End what takes too long."""
+
+    def end(_number: int, _frame: object) -> None:
+        raise TooSlow
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.alarm(LIMIT_S)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def place(error: BaseException | None) -> str:
+    """The innermost line of ours."""
+    frames = traceback.extract_tb(error.__traceback__) if error else []
+    ours = [f for f in frames if "site-packages" not in f.filename and "/lib/python" not in f.filename]
+    last = (ours or frames)[-1] if frames else None
+    return f"{Path(last.filename).name}:{last.lineno} {last.name}" if last else ""
+
+
+def rounds(seed: int, chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
+    """Inputs without end, each target by its share."""
+    number = Counter[str]()
+    while True:
+        for target in chosen:
+            for _ in range(target.share):
+                yield target, number[target.name]
+                number[target.name] += 1
+
+
+def main() -> int:
+    """Attack for a while and report."""
+    words = argparse.ArgumentParser(description=__doc__)
+    words.add_argument("--seconds", type=float, default=600.0)
+    words.add_argument("--inputs", type=int, default=10**12)
+    words.add_argument("--seed", type=int, default=1)
+    words.add_argument("--only", default="", help="part of a target's name")
+    words.add_argument("--keep", type=Path, default=Path("out/fuzz"))
+    asked = words.parse_args()
+    chosen = tuple(target for target in targets() if asked.only in target.name)
+    finds: dict[tuple[str, str], Find] = {}
+    done, end = Counter[str](), time.monotonic() + asked.seconds
+    for count, (target, number) in enumerate(rounds(asked.seed, chosen)):
+        if count >= asked.inputs or time.monotonic() > end:
+            break
+        find = attack(target, asked.seed, number)
+        done[target.name] += 1
+        if find is not None and (find.what.partition(":")[0], find.where) not in finds:
+            finds[find.what.partition(":")[0], find.where] = find
+            asked.keep.mkdir(parents=True, exist_ok=True)
+            file = asked.keep / f"{target.name.replace(' ', '-')}-{asked.seed}-{number}{target.suffix}"
+            file.write_bytes(find.data)
+            sys.stdout.write(f"{target.name} {number}: {find.what} at {find.where}; kept: {file}\n")
+            sys.stdout.flush()
+    sys.stdout.write(f"{sum(done.values())} inputs, {len(finds)} finds; {dict(done)}\n")
+    return 1 if finds else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

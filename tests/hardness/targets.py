@@ -1,0 +1,304 @@
+"""What is attacked: every loader and every command, with a valid input of each to start from."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mutate import damaged, damaged_tree, extreme
+
+from actuator_lti.design import load_design, read_design_text, shipped_designs, with_overrides, write_design
+from actuator_lti.design.loader import design_text
+from actuator_lti.design.objects import import_objects
+from actuator_lti.design.settings_file import read_settings_toml
+from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
+from actuator_lti.design.units import parse_quantity
+from actuator_lti.reading import decode
+from analyses.records import (
+    CsvFormat,
+    RecordSpec,
+    SignalColumn,
+    TimeColumn,
+    campaign_file,
+    load_campaign,
+    open_record,
+    read_csv_record,
+    read_mat_record,
+)
+from analyses.sampling import read_table
+from nonlinear.records import read_columns
+from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.history import open_history
+from reports.nightly.memory import remembered
+from reports.nightly.source import read_study
+
+Fault = Callable[[bytes, random.Random], bytes]
+
+
+@dataclass(frozen=True)
+class Target:
+    """Something that takes a file.
+
+    Attributes
+    ----------
+    name : str
+    seeds : tuple of bytes
+        Valid inputs.
+    attack : callable
+        Gets the path of a damaged file in a folder of its own; InputError is a good end.
+    suffix : str
+    fault : callable
+    share : int
+        Inputs of this target out of some hundred, by what they cost.
+    """
+
+    name: str
+    seeds: tuple[bytes, ...]
+    attack: Callable[[Path], object]
+    suffix: str = ".toml"
+    fault: Fault = damaged
+    share: int = 40
+
+
+SETTINGS = b'[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
+STUDY = b"""[study]
+name = "s"
+base = "ctms-motor-position"
+[[variant]]
+name = "v"
+override = { "control.position.gain" = "12 V/rad" }
+[[sweep]]
+parameter = "motor.resistance"
+from = "1 ohm"
+to = "2 ohm"
+points = 3
+[[grid]]
+axes = [{ parameter = "motor.inductance", values = ["0.5 H", "0.6 H"] }]
+[[requirement]]
+id = "b"
+quantity = "bandwidth"
+loop = "position"
+minimum = "1 Hz"
+[monte_carlo]
+samples = 10
+seed = 3
+[nightly]
+pdf = false
+tolerance = { "*margin*" = "0.5 deg" }
+"""
+CAMPAIGN = (campaign_file.__doc__ or "").split("::", 1)[1].replace("\n    ", "\n").encode()
+RECORD = b"""file = "log.csv"
+separator = ","
+time = { column = "t", unit = "ms" }
+signals.current = { column = "i", unit = "mA" }
+signals.speed = { column = "n", unit = "rpm" }
+"""
+ROWS = b"t,i,n\n" + b"".join(b"%d,%d,%d.5\n" % (k, k * k % 7, 3 * k) for k in range(30))
+KNOWN_ROWS = ROWS.replace(b"t,i,n", b"time_s,current_A,speed_rpm")
+SUMMARY = b'{"history": {"id": "x", "nights": 3, "approvals": 1}}'
+SPEC = RecordSpec(
+    format=CsvFormat(),
+    time=TimeColumn(column="t"),
+    signals=(
+        SignalColumn(name="current", column="i", unit="A"),
+        SignalColumn(name="speed", column="n", unit="rpm"),
+    ),
+)
+
+
+def design_round(path: Path) -> None:
+    design = load_design(path)
+    assert read_design_text(write_design(design)).name == design.name
+
+
+def override(path: Path) -> None:
+    key, _, value = path.read_bytes().decode("utf-8", "replace").partition("=")
+    with_overrides(load_design("ilr33-amber"), {key: value})
+
+
+def settings(path: Path) -> None:
+    import_objects(read_settings_toml(decode(path.read_bytes(), "f"), "f"), load_design("ilr33-amber"))
+
+
+def settings_xml(path: Path) -> None:
+    import_objects(read_settings_xml(decode(path.read_bytes(), "f"), "f"), load_design("ilr33-amber"))
+
+
+def record(path: Path) -> None:
+    (path.parent / "log.csv").write_bytes(ROWS)
+    open_record(path)
+
+
+def report(path: Path) -> None:
+    from reports.document import dumps, load
+    from reports.pdf.printable import printable
+
+    made = load(path)
+    dumps(made)
+    printable(made)
+
+
+def history(path: Path) -> None:
+    with open_history(path) as opened:
+        opened.runs()
+        opened.memory()
+        found = opened.results()
+        for one in found:
+            opened.figures(one.snapshot)
+            if one.snapshot is not None:
+                opened.inputs(one.snapshot)
+        opened.matrix(found, list(opened.figure_table()))
+
+
+def entry(path: Path) -> None:
+    with contextlib.suppress(CorruptEntry):
+        Cache(path.parent).take("k" * 64, path.read_bytes())
+
+
+def summary(path: Path) -> None:
+    path.rename(path.parent / "summary.json")
+    remembered(path.parent)
+
+
+def command(*words: str) -> Callable[[Path], None]:
+    """Run a command on the file (``FILE`` among the words); its status and its words are looked at."""
+
+    def run(path: Path) -> None:
+        from reports.cli.main import main
+
+        given = [str(path) if word == "FILE" else word.replace("FOLDER", str(path.parent)) for word in words]
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = main(given)
+        said = err.getvalue()
+        lines = [line for line in said.splitlines() if line.startswith("actuator-lti:")]
+        assert "unforeseen" not in said, said
+        assert "Traceback" not in said, said
+        assert status in (0, 1, 2, 3), (status, said)
+        assert len(lines) == (1 if status in (2, 3) else 0), (status, said)
+
+    return run
+
+
+@cache
+def small_report() -> bytes:
+    from reports import document as doc
+
+    columns = [doc.column("a", "A", "deg", format="sig:3"), doc.column("b", "B")]
+    rows = [{"a": 1.5, "b": {"text": "x", "status": "pass"}, "_status": "fail"}, {"a": None, "b": True}]
+    verdict = doc.verdict(
+        "i", "I", value=1.0, limit=2.0, unit="dB", distance=1.0, passed=True, comparison="<="
+    )
+    curve = {"label": "k", "x": [1.0, 2.0, None], "y": [0.0, -3.0, 1.0], "style": "points"}
+    drawn = {"series": [curve], "x_label": "x", "y_label": "y", "levels": [{"y": 1.0, "label": "l"}]}
+    blocks = [
+        doc.table("T", columns, rows, "n"), doc.text("x\n\ny"), doc.facts([doc.fact("l", 3.5, "m")]),
+        doc.verdicts([verdict]), doc.details("more", [doc.text("z"), doc.table("U", columns, [])]),
+        doc.figure("curves", drawn, caption="c", alt="a"),
+    ]  # fmt: skip
+    head = {"design": {"name": "d", "revision": "1"}, "provenance": {"time": None, "version": "1"}}
+    made = doc.document(
+        title="t", subtitle="s", **head,
+        sections=[doc.section("one", "One", blocks, status="warn"), doc.section("two", "Two", [])],
+    )  # fmt: skip
+    return doc.dumps(made).encode()
+
+
+def tree_fault(data: bytes, draw: random.Random) -> bytes:
+    """Half of the JSON files are damaged as trees, so that they still are JSON."""
+    if draw.random() < 0.3:
+        return damaged(data, draw)
+    return json.dumps(damaged_tree(json.loads(data), draw)).encode("utf-8", "surrogatepass")
+
+
+@cache
+def mat_files() -> tuple[bytes, ...]:
+    from scipy.io import savemat
+
+    made = []
+    for packed in (False, True):
+        stream = io.BytesIO()
+        values: dict[str, Any] = {
+            "t": np.arange(20.0),
+            "i": np.arange(20.0) ** 2,
+            "n": np.ones((1, 20)),
+            "k": 3.5,
+        }
+        savemat(stream, values, do_compression=packed)
+        made.append(b"MATLAB 5.0 MAT-file".ljust(116) + stream.getvalue()[116:])  # without the date
+    return tuple(made)
+
+
+@cache
+def history_file() -> bytes:
+    import sqlite3
+    import tempfile
+
+    from nightly_fakes import CODE, INLINE, job, study
+
+    from reports.nightly.night import run_night
+
+    with tempfile.TemporaryDirectory() as folder:
+        for margin in (10.0, 11.0):
+            run_night(study(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
+        path = Path(folder) / "s.state" / "history.sqlite"
+        with sqlite3.connect(path) as database:
+            database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        database.close()
+        return path.read_bytes()
+
+
+@cache
+def entry_file() -> bytes:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        Cache(Path(folder)).write("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
+        return Cache(Path(folder)).path("k" * 64).read_bytes()
+
+
+def xml_seed() -> bytes:
+    return write_settings_xml(read_settings_toml(SETTINGS.decode(), "f")).encode()
+
+
+@cache
+def targets() -> tuple[Target, ...]:
+    """All targets."""
+    designs = tuple(design_text(name).encode() for name in shipped_designs())
+    linear = ("margins", "FILE", "--json")
+    move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
+    return (
+        Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),
+               lambda p: parse_quantity(p.read_bytes().decode("utf-8", "replace"), "N*m"), share=150),
+        Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override),
+        Target("design", designs, design_round, share=60),
+        Target("extreme design", designs, design_round, fault=extreme, share=60),
+        Target("settings", (SETTINGS,), settings),
+        Target("settings xml", (xml_seed(),), settings_xml, ".xml"),
+        Target("study", (STUDY,), lambda p: read_study(str(p)), share=20),
+        Target("campaign", (CAMPAIGN,), load_campaign),
+        Target("record file", (RECORD,), record),
+        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
+        Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
+        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
+        Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),
+        Target("samples", (b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n",),
+               lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv"),
+        Target("report", (small_report(),), report, ".json", tree_fault),
+        Target("site", (SUMMARY,), summary, ".json", tree_fault),
+        Target("history", (history_file(),), history, ".sqlite", share=10),
+        Target("cache entry", (entry_file(),), entry, ".entry"),
+        Target("command margins", designs, command(*linear), fault=extreme, share=3),
+        Target("command simulate", designs, command(*move), fault=extreme, share=3),
+        Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme, share=3),
+        Target("command pdf", (small_report(),), command("pdf", "FILE", "--out", "FOLDER/x.pdf"), ".json",
+               tree_fault, share=2),
+    )  # fmt: skip

@@ -1,0 +1,216 @@
+"""Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from actuator_lti.design import load_design
+from analyses.correlation.voltage_motor import fit_step, read_odrive
+from analyses.identification.least_squares import between_records, correlated_covariance, solve
+from reports.cli.main import main
+from tests.identification.bench_records import columns_of, motion, staircase, write
+
+
+def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(status or 0), out, err
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("records")
+    made = {
+        "a": columns_of(motion(2), 0),
+        "b": columns_of(motion(3), 1),
+        "unseen": columns_of(motion(4), 2),
+        "loaded": columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5.0),
+        "one way": columns_of(staircase(100.0, 300.0, 600.0, 900.0), 4),
+        "one speed": columns_of(staircase(500.0), 5),
+    }
+    return {name: str(write(folder / f"{name.replace(' ', '_')}.csv", c)) for name, c in made.items()}
+
+
+def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_another(
+    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Truth: the coefficients of the design that was simulated (Table 1 of the paper)."""
+    arguments = ("identify", files["a"], files["b"], files["loaded"], "--validate", files["unseen"])
+    status, out, _ = _run(
+        capsys, *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
+    )
+    found = json.loads(out)
+    checks = {check["id"]: check for check in found["checks"]}
+    assert status == 0
+    assert checks["held-out-unseen.csv"]["passed"]
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(1.5 * found["relative_residual"] + 0.02)
+    assert {one["record"] for one in found["written_design_against"]} == {
+        "a.csv",
+        "b.csv",
+        "loaded.csv",
+        "unseen.csv",
+    }
+    written = load_design(tmp_path / "ilr33-amber-identified.toml")
+    assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
+    assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
+    assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
+    for path, value in found["refined"].items():
+        tolerance = written.parameters[path].tolerance
+        assert written.parameters[path].value == pytest.approx(value, rel=1e-6)
+        assert tolerance is not None
+        assert tolerance.std == pytest.approx(found["refined_standard_errors"][path], rel=1e-5)
+
+
+def test_a_held_out_record_of_another_drive_fails(
+    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from actuator_lti.design import with_values
+
+    other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
+    path = str(write(tmp_path / "other.csv", columns_of(motion(6, design=other), 7)))
+    status, out, _ = _run(
+        capsys, "identify", files["a"], "--validate", path, "--design", "ilr33-amber", "--json"
+    )
+    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+    assert status == 1
+    assert not checks["held-out-other.csv"]["passed"]
+    assert checks["residual"]["passed"]
+
+
+def test_a_value_can_be_held(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    common = ("identify", files["loaded"], "--design", "ilr33-amber", "--json")
+    status, out, _ = _run(capsys, *common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
+    found = json.loads(out)
+    assert status == 0
+    assert found["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked"}
+    assert found["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
+    for wrong, reason in (
+        ("friction.load_coefficient", "KEY=VALUE is wanted"),
+        ("friction.banana=1", "unknown parameter"),
+        ("friction.viscous=1 kg", "wrong dimension"),
+        ("motor.resistance=1 ohm", "can be fixed here"),
+    ):
+        status, _, err = _run(capsys, *common, "--fix", wrong)
+        assert (status, reason in err) == (2, True), err
+
+
+def test_one_direction_says_what_it_cannot_tell_apart(
+    files: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, _ = _run(capsys, "identify", files["one way"], "--design", "ilr33-amber", "--json")
+    found = json.loads(out)
+    assert status == 0
+    assert found["fixed"]["offset"]["reason"] == "cannot be told from dry: the design's value kept"
+    for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
+        value, std = (found["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        assert value == pytest.approx(truth, rel=0.03)
+        assert abs(value - truth) < 3.0 * std
+
+
+def test_one_speed_has_errors_that_hold_the_truth(
+    files: dict[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Dry and viscous friction are told by the run-up alone: poorly, and their errors say so."""
+    _, out, _ = _run(capsys, "identify", files["one speed"], "--design", "ilr33-amber", "--json")
+    found = json.loads(out)["parameters"]
+    for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
+        assert abs(found[name]["value"] - truth) < 3.0 * found[name]["standard_error_correlated"]
+
+
+def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
+    """AR(1) noise: the standard deviation of 200 fits against the mean of the stated errors."""
+    rng = np.random.default_rng(3)
+    time = np.arange(2000) * 0.01
+    w = np.column_stack([np.ones_like(time), np.sin(0.7 * time)])
+    fits, stated, white = [], [], []
+    for _ in range(200):
+        noise = lfilter([1.0], [1.0, -0.95], rng.standard_normal(len(time)))
+        found = solve(w, w @ np.array([1.0, 2.0]) + noise)
+        fits.append(found.values)
+        stated.append(np.sqrt(np.diag(found.correlated)))
+        white.append(np.sqrt(np.diag(found.white)))
+    spread = np.std(fits, axis=0)
+    assert np.mean(stated, axis=0) == pytest.approx(spread, rel=0.25)
+    assert np.all(np.mean(white, axis=0) < 0.3 * spread)
+
+
+def test_white_residuals_have_the_textbook_covariance() -> None:
+    rng = np.random.default_rng(4)
+    w = np.column_stack([np.ones(5000), np.linspace(-1.0, 1.0, 5000)])
+    rest = rng.standard_normal(5000)
+    textbook = np.diag([1.0 / 5000.0, 3.0 / 5000.0])
+    assert np.diag(correlated_covariance(w, rest)) == pytest.approx(np.diag(textbook), rel=0.35)
+
+
+def test_scatter_between_records_is_found_again() -> None:
+    """Values 2, own error 0.1, scatter 0.5: the estimate's mean square over many draws is the truth's."""
+    rng = np.random.default_rng(5)
+    own = np.full(6, 0.1)
+    found = [
+        between_records(2.0 + 0.5 * rng.standard_normal(6) + own * rng.standard_normal(6), own)
+        for _ in range(400)
+    ]
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.5, rel=0.05)
+
+
+def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Six records whose dry friction differs by 10 % rms: the joint error is the scatter over root six."""
+    from actuator_lti.design import with_values
+
+    drive = load_design("ilr33-amber")
+    true = 2.25e-3 * (1.0 + 0.1 * np.array([1.2, -1.1, 0.4, -0.2, 0.9, -1.2]))
+    paths = [
+        str(write(tmp_path / f"{k}.csv", columns_of(
+            motion(3, design=with_values(drive, {"friction.dry_torque": float(c)})), k)))
+        for k, c in enumerate(true)
+    ]  # fmt: skip
+    _, out, _ = _run(capsys, "identify", *paths, "--design", "ilr33-amber", "--json")
+    dry = json.loads(out)["parameters"]["dry"]
+    assert dry["value"] == pytest.approx(true.mean(), rel=0.03)
+    assert dry["standard_error_correlated"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
+    assert dry["standard_error"] < 0.3 * dry["standard_error_correlated"]
+
+
+def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:
+    """ODrive, measured: two steps 0.35 ms apart cannot be pooled to 0.04 ms."""
+    steps = [read_odrive(odrive_files[name]) for name in ("step1", "step2")]
+    alone = [fit_step([step]) for step in steps]
+    together = fit_step(steps)
+    apart = abs(alone[0].time_constant_s - alone[1].time_constant_s)
+    assert together.time_constant_std_s > 0.4 * apart
+    assert min(one.time_constant_s for one in alone) < together.time_constant_s
+    assert together.time_constant_s < max(one.time_constant_s for one in alone)
+
+
+def test_correlation_over_several_records(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    paths = (files["a"], files["b"], files["loaded"])
+    status, out, _ = _run(capsys, "correlate", "ilr33-amber", *paths, "--json")
+    found = json.loads(out)
+    own = [record["signals"]["current"] for record in found["records"]]
+    summary = found["summary"]["current"]
+    assert status == 0
+    assert summary["max_error"] == max(one["max_error"] for one in own)
+    assert summary["rms_error"] ** 2 == pytest.approx(np.mean([one["rms_error"] ** 2 for one in own]))
+    assert summary["mean_error"] == pytest.approx(np.mean([one["mean_error"] for one in own]))
+    assert own[0]["rms_error"] == pytest.approx(0.02, rel=0.05)  # the noise that was added
+    assert own[0]["mean_error"] == pytest.approx(0.02 * np.sqrt(2.0 / np.pi), rel=0.05)
+    worst = max(found["records"], key=lambda one: one["signals"]["angle"]["relative_error"])
+    assert found["worst"] == worst["record"]
+    _, text, _ = _run(capsys, "correlate", "ilr33-amber", *paths)
+    assert "all 3; worst:" in text
+
+
+def test_a_record_that_contradicts_itself_fails_the_correlation(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = columns_of(motion(2))
+    columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
+    path = str(write(tmp_path / "r.csv", columns))
+    status, out, _ = _run(capsys, "correlate", "ilr33-amber", path, "--json")
+    assert status == 1
+    assert "60/2 pi" in json.dumps(json.loads(out)["records"][0]["findings"])

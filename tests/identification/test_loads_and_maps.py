@@ -1,0 +1,155 @@
+"""Gravity, load friction on the moment, supply from a voltage drive, friction maps: closed forms as truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, read_design_text, with_values, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.bench import BenchSettings, identify_bench
+from analyses.identification.friction_map import fit_map
+from analyses.identification.inverse import fit_records
+from analyses.identification.to_design import design_with_estimate, joint_estimate, with_structure
+from analyses.records.record import Record, RowCounts
+
+PERIOD = 1e-3
+TIME = np.arange(0.0, 20.0, PERIOD)
+
+
+def _waves(order: int, scale: float = 1.0) -> np.ndarray:
+    """A sum of sines, differentiated ``order`` times."""
+    parts = ((1.0, 0.15, 0.0), (0.4, 0.6, 1.0), (0.08, 2.1, 2.0))
+    total = np.zeros(len(TIME))
+    for amplitude, hertz, phase in parts:
+        w = 2.0 * np.pi * hertz
+        total += scale * amplitude * w**order * np.sin(w * TIME + phase + 0.5 * np.pi * order)
+    return total
+
+
+def _record(**signals: np.ndarray) -> Record:
+    return Record(name="r", time_s=TIME, signals=signals, units={}, counts=RowCounts())
+
+
+def _joint() -> Design:
+    """A back-drivable joint, 100:1, 1 kg at 0.3 m to be found."""
+    design = load_design("ilr33-amber")
+    values = {"gear.planetary.ratio": 10.0, "gear.worm.ratio": 10.0, "motor.torque_constant": 0.02}
+    values |= {"motor.back_emf_constant": 0.02, "motor.resistance": 2.0, "motor.rotor_inertia": 2e-5}
+    values |= {"limits.speed": 500.0}
+    changed = with_values(design, values, check=False)
+    return replace(changed, load=replace(changed.load, path="back-drivable"))
+
+
+def _pendulum_record(noise: float, *, drive: str) -> Record:
+    """Closed form: torque at the motor = J a + Cv w + (C0 + CM |M|) sgn w - M/N, M = m g l sin(phi + off)."""
+    n, phi = 100.0, 1.2 + _waves(0)
+    w, a = n * _waves(1), n * _waves(2)
+    moment = 1.0 * 9.80665 * 0.3 * np.sin(phi + 0.2)
+    torque = 3e-5 * a + 2e-5 * w + (4e-3 + 1.5e-3 * np.abs(moment)) * np.sign(w) - moment / n
+    rng = np.random.default_rng(3)
+    current = torque / 0.02 + noise * rng.standard_normal(len(TIME))
+    if drive == "current":
+        return _record(output_angle=phi, current=current)
+    return _record(output_angle=phi, voltage=2.0 * current + 0.02 * w, supply=12.0 + np.sin(TIME))
+
+
+@pytest.mark.parametrize("drive", ["current", "voltage"])
+def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
+    """From a current, or from a voltage with kE w taken off: no inductance is needed for either."""
+    design = _joint()
+    model = fit_records(design, [_pendulum_record(0.02, drive=drive)], gravity=True)
+    assert model["inertia"] == pytest.approx(3e-5, rel=0.01)
+    assert model["viscous"] == pytest.approx(2e-5, rel=0.02)
+    assert model["dry"] == pytest.approx(4e-3, rel=0.02)
+    assert model["load_coefficient"] == pytest.approx(1.5e-3, rel=0.02)
+    made = design_with_estimate(with_structure(design, model), joint_estimate(design, model, "record"))
+    gravity = read_design_text(write_design(made)).load.gravity
+    assert gravity is not None
+    assert gravity.peak_Nm == pytest.approx(9.80665 * 0.3, rel=2e-3)
+    assert gravity.offset_rad == pytest.approx(0.2, abs=2e-3)
+
+
+def test_a_pendulum_through_a_self_locking_gear_is_refused() -> None:
+    with pytest.raises(InputError, match="self-locking"):
+        fit_records(load_design("ilr33-amber"), [_pendulum_record(0.0, drive="current")], gravity=True)
+
+
+def test_gravity_left_out_shows_in_the_residual() -> None:
+    """The same record without a pendulum in the model: ten times as far off."""
+    record = _pendulum_record(0.02, drive="current")
+    without = fit_records(_joint(), [record])
+    assert without.relative_residual > 0.15
+    assert fit_records(_joint(), [record], gravity=True).relative_residual < 0.02
+
+
+def _stribeck(speed: np.ndarray) -> np.ndarray:
+    return np.interp(speed, [0.0, 0.01, 0.05, 0.2], [30.0, 18.0, 15.0, 30.0])
+
+
+def _axis_record(law: str, seed: int = 0) -> Record:
+    v, a = _waves(1, 0.05), _waves(2, 0.05)
+    size = np.abs(v)
+    friction = _stribeck(size) if law == "map" else 20.0 + 100.0 * size
+    noise = np.random.default_rng(seed).standard_normal(len(TIME))
+    force = 95.0 * a + friction * np.sign(v) + 1.0 + noise
+    return _record(position=_waves(0, 0.05), force=force)
+
+
+def test_a_friction_map_is_found_with_its_break_points() -> None:
+    """Truth: 30, 18, 15 N at 0, 0.01, 0.05 m/s, then rising 100 N per m/s."""
+    found = fit_map(load_design("emps"), [_axis_record("map")])
+    taken = next(law for law in found.laws if law.taken)
+    assert taken.breaks_rad_s == pytest.approx((0.01, 0.05), rel=0.25)
+    assert taken.criterion < -100.0
+    knots, model = found.knots_rad_s, found.model
+    assert knots is not None
+    torque = [model[f"map_{k}"] for k in range(len(knots))]
+    speeds = np.array([0.003, 0.02, 0.04, 0.1, 0.15])
+    assert np.interp(speeds, knots, torque) == pytest.approx(_stribeck(speeds), rel=0.05)
+    assert model["inertia"] == pytest.approx(95.0, rel=5e-3)
+
+
+def test_a_plain_law_needs_no_map() -> None:
+    """Over ten draws of noise the criterion never takes a map for a drive that has none."""
+    for seed in range(10):
+        found = fit_map(load_design("emps"), [_axis_record("plain", seed)])
+        assert found.knots_rad_s is None
+        assert next(law for law in found.laws if law.taken).name.startswith("plain")
+
+
+def test_the_map_goes_into_the_design_with_its_errors() -> None:
+    result = identify_bench(load_design("emps"), [_axis_record("map")], settings=BenchSettings(form="map"))
+    back = read_design_text(result.text)
+    points = back.friction.map(1)
+    assert points[0].speed_rad_s == 0.0
+    assert len(points) == 4
+    for k, point in enumerate(points, 1):
+        tolerance = back.parameters[f"friction.point.{k}.torque"].tolerance
+        assert point.torque_Nm == pytest.approx(result.model[f"map_{k - 1}"], rel=1e-6)
+        assert tolerance is not None
+    assert result.passed
+    assert result.resimulated[0].relative_error == pytest.approx(result.model.relative_residual, rel=1e-3)
+
+
+def test_a_voltage_drive_needs_a_resistance() -> None:
+    record = _record(position=_waves(0, 0.05), supply=np.full(len(TIME), 12.0))
+    with pytest.raises(InputError, match="no drive signal"):
+        fit_records(load_design("emps"), [record])
+
+
+def test_only_what_was_recorded_while_enabled_is_used() -> None:
+    """With the torque off for a second the fit is that of the rest, exactly."""
+    record = _axis_record("plain")
+    on = np.ones(len(TIME))
+    on[-3000:] = 0.0
+    force = np.where(on > 0.0, record["force"], 500.0)
+    told = replace(record, signals={**record.signals, "force": force, "enable": on})
+    cut = record.slice(0, len(TIME) - 3000)
+    design = load_design("emps")
+    whole, part = fit_records(design, [told]), fit_records(design, [cut])
+    assert whole.values == pytest.approx(part.values, rel=1e-12)
+    assert any("enabled from 0 s" in note for note in whole.records[0].notes)

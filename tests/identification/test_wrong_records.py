@@ -1,0 +1,278 @@
+"""Records that are wrong as records are on a bench: no design may come of them with status 0."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, parameter_value
+from actuator_lti.errors import InputError
+from analyses.identification.to_design import inertia_share
+from analyses.virtual_bench import BenchPlan, simulate_bench
+from analyses.virtual_bench_files import write_bench
+from analyses.virtual_bench_instruments import measure_bench
+from reports.cli.main import main
+from tests.identification.bench_records import Columns, columns_of, motion, write
+
+
+def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = main(list(arguments))
+    out, err = capsys.readouterr()
+    return int(status or 0), out, err
+
+
+@pytest.fixture(scope="module")
+def right() -> Columns:
+    return columns_of(motion(2))
+
+
+def _scaled(name: str, factor: float) -> Callable[[Columns], Columns]:
+    return lambda columns: {**columns, name: columns[name] * factor}
+
+
+def _swapped(columns: Columns) -> Columns:
+    return {**columns, "current_A": columns["motor_speed_rpm"], "motor_speed_rpm": columns["current_A"]}
+
+
+def _rpm_as_rad_s(columns: Columns) -> Columns:
+    return {("motor_speed_rad_s" if name == "motor_speed_rpm" else name): v for name, v in columns.items()}
+
+
+WRONG = {
+    "mA read as A": (_scaled("current_A", 1e3), "factor 1000"),
+    "A read as mA": (_scaled("current_A", 1e-3), "factor 1000"),
+    "rms read as peak": (_scaled("current_A", 0.5**0.5), "root 2"),
+    "rpm read as rad/s": (_rpm_as_rad_s, "60/2 pi"),
+    "a clock 5 % off": (_scaled("time_s", 1.05), "a clock +5 % off"),
+    "ms read as s": (_scaled("time_s", 1e3), "factor 1000"),
+    "two columns swapped": (_swapped, "columns of speed and current swapped"),
+    "the current's sign turned": (_scaled("current_A", -1.0), "does not explain"),
+    "degrees as turns": (_scaled("motor_angle_rad", 1.0 / 360.0), "times the rate of the angle"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_a_wrong_record_gives_no_design(
+    fault: str, right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, reason = WRONG[fault]
+    record = str(write(tmp_path / "r.csv", right, change))
+    status, out, err = _run(
+        capsys, "identify", record, "--design", "ilr33-amber", "--out", str(tmp_path / "o"), "--json"
+    )
+    assert not list((tmp_path / "o").glob("*.toml"))
+    if status == 2:
+        assert reason in err
+        return
+    found = json.loads(out)
+    assert status == 1
+    assert not found["passed"]
+    assert found["design"] is None
+    assert reason in " ".join(check["reason"] for check in found["checks"])
+
+
+def test_the_right_record_gives_the_drive_that_made_it(
+    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
+    record, out = str(write(tmp_path / "r.csv", right)), tmp_path / "o"
+    status, text, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
+    truth, found = load_design("ilr33-amber"), load_design(out / "ilr33-amber-identified.toml")
+    assert status == 0
+    assert found.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
+    assert found.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
+    assert found.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
+    again = json.loads(text)["written_design_against"][0]
+    assert again["relative_error"] < 0.03
+    status, text, _ = _run(capsys, "correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
+    assert status == 0
+    own = json.loads(text)["records"][0]["signals"]["current"]["relative_error"]
+    assert own == pytest.approx(again["relative_error"], rel=1e-9)
+
+
+@pytest.mark.parametrize("key", ["motor.rotor_inertia", "load.inertia"])
+def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
+    """What the other inertias leave of the whole, at the shaft of the key: equation 12 turned round."""
+    design = load_design("ilr33-amber")
+    value, slope = inertia_share(design, design.inertia_kgm2, key)
+    assert value == pytest.approx(parameter_value(design, key), rel=1e-4)
+    assert slope == (1.0 if key == "motor.rotor_inertia" else 2376.0**2)
+    with pytest.raises(InputError, match="beside"):
+        inertia_share(design, 1e-8, key)
+    with pytest.raises(InputError, match=r"motor\.rotor_inertia or load\.inertia"):
+        inertia_share(design, 1e-6, "gear.worm.ratio")
+
+
+def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
+    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
+    record, out = str(write(tmp_path / "r.csv", noisy)), tmp_path / "o"
+    arguments = ["identify", record, "--design", "ilr33-amber", "--out", str(out)]
+    assert _run(capsys, *arguments, "--cutoff", "400")[0] == 1
+    assert not list(out.glob("*.toml"))
+    status, text, _ = _run(capsys, *arguments, "--cutoff", "400", "--accept")
+    assert status == 1
+    assert "accepted, a check failed" in " ".join(text.split())
+    assert list(out.glob("*.toml"))
+
+
+def test_every_column_is_accounted_for(
+    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
+    record = str(write(tmp_path / "r.csv", more))
+    _, out, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--json")
+    inputs = {row["column"]: row["use"] for row in json.loads(out)["records"][0]["inputs"]}
+    assert set(inputs) == set(more)
+    assert inputs["current_A"].startswith("drive")
+    assert inputs["temperature_C"] == "no: no name that is known"
+    assert inputs["current_mA"] == "no: motor current is read from current_A"
+    assert inputs["motor_speed_rpm"].startswith("no: ")
+
+
+@pytest.mark.parametrize(
+    ("signal", "reason"),
+    [
+        ('signals.banana = { column = "current_A", unit = "A" }', "signals.banana: no signal that is known"),
+        ('signals.curent = { column = "current_A", unit = "A" }', 'did you mean "current"?'),
+        ('signals.current = { column = "current_A", unit = "V" }', "must be a unit like A"),
+        ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
+    ],
+)
+def test_a_signal_that_nothing_reads_is_refused(
+    signal: str, reason: str, right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "r.csv", right)
+    text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
+    (tmp_path / "r.toml").write_text(text)
+    status, _, err = _run(capsys, "identify", str(tmp_path / "r.toml"), "--design", "ilr33-amber")
+    assert status == 2
+    assert reason in err
+    assert err.count("\n") == 1
+
+
+def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path: Path) -> None:
+    from actuator_lti.design import with_values
+    from analyses.correlation import correlate_record
+    from analyses.records import open_record
+    from nonlinear import commands, loads, simulate
+
+    design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
+    run = simulate(design, commands.sine(0.08, 2.0), 0.6, loads.proportional(-60.0))
+    run.to_csv(tmp_path / "r.csv")
+    result = correlate_record(design, open_record(tmp_path / "r.csv"))
+    assert max(signal.relative_error for signal in result.signals) < 1e-9
+    without = correlate_record(load_design("ilr33-amber"), open_record(tmp_path / "r.csv"))
+    assert without["current"].relative_error > 0.1
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
+    logs, _ = measure_bench(simulate_bench(load_design("ilr33-amber"), plan), 2)
+    folder = tmp_path_factory.mktemp("bench")
+    write_bench(folder, logs, design="ilr33-amber", seed=2)
+    return folder
+
+
+def _slow_sensor(folder: Path) -> None:
+    for file in folder.glob("*_torque.csv"):
+        head, names, *rows = file.read_text().splitlines()
+        pairs = (row.split(",") for row in rows)
+        file.write_text("\n".join([head, names, *(f"{float(t) * 1.05:.4f},{m}" for t, m in pairs)]) + "\n")
+
+
+def _other_sensor(folder: Path) -> None:
+    shutil.copy(folder / "run09_torque.csv", folder / "run05_torque.csv")
+
+
+def _other_drive(folder: Path) -> None:
+    shutil.copy(folder / "run09_drive.csv", folder / "run08_drive.csv")
+
+
+def _replaced(*pairs: tuple[str, str]) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        text = (folder / "campaign.toml").read_text()
+        for old, new in pairs:
+            assert old in text
+            text = text.replace(old, new)
+        (folder / "campaign.toml").write_text(text)
+
+    return change
+
+
+SWAP = (('"Current"', '"X"'), ('"Speed"', '"Current"'), ('"X"', '"Speed"'))
+WRONG_BENCH = {
+    "mA read as A": (_replaced(('unit = "mA"', 'unit = "A"')), "factor 1000"),
+    "rpm read as rad/s": (_replaced(('unit = "rpm"', 'unit = "rad/s"')), "60/2 pi"),
+    "N m read as N cm": (_replaced(('"torque", unit = "N*m"', '"torque", unit = "N*cm"')), "factor 100"),
+    "two columns swapped": (_replaced(*SWAP), "usable runs"),
+    "the sensor's clock 5 % off": (_slow_sensor, "a clock is off"),
+    "another run's sensor file": (_other_sensor, "that of run 09 as well"),
+    "another run's drive file": (_other_drive, "set speed"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG_BENCH)
+def test_a_wrong_campaign_gives_no_design(
+    fault: str, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, reason = WRONG_BENCH[fault]
+    folder = tmp_path / "bench"
+    shutil.copytree(campaign, folder)
+    change(folder)
+    arguments = ("--suggest", "0", "--json", "--out", str(tmp_path / "o"))
+    status, out, err = _run(capsys, "identify", str(folder / "campaign.toml"), *arguments)
+    assert status in (1, 2)
+    assert reason in out + err
+    assert not list((tmp_path / "o").glob("*.toml"))
+
+
+def test_a_right_campaign_is_simulated_again_with_what_was_written(
+    campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, out, _ = _run(capsys, "identify", str(campaign / "campaign.toml"), "--suggest", "0", "--json")
+    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+    assert status == 0
+    assert checks["written-the runs"]["value"] < 0.005
+    inputs = {(row["file"], row["column"]) for row in json.loads(out)["inputs"]}
+    assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
+
+
+def test_unloaded_runs_say_what_they_do_not_tell(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The commonest friction test: no load, so CM stays the design's, and that is said."""
+    folder = tmp_path / "bench"
+    shutil.copytree(campaign, folder)
+    head, *runs = (campaign / "campaign.toml").read_text().split("[[run]]")
+    text = head + "".join(f"[[run]]{run}" for run in (*runs[:3], runs[1].replace('id = "02"', 'id = "99"')))
+    (folder / "unloaded.toml").write_text(text)
+    status, out, _ = _run(capsys, "identify", str(folder / "unloaded.toml"), "--json")
+    found = json.loads(out)
+    assert status == 0
+    assert found["held"] == {"CM": "no run is loaded: the design's value kept"}
+    assert found["coefficients"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
+    assert found["coefficients"]["CM"]["value"] == 1.34e-3
+
+
+def test_a_coefficient_of_a_campaign_can_be_fixed(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("identify", str(campaign / "campaign.toml"), "--json", "--out", str(tmp_path))
+    status, out, _ = _run(capsys, *arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
+    found = json.loads(out)
+    assert status == 0
+    assert found["held"] == {"Cv": "fixed as asked"}
+    assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
+    status, _, _ = _run(capsys, *arguments[:3], "--fix", "friction.load_coefficient=0")
+    assert status == 1
+    status, _, err = _run(capsys, *arguments[:3], "--fix", "motor.resistance=1 ohm")
+    assert (status, "a campaign can fix" in err) == (2, True)

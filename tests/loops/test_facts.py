@@ -1,0 +1,127 @@
+"""What a drive can do: against the simulator, against first principles, and many against one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from loop_designs import amber, emps, without
+from test_stacked import DRIVES, scattered
+from two_mass import drive_d, drive_e
+
+from actuator_lti.design.access import stacked
+from actuator_lti.design.model import (
+    Controller,
+    Design,
+    Friction,
+    FrictionPoint,
+    Limits,
+    Load,
+    LoadFriction,
+    Motor,
+    PositionLoop,
+    Temperature,
+    Validation,
+)
+from actuator_lti.drive.facts import (
+    RATE_LIMITS,
+    Capability,
+    breakaway_torque_Nm,
+    capability,
+    stall_torque_Nm,
+    torque_gain_Nm_rad,
+)
+from analyses.drive_figures import drive_figures
+
+
+def force_source(ratio: float = 2.0) -> Design:
+    """A mass of 2 kg m2 pushed by an ideal source of 4 N m/V at up to 10 V, friction 5 N m."""
+    return Design(
+        name="source",
+        title="",
+        motor=Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
+        controller=Controller(period_s=1e-4, computing_delay_s=0.0, position=PositionLoop(gain=1e6)),
+        limits=Limits(voltage_V=10.0),
+        validation=Validation(full_deflection_rad=1.0),
+        load=Load(path="back-drivable", moment_max_Nm=30.0),
+        friction=Friction(dry_torque_Nm=5.0, breakaway_ratio=ratio),
+    )
+
+
+@pytest.mark.parametrize(("load", "starts"), [(-20.0, True), (-29.0, True), (-31.0, False)])
+def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: bool) -> None:
+    """40 N m against 2 x 5 + load: the drive starts up to 30 N m, and then 5 + load holds it back."""
+    from nonlinear import commands, simulate
+
+    design = force_source()
+    found = drive_figures(design, load)
+    expected = (40.0 - 5.0 - abs(load)) / 2.0 if starts else 0.0
+    assert found.acceleration_rad_s2 == pytest.approx(expected)
+    run = simulate(design, commands.step(1.0), duration_s=0.02, load_Nm=load)
+    travelled = run.output_angle_rad[-1]
+    assert travelled == pytest.approx(0.5 * expected * run.time_s[-1] ** 2, rel=1e-6, abs=1e-12)
+
+
+def test_a_map_of_friction_bounds_the_speed() -> None:
+    """U = R i + kE w with the map's torque: on its second piece 0.02 + 1e-4 (w - 100)."""
+    rows = ((0.0, 0.05), (100.0, 0.02), (900.0, 0.1))
+    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in rows)
+    design = replace(drive_e(), friction=Friction(points=points), coupling=None, load=Load())
+    found = capability(design)
+    w = found.output_rate_rad_s * design.total_ratio
+    i = (0.02 + 1e-4 * (w - 100)) / 0.05
+    assert 0.5 * i + 0.05 * w == pytest.approx(48.0, rel=1e-12)
+    assert found.motor_current_A == pytest.approx(i, rel=1e-12)
+    assert RATE_LIMITS[int(found.rate_limit)] == "voltage"
+
+
+def test_friction_behind_the_coupling_counts() -> None:
+    """Both frictions at the motor: Cv + Cv_l/N_c^2, C0_l/N_c; each dry part held by its own ratio."""
+    behind = LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
+    design = drive_d()
+    design = replace(
+        design,
+        friction=Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2),
+        load=replace(design.load, friction=behind),
+    )
+    assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(1.2 * 0.01 + 1.5 * 3.0 / 10)
+    w = capability(design).output_rate_rad_s * 10
+    needed = 0.01 + 0.3 + (1e-5 + 0.2 / 100) * w
+    assert 0.5 * needed / 0.05 + 0.05 * w == pytest.approx(48.0, rel=1e-12)
+
+
+def test_a_hot_motor_is_weaker() -> None:
+    warm = Temperature(winding_degC=125.0, magnet_degC=75.0)
+    hot = replace(drive_d(), temperature=warm)
+    R, kM = 0.5 * (1 + 0.00393 * 100), 0.05 * (1 - 0.0011 * 50)
+    assert stall_torque_Nm(hot) == pytest.approx(kM * 48.0 / R)
+
+
+def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
+    """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
+    base = drive_e()
+    assert base.controller.current is not None
+    current = replace(base.controller.current, integral_time_s=None, resistance_feedforward=0.6)
+    design = replace(base, controller=replace(base.controller, current=current))
+    share = (0.8 + 0.3) / (0.8 + 0.5)
+    assert torque_gain_Nm_rad(design) == pytest.approx(20.0 * 10 * 0.05 * 0.05 * share)
+
+
+@pytest.mark.parametrize("name", [*DRIVES, "emps with offset"])
+@pytest.mark.parametrize("load", [0.0, 3.0])
+def test_many_drives_are_each_of_them_alone(name: str, load: float) -> None:
+    design = DRIVES.get(name, emps())
+    values = scattered(design, 6)
+    many = capability(stacked(design, values), load)
+    for k in range(6):
+        alone = capability(stacked(design, {path: float(v[k]) for path, v in values.items()}), load)
+        for attribute in Capability.__dataclass_fields__:
+            mine = np.broadcast_to(getattr(many, attribute), 6)[k]
+            assert mine == pytest.approx(getattr(alone, attribute), rel=1e-12, nan_ok=True), attribute
+
+
+def test_the_speed_limit_belongs_to_the_position_stage() -> None:
+    """The speed command is clamped where a position loop gives it; without a velocity loop there is none."""
+    assert drive_figures(amber()).rate_limit == "speed limit"
+    assert drive_figures(without(amber(), "velocity", gain=1.0)).rate_limit == "voltage"

@@ -1,0 +1,214 @@
+"""The wider drive in all three forms: limits of the sampled one, hand-made transfer functions, budgets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from test_stacked import FILTERS, everything
+from two_mass import drive_d, drive_e
+
+from actuator_lti import InputError, assemble_loops, delay_budget
+from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
+from actuator_lti.drive.blocks import biquad, lag, tracking
+from actuator_lti.drive.signals import LIMITERS
+
+
+def faster(design: Design, factor: float) -> Design:
+    """The same continuous drive, sampled faster (its filters stay)."""
+    control_ = design.controller
+    quick = replace(
+        control_,
+        period_s=control_.period_s / factor,
+        computing_delay_s=control_.computing_delay_s / factor,
+    )
+    return replace(design, controller=quick)
+
+
+def response(system: Any, omega: np.ndarray) -> np.ndarray:
+    return np.asarray(system(np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega))
+
+
+@pytest.mark.parametrize("form", ["sampled", "continuous"])
+def test_every_form_of_the_whole_drive_tends_to_the_ideal_one(form: Any) -> None:
+    """First order in Ts for every loop, break point, the command and the moment."""
+    design, omega = everything(), np.array([20.0, 100.0, 300.0])
+    ideal = assemble_loops(design, "ideal")
+    worst = []
+    for factor in (64, 128):
+        loops = assemble_loops(faster(design, factor), form)
+        pairs = [(loop.open_loop, getattr(ideal, name).open_loop) for name, loop in loops.present.items()]
+        points = ("w_ref", "output")
+        pairs += [(loops.break_points[p].open_loop, ideal.break_points[p].open_loop) for p in points]
+        paths = ("reference_to_output", "moment_to_output")
+        pairs += [(getattr(loops, name), getattr(ideal, name)) for name in paths]
+        gaps = [np.max(np.abs(response(a, omega) / response(b, omega) - 1)) for a, b in pairs]
+        worst.append(np.array(gaps))
+    assert np.all(worst[1] < 0.02)
+    assert np.all(worst[0] / worst[1] > 1.8)
+
+
+def test_pid_with_filters_by_hand() -> None:
+    """Ideal form: Kv (1 + 1/(Ti s) + Td s/(TD s + 1)) in front of the closed velocity loop."""
+    base = drive_e()
+    pid = PositionLoop(gain=20.0, integral_time_s=0.2, derivative_time_s=2e-3, derivative_filter_s=1e-3)
+    one, two = (
+        assemble_loops(replace(base, controller=replace(base.controller, position=law)), "ideal").position
+        for law in (PositionLoop(gain=20.0), pid)
+    )
+    assert one is not None
+    assert two is not None
+    s = 1j * np.geomspace(1, 1000, 10)
+    law = 1 + 1 / (0.2 * s) + 2e-3 * s / (1e-3 * s + 1)
+    np.testing.assert_allclose(two.open_loop(s), law * one.open_loop(s), rtol=1e-9)
+
+
+def test_torque_filters_multiply_the_velocity_loop() -> None:
+    plain, filtered = (assemble_loops(drive_d(*f), "ideal").velocity for f in ((), FILTERS[:3]))
+    assert plain is not None
+    assert filtered is not None
+    s = 1j * np.geomspace(1, 5000, 10)
+    w2, w1 = 2000.0, 900.0
+    shape = w2**2 / (s**2 + np.sqrt(2) * w2 * s + w2**2)
+    shape = shape * (s**2 + 30 * s + w1**2) / (s**2 + 300 * s + w1**2)
+    shape = shape * (s / 500 + 1) / (s / 1500 + 1)
+    np.testing.assert_allclose(filtered.open_loop(s), shape * plain.open_loop(s), rtol=1e-9)
+
+
+def test_resistance_and_back_emf_feedforward_make_the_current_loop_ideal() -> None:
+    """With k = 1 and w itself measured, the current loop is that of a locked rotor: back-EMF is gone."""
+    base = drive_d()
+    assert base.controller.current is not None
+    fed = replace(base.controller, current=replace(base.controller.current, back_emf_feedforward=1.0))
+    free = assemble_loops(replace(base, controller=fed), "ideal").current
+    locked = assemble_loops(base, "ideal", rotor="locked").current
+    assert free is not None
+    assert locked is not None
+    s = 1j * np.geomspace(1, 1e4, 10)
+    np.testing.assert_allclose(free.open_loop(s), locked.open_loop(s), rtol=1e-9)
+    sampled = assemble_loops(replace(base, controller=fed)).current
+    assert sampled is not None
+    assert sampled.periodic  # the speed is measured every other tick
+
+
+def test_faces_of_the_blocks_agree_at_low_frequency() -> None:
+    omega, T = np.array([2.0, 20.0]), 2e-4
+    blocks = [lag(2e-3, T), *(biquad(item, T) for item in FILTERS)]
+    for block in blocks:
+        np.testing.assert_allclose(block.at_z(omega), block.at_s(omega), rtol=1e-3)
+    # the tracking loop takes the angle gained when sampled, the speed when continuous
+    block, z = tracking(400.0, T), np.exp(1j * omega * T)
+    gained = (1 - 1 / z) / (1j * omega)
+    np.testing.assert_allclose(block.at_z(omega) * gained, block.at_s(omega), rtol=5e-3)
+    for item in FILTERS:  # Tustin, prewarped: exact at its own frequency
+        centre = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5
+        block = biquad(item, T)
+        at = np.array([centre])
+        np.testing.assert_allclose(block.at_z(at), block.at_s(at), rtol=1e-10)
+    with pytest.raises(InputError, match="below pi/T"):
+        biquad(Filter(kind="lowpass", frequency_rad_s=2e4), T)
+
+
+def test_the_given_biquad_goes_to_continuous_time_and_back() -> None:
+    item = Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(1.0, -0.9, 0.25))
+    block, T = biquad(item, 1e-3), 1e-3
+    omega = np.array([1.0, 300.0, 2000.0])
+    warped = 2 / T * np.tan(omega * T / 2)
+    np.testing.assert_allclose(block.at_z(omega), block.continuous.response(1j * warped), rtol=1e-12)
+    z = np.exp(1j * omega * T)
+    by_hand = (0.2 * z**2 + 0.1 * z + 0.05) / (z**2 - 0.9 * z + 0.25)
+    np.testing.assert_allclose(block.at_z(omega), by_hand, rtol=1e-12)
+
+
+def test_the_budget_has_a_share_for_each_filter() -> None:
+    """In the velocity loop a filter's share is its own phase; the shares and the rest sum to the loop's."""
+    design, omega = everything(), 150.0
+    for name in ("velocity", "position"):
+        budget = delay_budget(design, name, omega)
+        loop = getattr(assemble_loops(design), name)
+        exact = np.angle(loop.open_loop(np.exp(1j * omega * loop.period_s)), deg=True)
+        assert sum(budget.items.values()) == pytest.approx(budget.total_deg, abs=1e-9)
+        assert (budget.total_deg - exact + 180) % 360 - 180 == pytest.approx(0, abs=1e-6)
+        assert len(budget.filters_deg) == 5
+    current = design.controller.current
+    assert current is not None
+    unfed = replace(design.controller, current=replace(current, back_emf_feedforward=0.0))
+    shares = delay_budget(replace(design, controller=unfed), "velocity", omega).filters_deg
+    s = 1j * omega
+    own = np.angle(2000.0**2 / (s**2 + np.sqrt(2) * 2000.0 * s + 2000.0**2), deg=True)
+    assert shares["torque lowpass 1 2000 rad/s"] == pytest.approx(own, abs=1e-6)
+    assert shares["speed filter 5000 rad/s"] == pytest.approx(-np.degrees(np.arctan(omega * 2e-4)), abs=1e-6)
+
+
+def test_limiters_of_the_torque_path_and_of_the_overload() -> None:
+    base = everything()
+    limits = Limits(voltage_V=24.0, speed_rad_s=300.0, acceleration_rad_s2=1e4, peak_current_A=15.0,
+                    continuous_current_A=5.0, peak_time_s=1.0)  # fmt: skip
+    loops = assemble_loops(replace(base, limits=limits))
+    assert list(loops.limiters) == list(LIMITERS)
+    omega = np.array([1.0, 40.0])
+    # at low frequency the filters change nothing: both clamps of the torque path are reached together
+    first, second = (loops.limiters[n].onset_amplitude_rad(omega) for n in ("torque-command", "current"))
+    np.testing.assert_allclose(first[0], second[0], rtol=1e-3)
+    assert abs(first[1] / second[1] - 1) > 1e-3
+    # the mean square of the current: sqrt(2) of the continuous current, but for the ripple
+    overload = loops.limiters["overload"]
+    ratio = overload.onset_amplitude_rad(omega) * np.abs(overload.response(omega)) / 5.0
+    tau = 1.0 / np.log(9 / 8)
+    np.testing.assert_allclose(ratio, np.sqrt(2 / (1 + 1 / np.hypot(1, 2 * omega * tau))), rtol=1e-12)
+    assert overload.onset_amplitude_rad(omega, bias=6.0)[0] == 0.0
+
+
+def test_ripple_of_the_overload_by_integration() -> None:
+    """dx/dt = (i^2 - x)/tau under i = b + I sin(w t): the bound is met where b = 0, kept where it is not."""
+    from scipy.integrate import solve_ivp
+
+    limits = Limits(voltage_V=24.0, peak_current_A=15.0, continuous_current_A=5.0, peak_time_s=1.0)
+    path = assemble_loops(replace(everything(), limits=limits)).limiters["overload"]
+    tau, omega = 1.0 / np.log(9 / 8), 0.3
+    for bias in (0.0, 2.0):
+        gain = np.abs(path.response([omega]))[0]
+        size = path.onset_amplitude_rad([omega], bias)[0] * gain
+
+        def rate(t: float, x: np.ndarray, b: float = bias, a: float = size) -> np.ndarray:
+            return ((b + a * np.sin(omega * t)) ** 2 - x) / tau
+
+        run = solve_ivp(rate, (0, 200), [0.0], rtol=1e-9, atol=1e-9, max_step=0.2)
+        top = np.max(run.y[0])
+        assert top <= 25.0 * (1 + 1e-6)
+        assert top > (25.0 * 0.999 if bias == 0.0 else 20.0)
+
+
+def test_any_loop_goes_through_python_control() -> None:
+    """Names of states and signals, and its own functions on them."""
+    loops = assemble_loops(everything())
+    for loop in (*loops.present.values(), *loops.break_points.values()):
+        assert len(set(loop.open_loop.state_labels)) == loop.open_loop.nstates
+        assert len(loop.closed_loop.poles()) == loop.closed_loop.nstates
+        control.frequency_response(loop.open_loop, np.array([10.0, 100.0, 1000.0]))
+    assert "W" in loops.velocity.open_loop.state_labels  # type: ignore[union-attr]
+    total = control.feedback(loops.position.open_loop, 1)  # type: ignore[union-attr]
+    assert total.nstates == loops.position.open_loop.nstates  # type: ignore[union-attr]
+    ideal = assemble_loops(everything(), "ideal")
+    assert "torque2_0" in ideal.velocity.open_loop.state_labels  # type: ignore[union-attr]
+    control.step_response(ideal.reference_to_output, np.linspace(0, 0.1, 50))
+
+
+def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() -> None:
+    """A bare D is proper in front of this plant, as the angle's derivative is a state."""
+    base = drive_e()
+    bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
+    loop = assemble_loops(replace(base, controller=replace(base.controller, position=bare)), "ideal").position
+    plain = assemble_loops(base, "ideal").position
+    assert loop is not None
+    assert plain is not None
+    s = 1j * np.geomspace(1, 1000, 10)
+    np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
+
+
+def test_encoder_tracking_needs_its_bandwidth() -> None:
+    with pytest.raises(InputError, match="bandwidth"):
+        assemble_loops(replace(drive_d(), encoder=Encoder(speed="tracking")))

@@ -1,0 +1,117 @@
+"""Exact delays, certified: verdict by the direct method of Walton and Marshall, crossings by a dense grid."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+from margin_families import poly, roots_of, uniform
+from margin_truth import Truth, truth_of
+
+from actuator_lti import DelaySystem
+from actuator_lti.margins import stability_margins
+from actuator_lti.margins.delay_form import from_rational
+from actuator_lti.margins.exact_delay import exact_delay_loop
+from actuator_lti.margins.loop import rational_loop
+
+LOOPS = 12
+
+
+def random_loop(rng: np.random.Generator) -> tuple[control.TransferFunction, float]:
+    """Strictly proper, one or two integrators or none, and a delay that matters at the last crossover."""
+    n = int(rng.integers(1, 5))
+    poles = roots_of(rng, n, 2.0, wrong=0.15) + [0j] * int(rng.integers(0, 3))
+    zeros = roots_of(rng, int(rng.integers(0, len(poles))), 2.0)
+    num, den = poly(zeros), poly(poles)
+    w = uniform(rng, -1.0, 1.0)
+    gain = uniform(rng, -0.5, 1.0) / abs(np.polyval(num, 1j * w) / np.polyval(den, 1j * w))
+    return control.tf(gain * num, den), uniform(rng, -2.0, 0.7) / w
+
+
+def unstable_with_delay(loop: Truth, delay_s: float) -> int:
+    """Unstable poles: those without delay, and a pair for each delay below it at which one crosses the axis.
+
+    At a gain crossover they cross at the delays (phase margin + 2 pi k)/w, to the right where the gain falls.
+    """
+    count = loop.unstable
+    falling = True  # strictly proper: the last crossover falls, and they alternate
+    pairs = zip(loop.gain_crossovers, loop.phase_margins_deg, strict=True)
+    for w, deg in reversed(list(pairs)):
+        turns = math.floor((delay_s * w - math.radians(deg % 360.0)) / (2 * math.pi)) + 1
+        count += 2 * max(turns, 0) * (1 if falling else -1)
+        falling = not falling
+    return count
+
+
+@pytest.mark.parametrize("seed", range(LOOPS))
+def test_verdict_crossovers_and_crossings_under_a_delay(seed: int) -> None:
+    rng = np.random.default_rng([seed, 7])
+    loop, delay_s = random_loop(rng)
+    without = truth_of(loop)
+    m = stability_margins(loop, delay_s=delay_s, certify=True)
+    assert m.evidence == "certified", m.evidence_reason
+    assert m.agreement.unstable_poles == unstable_with_delay(without, delay_s)
+    assert m.stable is (m.agreement.unstable_poles == 0)
+    assert [p.frequency_rad_s for p in m.phase_margins] == pytest.approx(without.gain_crossovers, rel=1e-9)
+    for ours, free, w in zip(
+        m.phase_margins, without.phase_margins_deg, without.gain_crossovers, strict=True
+    ):
+        assert math.remainder(ours.deg - free + math.degrees(delay_s * w), 360.0) == pytest.approx(
+            0, abs=1e-6
+        )
+    crossed = crossings_on_a_grid(loop, delay_s, m.band_rad_s[1])
+    found = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins if g.frequency_rad_s > 0]
+    assert len(found) == len(crossed)
+    assert found == [(pytest.approx(w, rel=1e-3), pytest.approx(k, rel=0.02)) for w, k in crossed]
+    assert m.modulus_margin is not None
+    nearest = nearest_on_a_grid(loop, delay_s)
+    assert m.modulus_margin <= nearest * (1 + 1e-6) or (m.modulus_margin == 1.0 and nearest > 0.9999)
+
+
+def grid(loop: control.TransferFunction, delay_s: float, top: float) -> tuple[np.ndarray, np.ndarray]:
+    w = np.geomspace(1e-5, top, 400_000)
+    response = np.polyval(loop.num[0][0], 1j * w) / np.polyval(loop.den[0][0], 1j * w)
+    return w, response * np.exp(-1j * w * delay_s)
+
+
+def crossings_on_a_grid(
+    loop: control.TransferFunction, delay_s: float, top: float
+) -> list[tuple[float, float]]:
+    w, L = grid(loop, delay_s, 2 * top)
+    hit = np.flatnonzero((L.imag[1:] * L.imag[:-1] < 0) & (L.real[1:] < 0) & (L.real[:-1] < 0))
+    return [(float(w[k]), float(1 / abs(L[k]))) for k in hit if abs(L[k]) >= 0.01]
+
+
+def nearest_on_a_grid(loop: control.TransferFunction, delay_s: float) -> float:
+    return float(np.abs(1 + grid(loop, delay_s, 1e3)[1]).min())
+
+
+def test_many_turns_of_the_delay_that_collocation_cannot_follow_are_certified() -> None:
+    loop, delay_s = control.tf([30, 30], [1, 0.2, 0]), 1.1
+    m = stability_margins(loop, delay_s=delay_s, band_rad_s=(0.0, 60.0))
+    assert m.agreement.unstable_poles == unstable_with_delay(truth_of(loop), delay_s)
+    assert m.agreement.unstable_poles == m.agreement.unstable_nyquist
+    assert (m.evidence, m.stable) == ("certified", False)
+
+
+def test_delays_inside_and_in_series_are_certified_alike() -> None:
+    plant = DelaySystem.from_system(control.tf([300], [1 / 80, 1, 0]))
+    inner = (plant * DelaySystem.delay(0.002)).feedback()
+    outer = inner * DelaySystem.delay(0.001) * DelaySystem.from_system(control.tf([30], [1, 0]))
+    checked, certified = stability_margins(outer), stability_margins(outer, certify=True)
+    assert (checked.evidence, certified.evidence) == ("checked", "certified")
+    assert certified.stable is checked.stable
+    for a, b in zip(checked.phase_margins, certified.phase_margins, strict=True):
+        assert (a.deg, a.frequency_rad_s) == (pytest.approx(b.deg), pytest.approx(b.frequency_rad_s))
+    for c, d in zip(checked.gain_margins, certified.gain_margins, strict=True):
+        assert (c.ratio, c.frequency_rad_s) == (pytest.approx(d.ratio), pytest.approx(d.frequency_rad_s))
+
+
+def test_determinants_of_a_loop_with_a_delay_in_series_are_its_coefficients() -> None:
+    loop = exact_delay_loop(from_rational(rational_loop(control.tf([3, 5], [1, 4, 7])), 0.25))
+    ((num, delay),), ((den, none),) = loop.N.terms, loop.D.terms
+    assert [float(c.p) / float(c.q) for c in num.coeffs()] == [5.0, 3.0]
+    assert [float(c.p) / float(c.q) for c in den.coeffs()] == [7.0, 4.0, 1.0]
+    assert (float(delay.p) / float(delay.q), none) == (0.25, 0)

@@ -1,0 +1,85 @@
+"""Harsh families of loops: none wrong where the data determine the answer, hardly any withheld there.
+
+Truth is mpmath at high precision on the exact values of the doubles. What 8 ulp of the entries change, the
+data do not determine: there any answer is allowed, and withholding is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from margin_families import FAMILIES, Loop
+from margin_truth import determined, difference, truth_of
+
+from actuator_lti.margins import StabilityMargins, stability_margins
+
+TRUE_LOOPS = 16  # of each family, against mpmath
+LOOPS = 120  # of each family, double precision against exact arithmetic
+Family = Callable[[np.random.Generator], Loop]
+
+
+def problem(loop: Loop, m: StabilityMargins, rng: np.random.Generator) -> str | None:
+    answer = truth_of(loop)
+    found = difference(m, answer, float(loop.dt) if loop.dt else 1.0, 1e-6)
+    return found if found is not None and determined(loop, answer, rng) else None
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+def test_the_answer_is_the_truth_where_the_data_determine_it(
+    family: Family, capfd: pytest.CaptureFixture[str]
+) -> None:
+    wrong = []
+    for k in range(TRUE_LOOPS):
+        rng = np.random.default_rng([k, 1])
+        loop = family(rng)
+        m = stability_margins(loop)
+        if found := problem(loop, m, rng):
+            wrong.append((k, m.evidence, found))
+    assert not wrong
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+def test_what_double_precision_has_checked_is_what_exact_arithmetic_certifies(
+    family: Family, capfd: pytest.CaptureFixture[str]
+) -> None:
+    wrong, kinds = [], set()
+    for k in range(LOOPS):
+        loop = family(np.random.default_rng([k, 2]))
+        m = stability_margins(loop)
+        kinds.add(m.evidence)
+        assert m.evidence_reason
+        if m.evidence != "checked":
+            continue
+        exact = stability_margins(loop, certify=True)
+        if exact.evidence == "certified" and (found := unlike(m, exact)):
+            wrong.append((k, found))
+    assert not wrong
+    assert kinds & {"checked", "certified"}
+    assert capfd.readouterr() == ("", "")
+
+
+def unlike(m: StabilityMargins, exact: StabilityMargins) -> str | None:
+    if m.stable is not exact.stable or m.agreement.unstable_poles != exact.agreement.unstable_poles:
+        return f"{m.agreement}, not {exact.agreement}"
+    for name in ("gain_margins", "phase_margins"):
+        ours, theirs = getattr(m, name), getattr(exact, name)
+        if name == "gain_margins":  # those far from -1 that the data do not determine are not certified
+            ours, theirs = ([g for g in part if 1 / 30 < g.ratio < 30] for part in (ours, theirs))
+        if len(ours) != len(theirs):
+            return f"{name}: {ours}, not {theirs}"
+        for a, b in zip(ours, theirs, strict=True):
+            value = (a.ratio, b.ratio) if name == "gain_margins" else (a.deg, b.deg)
+            if not math.isclose(*value, rel_tol=1e-8, abs_tol=1e-6) or not (
+                a.frequency_rad_s == b.frequency_rad_s
+                or math.isclose(a.frequency_rad_s, b.frequency_rad_s, rel_tol=1e-8)
+            ):
+                return f"{name}: {a}, not {b}"
+    assert m.modulus_margin is not None
+    assert exact.modulus_margin is not None
+    if not math.isclose(m.modulus_margin, exact.modulus_margin, rel_tol=1e-7, abs_tol=1e-12):
+        return f"modulus margin {m.modulus_margin}, not {exact.modulus_margin}"
+    return None

@@ -1,0 +1,380 @@
+"""Loads, supply, overload, instruments, profile and other outermost stages against laws and closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from actuator_lti import load_design
+from actuator_lti.design.model import (
+    Command,
+    CurrentLoop,
+    Design,
+    Filter,
+    Friction,
+    Gravity,
+    Instruments,
+    Limits,
+    Motor,
+    PositionLoop,
+    Supply,
+)
+from actuator_lti.errors import InputError
+from nonlinear import Drive, Probe, Rows, State, commands, loads, simulate
+
+AMBER = load_design("ilr33-amber")
+FREE = Friction(viscous_Nms_rad=1e-6)
+GAIN = 0.05  # V/A, of a current loop that hardly acts
+
+
+def changed(design: Design = AMBER, **control: object) -> Design:
+    return replace(design, controller=replace(design.controller, **control))
+
+
+def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
+    """Every tick integrated afresh with the moment of its beginning."""
+    ticks, Ts = 200, AMBER.controller.period_s
+    load = replace(
+        AMBER.load,
+        path="back-drivable",
+        moment_slope_Nm_rad=-300.0,
+        gravity=Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7),
+    )
+    design = changed(
+        replace(AMBER, load=load, friction=FREE, limits=Limits(voltage_V=1e9)), computing_delay_s=0.0
+    )
+    u, t = 6.0 * np.sin(0.02 * np.arange(ticks)), np.arange(ticks) * Ts
+    series = 20.0 * np.sin(300.0 * t)
+    given = replace(loads.series(t, series), constant_Nm=5.0, slope_Nm_rad=100.0)
+    probe = Probe(point="u", gain=0.0, injection=u)
+    run = simulate(
+        design, commands.hold(), ticks * Ts, given, probes=[probe], initial=State(motor_speed_rad_s=50.0)
+    )
+    m, N, J = design.motor, design.total_ratio, design.inertia_kgm2
+    x, found = np.array([0.0, 50.0, 0.0]), np.empty((ticks, 3))
+    for k in range(ticks):
+        found[k] = x
+        y = x[2] / N
+        M = 5.0 - 200.0 * y + series[k] + 3.0 * 0.4 * 9.80665 * np.sin(y + 0.7)
+
+        def rate(_: float, x: np.ndarray, M: float = M, u: float = u[k]) -> list[float]:
+            di = (u - m.resistance_ohm * x[0] - m.back_emf_constant_Vs_rad * x[1]) / m.inductance_H
+            return [di, (m.torque_constant_Nm_A * x[0] - 1e-6 * x[1] + M / N) / J, x[1]]
+
+        x = solve_ivp(rate, (0.0, Ts), x, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    for k, values in enumerate((run.current_A, run.motor_speed_rad_s, run.motor_angle_rad)):
+        assert np.abs(values - found[:, k]).max() < 1e-9 * np.abs(found[:, k]).max()
+
+
+def test_j9_the_slope_of_the_design_acts_without_being_told() -> None:
+    """Without integrals a slope leaves th/(N ref) = g/(g - slope/N^2), g the torque per position error."""
+    load = replace(AMBER.load, path="back-drivable", moment_slope_Nm_rad=-6000.0)
+    velocity = replace(AMBER.controller.velocity, integral_time_s=None)
+    design = changed(replace(AMBER, load=load, friction=FREE), velocity=velocity)
+    g = design.motor.torque_constant_Nm_A * velocity.gain * design.controller.position.gain
+    expected = g / (g + 6000.0 / design.total_ratio**2)
+    run = simulate(design, commands.step(0.001), 2.0)
+    assert run.output_angle_rad[-1] / 0.001 == pytest.approx(expected, rel=1e-6)
+    assert expected < 0.99
+
+
+@pytest.mark.parametrize(
+    "supply",
+    [
+        Supply(resistance_ohm=0.1),
+        Supply(resistance_ohm=0.1, regenerative=False, capacitance_F=2e-4, brake_voltage_V=27.0),
+        Supply(regenerative=False, capacitance_F=1e-3),
+    ],
+)
+def test_supply(supply: Supply) -> None:
+    """The bus by its law from recorded voltage and current, its account, and the limit that it is."""
+    design = replace(AMBER, supply=supply, limits=Limits(voltage_V=24.0, peak_current_A=8.0))
+    Ts, Us, C = design.controller.period_s, 24.0, supply.capacitance_F
+    drive, U, power, braked, saturated = Drive(design), Us, 0.0, False, False
+    for k in range(4000):
+        u, i, before = drive.value("voltage"), drive.value("current"), U
+        if k:
+            i_b = u * i / U if U > 0.0 else 0.0
+            power += u * i * Ts
+            if i_b >= 0.0 or supply.regenerative:
+                U = max(Us - supply.resistance_ohm * i_b, 0.0)
+            else:
+                U = min(sqrt(before**2 - 2.0 * u * i * Ts / C), supply.brake_voltage_V or inf)
+        drive.step(0.3 if k < 2500 else -0.3)
+        assert drive.value("voltage_limit") == pytest.approx(U, rel=1e-12)
+        assert abs(drive.value("voltage")) <= U * (1 + 1e-15)
+        saturated |= abs(drive.value("voltage")) == drive.value("voltage_limit") != 24.0
+        braked |= supply.brake_voltage_V == U
+    assert saturated or not supply.resistance_ohm
+    assert drive.value("voltage_limit") > 10.0
+    assert braked == (supply.brake_voltage_V is not None)
+    run = simulate(design, commands.step(0.3), 0.4, energy=True)
+    energy = run.energy
+    account = energy.supply_J - energy.supply_loss_J - energy.brake_J - energy.bus_capacitor_J
+    assert account == pytest.approx(Ts * float(run.voltage_V[:-1] @ run.current_A[1:]), rel=1e-9)
+    assert energy.relative_error < 1e-9
+
+
+@pytest.mark.parametrize(("overload", "tau"), [("thermal", 8.490187), ("excess", 8.0)])
+def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
+    """r = 3, 1 s: after one second at the peak the limit falls to the continuous current."""
+    limits = Limits(
+        voltage_V=24.0,
+        peak_current_A=6.0,
+        continuous_current_A=2.0,
+        peak_time_s=1.0,
+        overload=overload,
+        release=0.5,
+    )
+    design = replace(
+        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=1.0, integral_time_s=None)),
+        limits=limits,
+    )
+    Ts = design.controller.period_s
+    drive = Drive(design)
+    out = np.array([drive.control(6.0, 6.0, 0.0, 0.0) for _ in range(round(1.2 / Ts))])
+    at = int(np.argmax(out < 0.0))  # i_ref falls from 6 to 2 while 6 A are measured
+    expected = 1.0 if overload == "thermal" else -8.0 * np.log(1 - 1 / 9)
+    assert at * Ts == pytest.approx(expected, abs=3 * Ts)
+    assert out[at] == 2.0 - 6.0
+    assert drive.value("overloaded") == 1.0
+    x = drive.value("overload")
+    back = next(k for k in range(10**6) if drive.control(6.0, 0.0, 0.0, 0.0) == 6.0)
+    assert back * Ts == pytest.approx(tau * np.log(x / 0.5), abs=3 * Ts)
+
+
+def test_noise_resolution_and_their_seeds() -> None:
+    """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
+    design = replace(
+        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=GAIN, integral_time_s=None)),
+        limits=Limits(voltage_V=inf),
+    )
+    noisy = replace(design, instruments=Instruments(current_noise_A=0.1, seed=3))
+    ticks = 20_000
+    runs = [
+        simulate(
+            replace(noisy, instruments=replace(noisy.instruments, seed=s)), commands.hold(), ticks * 1e-4
+        )
+        for s in (3, 3, 4)
+    ]
+    assert np.array_equal(runs[0].current_A, runs[1].current_A)
+    assert not np.array_equal(runs[0].current_A, runs[2].current_A)
+    noise = (-runs[0].voltage_V / GAIN - runs[0].current_A) / 0.1
+    assert abs(noise.mean()) < 5.0 / sqrt(ticks)
+    assert noise.std() == pytest.approx(1.0, abs=5.0 / sqrt(2 * ticks))
+    assert abs(np.mean(noise[1:] * noise[:-1])) < 5.0 / sqrt(ticks)
+    assert np.mean(noise**4) == pytest.approx(3.0, abs=5.0 * sqrt(96 / ticks))
+    other = (-runs[2].voltage_V / GAIN - runs[2].current_A) / 0.1
+    assert abs(np.mean(noise * other)) < 5.0 / sqrt(ticks)
+    coarse = replace(design, instruments=Instruments(current_resolution_A=0.25))
+    run = simulate(coarse, commands.sine(200.0, 5.0), 0.2)
+    measured = run.reference_rad - run.voltage_V / GAIN
+    assert np.abs(measured / 0.25 - np.round(measured / 0.25)).max() < 1e-9
+    assert np.abs(measured - run.current_A).max() <= 0.125 + 1e-12
+
+
+def test_jitter_and_angle_noise() -> None:
+    """A source that cannot be felt, at constant speed: the position loop shows what it reads."""
+    Ts, w, ticks = 1e-3, 40.0, 4000
+    design = Design(
+        name="coasting",
+        title="",
+        motor=Motor(rotor_inertia_kgm2=1.0, source_gain_Nm_V=1e-15),
+        controller=replace(
+            AMBER.controller,
+            period_s=Ts,
+            computing_delay_s=0.0,
+            position=PositionLoop(gain=1.0),
+            velocity=None,
+            current=None,
+        ),
+        limits=Limits(voltage_V=inf),
+        validation=AMBER.validation,
+    )
+    start = State(motor_speed_rad_s=w)
+    for instruments, rms in (
+        (Instruments(jitter_s=1e-4), 1e-4 * w),
+        (Instruments(angle_noise_rad=0.02), 0.02),
+    ):
+        run = simulate(replace(design, instruments=instruments), commands.hold(), ticks * Ts, initial=start)
+        seen = -run.voltage_V - run.motor_angle_rad
+        assert run.motor_angle_rad[-1] == pytest.approx(w * (ticks - 1) * Ts, rel=1e-9)
+        assert seen.std() == pytest.approx(rms, rel=5.0 / sqrt(2 * ticks))
+        assert abs(seen.mean()) < 5.0 * rms / sqrt(ticks)
+
+
+def everything() -> Design:
+    """A drive with every rare feature on."""
+    control = AMBER.controller
+    velocity = replace(
+        control.velocity,
+        every=2,
+        filters=(
+            Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0),
+            Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0),
+        ),
+    )
+    position = replace(
+        control.position,
+        every=4,
+        integral_time_s=0.05,
+        derivative_time_s=1e-3,
+        sensor="output",
+        acceleration_feedforward=0.7,
+        friction_feedforward=0.05,
+    )
+    return replace(
+        changed(velocity=velocity, position=position, computing_delay_s=1.3e-4),
+        encoder=replace(AMBER.encoder, speed="tracking", bandwidth_rad_s=1500.0, counts_per_rev=4096),
+        command=Command(
+            filter_time_s=2e-3, filter_order=2, rate_rad_s=0.3, acceleration_rad_s2=20.0, jerk_rad_s3=5000.0
+        ),
+        supply=Supply(resistance_ohm=0.2, regenerative=False, capacitance_F=1e-3, brake_voltage_V=27.0),
+        instruments=Instruments(
+            current_noise_A=0.01, angle_noise_rad=1e-4, output_angle_noise_rad=1e-6, jitter_s=1e-6, seed=5
+        ),
+        load=replace(AMBER.load, moment_slope_Nm_rad=-20.0, gravity=Gravity(mass_kg=1.0, arm_m=0.1)),
+        limits=replace(AMBER.limits, peak_time_s=0.02),
+    )
+
+
+def test_a_state_set_elsewhere_goes_on_with_the_same_bits() -> None:
+    design = everything()
+    first, second = Drive(design), Drive(design)
+    for k in range(700):
+        first.step(0.05 * np.sin(0.01 * k))
+    second.set(first.get())
+    for k in range(700, 1400):
+        first.step(0.05 * np.sin(0.01 * k))
+        second.step(0.05 * np.sin(0.01 * k))
+    assert np.array_equal(first.get(), second.get())
+    rows = Rows.of(design)
+    rows["ticks"] = 1400
+    rows.series("command", 0.05 * np.sin(0.01 * np.arange(1400)))
+    run = rows.trajectory()  # blocks of ticks, and one at a time
+    assert run.final.motor_angle_rad == first.value("angle")
+    with pytest.raises(InputError, match="this drive has"):
+        second.set(np.zeros(3))
+
+
+def test_profile_keeps_its_limits_and_arrives() -> None:
+    limits = Command(rate_rad_s=0.2, acceleration_rad_s2=4.0, jerk_rad_s3=200.0)
+    T = AMBER.controller.period_s
+    rng = np.random.default_rng(2)
+    for jerk in (inf, 200.0):
+        drive, seen, n = Drive(replace(AMBER, command=replace(limits, jerk_rad_s3=jerk))), [0.0], 8000
+        wanted = np.repeat(np.append(rng.uniform(-0.05, 0.05, 4), 0.03), n)
+        for value in wanted:
+            drive.control(value, 0.0, 0.0, 0.0)
+            seen.append(drive.value("reference") / AMBER.total_ratio)
+        rate, second, third = (np.diff(seen, k) / T**k for k in (1, 2, 3))
+        assert np.abs(rate).max() == pytest.approx(0.2, rel=1e-6)
+        assert np.abs(second).max() == pytest.approx(4.0, rel=1e-5)
+        assert seen[-1] == pytest.approx(0.03, rel=1e-12)
+        for k in range(1, 6):  # each step is reached, without overshoot
+            assert seen[k * n] == pytest.approx(wanted[k * n - 1], rel=1e-9)
+            part = np.array(seen[(k - 1) * n : k * n + 1])
+            assert (
+                min(part[0], part[-1]) - 1e-12 <= part.min() <= part.max() <= max(part[0], part[-1]) + 1e-12
+            )
+        if jerk < inf:
+            assert np.abs(third).max() < 200.0 * (1 + 1e-4)
+
+
+def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
+    command = Command(rate_rad_s=0.2, acceleration_rad_s2=4.0)
+    wave = commands.sine(0.005, 4.0, phase_rad=pi / 2)
+    # slowly into the cosine, so that the start keeps the limits as well
+    run = [
+        simulate(replace(AMBER, command=c), commands.ramp(0.05, 0.0, 0.2), 0.3)
+        for c in (command, Command(rate_rad_s=0.06))
+    ]
+    plain = simulate(AMBER, commands.ramp(0.05, 0.0, 0.2), 0.3)
+    assert np.array_equal(run[1].output_angle_rad, plain.output_angle_rad)
+    shaped = simulate(
+        replace(AMBER, command=command), wave, 1.0, initial=State(motor_angle_rad=0.005 * AMBER.total_ratio)
+    )
+    free = simulate(AMBER, wave, 1.0, initial=State(motor_angle_rad=0.005 * AMBER.total_ratio))
+    assert np.array_equal(shaped.output_angle_rad, free.output_angle_rad)
+    assert shaped.limits["profile"].fraction == 0.0
+    assert simulate(replace(AMBER, command=command), commands.step(0.1), 0.3).limits["profile"].active
+
+
+def test_any_stage_may_be_the_outermost() -> None:
+    m, friction = AMBER.motor, replace(FREE, dry_torque_Nm=1e-3)
+    design = replace(AMBER, friction=friction, limits=Limits(voltage_V=48.0))
+    voltage = simulate(changed(design, position=None, velocity=None, current=None), commands.step(10.0), 2.0)
+    lost = (friction.dry_torque_Nm + 1e-6 * voltage.motor_speed_rad_s[-1]) / m.torque_constant_Nm_A
+    assert voltage.motor_speed_rad_s[-1] == pytest.approx(
+        (10.0 - m.resistance_ohm * lost) / m.back_emf_constant_Vs_rad, rel=1e-9
+    )
+    assert voltage.voltage_V[-1] == 10.0
+    held = replace(design, friction=replace(friction, dry_torque_Nm=1.0))
+    torque = simulate(changed(held, position=None, velocity=None), commands.step(1.5), 0.1)
+    assert torque.current_A[-1] == pytest.approx(1.5, rel=1e-9)
+    speed = simulate(changed(design, position=None), commands.step(0.2), 1.0)
+    assert speed.motor_speed_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-6)
+    assert speed.speed_command_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-12)
+    slow = replace(changed(design, position=None), command=Command(acceleration_rad_s2=2.0))
+    ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio
+    assert np.diff(ramped).max() == pytest.approx(2.0 * AMBER.controller.period_s, rel=1e-9)
+    assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("design", "what"),
+    [
+        (
+            replace(changed(position=None, velocity=None), command=Command(rate_rad_s=1.0)),
+            "need a position or a velocity loop",
+        ),
+        (replace(AMBER, command=Command(jerk_rad_s3=1.0)), "needs command.acceleration"),
+        (replace(AMBER, command=Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)), "a mean over"),
+        (replace(AMBER, supply=Supply(regenerative=False)), "supply.capacitance: missing"),
+        (replace(AMBER, encoder=replace(AMBER.encoder, speed="tracking")), "encoder.bandwidth: missing"),
+        (
+            changed(
+                velocity=replace(
+                    AMBER.controller.velocity,
+                    filters=(Filter(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),),
+                )
+            ),
+            "below pi/T",
+        ),
+        (
+            changed(
+                velocity=replace(
+                    AMBER.controller.velocity, filters=(Filter(kind="notch", frequency_rad_s=400.0),)
+                )
+            ),
+            "width = None",
+        ),
+        (
+            changed(
+                velocity=replace(
+                    AMBER.controller.velocity, filters=(Filter(kind="lowpass", frequency_rad_s=400.0),) * 9
+                )
+            ),
+            "at most 8",
+        ),
+        (
+            changed(
+                velocity=replace(
+                    AMBER.controller.velocity, filters=(Filter(kind="biquad", b=(1.0,), a=(1.0, -1.0)),)
+                )
+            ),
+            "unit circle",
+        ),
+        (
+            replace(changed(current=None), limits=replace(AMBER.limits, peak_time_s=1.0)),
+            "needs a current loop",
+        ),
+    ],
+)
+def test_refusals(design: Design, what: str) -> None:
+    with pytest.raises(InputError, match=what):
+        simulate(design, commands.hold(), 0.01)

@@ -1,0 +1,166 @@
+"""Charts: ticks that can be read alone, words off the curves, places that are where the values are."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reports.charts.axis import Axis, linear_ticks, log_ticks
+from reports.charts.chart import Chart
+from reports.charts.labels import Room
+from reports.charts.svg import page_svg, paper_svg
+
+finite = st.floats(-1e9, 1e9, allow_nan=False)
+
+
+def value_of(words: str) -> float:
+    """Read a tick label as a number."""
+    plain = words.translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789"))
+    scale = {"k": 1e3, "M": 1e6}.get(plain[-1], 1.0)
+    plain = plain.rstrip("kM")
+    if plain.startswith("10-") or (plain.startswith("10") and "⁰" in words):
+        return 10.0 ** float(plain[2:]) * scale
+    mantissa, _, power = plain.partition("×10")
+    return float(mantissa) * 10.0 ** float(power or 0) * scale
+
+
+@given(finite, st.floats(1e-6, 1e9), st.integers(2, 9))
+def test_linear_ticks_lie_inside_and_say_their_value(low: float, span: float, room: int) -> None:
+    high = low + span
+    if not high - low > 1e-9 * max(abs(low), abs(high)):
+        return
+    ticks = linear_ticks(low, high, room)
+    assert 1 <= len(ticks) <= room + 2 or len(ticks) == 0
+    step = min((b - a for (a, _), (b, _) in itertools.pairwise(ticks)), default=span)
+    for value, words in ticks:
+        assert low - 1e-6 * span <= value <= high + 1e-6 * span
+        assert "e" not in words
+        # a number of four digits where a power of ten is needed, all digits of the step elsewhere
+        assert value_of(words) == pytest.approx(value, abs=0.01 * step, rel=6e-4 if "×" in words else 1e-12)
+
+
+@given(st.floats(-8, 8), st.floats(0.1, 12))
+def test_log_ticks_lie_inside_and_say_their_value(power: float, decades: float) -> None:
+    low, high = 10.0**power, 10.0 ** (power + decades)
+    ticks = log_ticks(low, high)
+    assert len(ticks) <= 9
+    for value, _ in ticks:
+        assert low * (1 - 1e-6) <= value <= high * (1 + 1e-6)
+
+
+@given(st.floats(0.01, 1e4), st.floats(1.5, 1e6), st.floats(0.0, 1.0), st.booleans(), st.booleans())
+def test_an_axis_places_its_ends_and_what_lies_between(
+    low: float, ratio: float, part: float, log: bool, reversed_: bool
+) -> None:
+    axis = Axis(log=log, reversed=reversed_)
+    axis.limits(low, low * ratio)
+    value = low * ratio**part if log else low + part * (low * ratio - low)
+    (place,) = axis.place([value])
+    assert place == pytest.approx(1.0 - part if reversed_ else part, abs=1e-9)
+
+
+def test_limits_follow_the_values_and_survive_a_single_one() -> None:
+    chart = Chart()
+    panel = chart.panel()
+    panel.curve([1.0, 1.0], [5.0, 5.0])
+    (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
+    assert x0 < 1.0 < x1
+    assert y0 < 5.0 < y1
+
+
+def test_gaps_break_a_line() -> None:
+    chart = Chart()
+    chart.panel().curve([0, 1, 2, 3, 4], [0.0, 1.0, None, 1.0, 0.0])
+    path = re.search(r'class="curve" d="([^"]*)"', page_svg(chart, "f", ""))
+    assert path is not None
+    assert path.group(1).count("M") == 2
+
+
+def test_the_points_of_a_curve_are_where_its_values_are() -> None:
+    """Read pixels back by the axes in the picture: the values again, to a thousandth of the frame."""
+    chart = Chart(width=400, height=300)
+    panel = chart.panel()
+    f = np.geomspace(0.1, 1000.0, 50)
+    panel.x.log = True
+    panel.curve(f, -20.0 * np.log10(f))
+    svg = page_svg(chart, "f", "")
+    x_axis, y_axis = (re.search(rf'data-{k}="(\w+) ([^"]*)"', svg) for k in "xy")
+    path = re.search(r'class="curve" d="([^"]*)"', svg)
+    assert x_axis is not None
+    assert y_axis is not None
+    assert path is not None
+    low, high, a, b = map(float, x_axis.group(2).split())
+    bottom, top, c, d = map(float, y_axis.group(2).split())
+    for (x, y), hz in zip(re.findall(r"[ML]([-\d.]+) ([-\d.]+)", path.group(1)), f, strict=True):
+        seen_hz = low * (high / low) ** ((float(x) - a) / (b - a))
+        seen_db = bottom + (float(y) - c) / (d - c) * (top - bottom)
+        assert seen_hz == pytest.approx(hz, rel=5e-4)
+        assert seen_db == pytest.approx(-20.0 * math.log10(hz), abs=2e-3)
+
+
+def test_equal_axes_have_equal_units() -> None:
+    chart = Chart(width=500, height=300)
+    panel = chart.panel()
+    panel.equal = True
+    panel.x.limits(-2.0, 1.0)
+    panel.y.limits(-1.0, 1.0)
+    svg = page_svg(chart, "f", "")
+    units = []
+    for key in "xy":
+        found = re.search(rf'data-{key}="lin ([^"]*)"', svg)
+        assert found is not None
+        low, high, a, b = map(float, found.group(1).split())
+        assert low <= -1.0
+        assert high >= 1.0
+        units.append(abs(b - a) / (high - low))
+    assert units[0] == pytest.approx(units[1], rel=1e-3)
+
+
+@given(st.integers(0, 10_000))
+def test_words_keep_off_curves_and_each_other_where_there_is_room(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    room = Room((0.0, 0.0, 400.0, 300.0))
+    x = np.linspace(0.0, 400.0, 40)
+    y = 150.0 + 60.0 * np.sin(x / rng.uniform(30.0, 90.0) + rng.uniform(0.0, 6.0))
+    room.add_line(x, y)
+    boxes = [room.near((float(x[k]), float(y[k])), (60.0, 26.0))[0] for k in (8, 20, 33)]
+    dense_x = np.linspace(0.0, 400.0, 4000)
+    dense_y = np.interp(dense_x, x, y)
+    for k, (x0, y0, x1, y1) in enumerate(boxes):
+        assert 0.0 <= x0 < x1 <= 400.0
+        assert 0.0 <= y0 < y1 <= 300.0
+        assert not ((dense_x > x0) & (dense_x < x1) & (dense_y > y0) & (dense_y < y1)).any()
+        for a0, b0, a1, b1 in boxes[:k]:
+            assert x1 <= a0 or a1 <= x0 or y1 <= b0 or b1 <= y0
+
+
+@pytest.mark.parametrize("write", [lambda c: page_svg(c, "f", "alt"), lambda c: paper_svg(c, "f")])
+def test_a_chart_is_well_formed_and_says_every_label_once(write) -> None:
+    chart = Chart(width=900, height=300, title="A & B", legend=True)
+    for name in ("one <b>", "two"):
+        panel = chart.panel(title=name)
+        panel.curve([1, 2], [1, 2], "shared & <same>", marker="o")
+        panel.bar(0.0, 1.0, 2.0, "bar", hatch="//")
+        panel.rule_y(1.5, "limit", colour="c5", dash=1)
+        panel.band_x(1.0, 1.2, "band")
+    words = ["".join(node.itertext()) for node in ElementTree.fromstring(write(chart)).iter()]
+    assert words.count("shared & <same>") == 1
+    assert "A & B" in words
+    assert "one <b>" in words
+
+
+def test_pictures_and_panels_have_ids_of_their_own() -> None:
+    chart = Chart()
+    for panel in chart.column(1.0, 1.0):
+        panel.points([1, 2], [1, 2], "a")
+        panel.points([1, 2], [2, 1], "b")
+        panel.bar(0.0, 1.0, 2.0, "c", hatch="x")
+    ids = re.findall(r' id="([^"]*)"', page_svg(chart, "f1", "") + page_svg(chart, "f2", ""))
+    assert len(ids) == len(set(ids)) > 10

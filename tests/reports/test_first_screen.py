@@ -1,0 +1,124 @@
+"""The first screen answers: five figures a loop with their distance, the weakest point, what to watch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from built_report import Built
+
+from actuator_lti import load_design
+from analyses.validation.borders import Border
+from analyses.validation.release import AmplitudeMargin
+from reports import document as doc
+from reports.build import design_report
+from reports.findings import Finding, gathered
+from reports.sections.answer import weakest
+from reports.sections.confirmation import _remark
+
+
+def glance(document: dict[str, Any]) -> dict[str, Any]:
+    """Give the block of the first screen."""
+    return next(block for block in document["sections"][0]["blocks"] if block["kind"] == "glance")
+
+
+def verdict(distance: float | None, limit: float | None, passed: bool | None = True) -> dict[str, Any]:
+    return doc.verdict(
+        "v", f"at {distance}", value=1.0, limit=limit, unit="dB", distance=distance, passed=passed,
+        comparison=">=",
+    )  # fmt: skip
+
+
+def test_every_loop_shows_five_figures_and_the_distance_to_its_own_requirement(built: Built) -> None:
+    found = glance(built.document)
+    assert [row["loop"] for row in found["loops"]] == ["Current loop", "Velocity loop", "Position loop"]
+    items = {
+        item["id"]: item for part in built.document["sections"][1:2] for item in part["blocks"][0]["items"]
+    }
+    for name, row in zip(("current", "velocity", "position"), found["loops"], strict=True):
+        cells = {cell["label"]: cell for cell in row["figures"]}
+        assert len(cells) == 5
+        wanted = items[f"phase-margin/{name}"]
+        assert cells["Phase margin"]["value"] == wanted["value"]
+        assert cells["Phase margin"]["distance"] == wanted["distance"]
+    bandwidths = [row["figures"][-1]["distance"] for row in found["loops"]]
+    assert bandwidths[:2] == [None, None]  # required of the position loop only
+    assert bandwidths[2] == pytest.approx(items["position-bandwidth"]["value"] - 15.0)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "wanted"),
+    [
+        ([(3.0, 6.0), (9.0, 45.0), (2.0, 4.0)], "at 9.0"),  # 50 %, 20 %, 50 % of the limit
+        ([(3.0, 6.0), (-1.0, 45.0), (-1.0, 6.0)], "at -1.0"),  # the one furthest beyond, as part of the limit
+        ([(None, 6.0), (5.0, 6.0)], "at 5.0"),
+    ],
+)
+def test_the_weakest_point_is_nearest_to_its_limit_as_part_of_it(
+    pairs: list[tuple[float | None, float]], wanted: str
+) -> None:
+    items = [verdict(distance, limit) for distance, limit in pairs]
+    found = weakest(items)
+    assert found is not None
+    assert found["label"] == wanted
+
+
+def test_without_a_judged_requirement_there_is_no_weakest_point() -> None:
+    assert weakest([]) is None
+    assert weakest([verdict(None, 6.0, None)]) is None
+
+
+def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
+    mild = Finding(severity="info", text="b", where="two")
+    grave = Finding(severity="fail", text="a", where="one")
+    sections = [
+        doc.section("one", "One", [], findings=[mild, grave]),
+        doc.section("two", "Two", [], findings=[mild]),
+        {"id": "of-an-older-file"},
+    ]
+    assert gathered(sections) == [grave, mild]
+
+
+def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field() -> None:
+    border = Border(value=2.0, bracket=(1.9, 2.1), frequency_hz=30.0, runs=9)
+    item = AmplitudeMargin(
+        loop="position", kind="gain up", size="large", part=0.5, friction_on=True, linear=10.0, border=border,
+        period_s=1e-4, limiter="current",
+    )  # fmt: skip
+    assert _remark(item) == (
+        "The position loop sustains an oscillation if its gain is raised by 6.02 dB or more after release "
+        "from "
+        "50 % of full range; the linear margin is 20 dB. The current limit acts."
+    )
+
+
+def test_what_to_watch_leads_to_a_section(built: Built) -> None:
+    assert glance(built.document)["findings"]
+    ids = {part["id"] for part in built.document["sections"]}
+    assert {item["where"] for item in glance(built.document)["findings"]} <= ids
+
+
+def test_a_report_without_simulation_says_so() -> None:
+    found = glance(design_report(load_design("emps")))["findings"]
+    assert any("No simulation stands behind this report" in item["text"] for item in found)
+
+
+def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> None:
+    design = load_design("ilr33-amber")
+    strict = [
+        replace(item, minimum=90.0) if item.quantity == "phase_margin" else item
+        for item in design.requirements
+    ]
+    document = design_report(replace(design, requirements=tuple(strict)))
+    assert document["sections"][0]["status"] == "fail"
+    found = glance(document)["weakest"]
+    assert found["passed"] is False
+    assert found["label"] == "Velocity loop: phase margin"  # 73.7 of 90: 18 % beyond
+    assert "18 % beyond its limit" in found["words"]
+
+
+def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built) -> None:
+    for part in built.document["sections"][1:]:
+        assert part["result"].endswith("."), part["id"]
+        assert len(part["result"]) < 220, part["id"]
