@@ -159,6 +159,8 @@ class Expressions:
         return "(" + sign.join(f"({self.condition(value)})" for value in node.values) + ")", "bool"
 
     def _Compare(self, node: ast.Compare) -> Text:
+        if isinstance(node.ops[0], ast.Is | ast.IsNot):
+            return self._present(node)
         values = [node.left, *node.comparators]
         if len(values) > 2 and any(
             not isinstance(v, ast.Name | ast.Constant | ast.Attribute) for v in values[1:-1]
@@ -170,6 +172,14 @@ class Expressions:
                 raise self.function.error(node, f"the comparison {type(op).__name__} is not in the subset")
             parts.append(self._compared(left, _COMPARE[type(op)], right))
         return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
+
+    def _present(self, node: ast.Compare) -> Text:
+        """``x is None``: an argument that is there is a number, so this is known here."""
+        other = node.comparators[0]
+        if len(node.ops) > 1 or not (isinstance(other, ast.Constant) and other.value is None):
+            raise self.function.error(node, "an identity other than that with None")
+        self.emit(node.left)
+        return ("true" if isinstance(node.ops[0], ast.IsNot) else "false"), "bool"
 
     def _compared(self, left: ast.expr, sign: str, right: ast.expr) -> str:
         (a, first), (b, second) = self.emit(left), self.emit(right)

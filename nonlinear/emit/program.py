@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -159,14 +160,20 @@ _ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false"}
 
 
 def _definition(function: Function, head: str, lines: list[str]) -> str:
-    text = _plain(ast.get_docstring(function.tree) or "")
-    described = [f" * {line}".rstrip() for line in text.splitlines()]
+    about = _plain(ast.get_docstring(function.tree) or "")
+    described = [f" * {line}".rstrip() for line in about.splitlines()]
     comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
     declared = [
         f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
         for name, kind in function.variables.items()
     ]
-    return "\n".join([*comment, head, "{", *declared, *lines, "}", ""])
+    text = "\n".join(lines)
+    unused = [
+        f"{INDENT}(void){c_name(name)};"
+        for name in function.arguments
+        if not re.search(rf"\b{c_name(name)}\b", text)
+    ]
+    return "\n".join([*comment, head, "{", *declared, *unused, *lines, "}", ""])
 
 
 def _plain(text: str) -> str:

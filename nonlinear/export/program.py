@@ -10,16 +10,17 @@ from importlib.resources import files
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.control import control_tick
 from nonlinear._kernels.motion import put_load
-from nonlinear._kernels.prepare import prepare, prepare_sizes
+from nonlinear._kernels.prepare import prepare_sizes
 from nonlinear._kernels.tick import get, init, set_state, tick
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import FUNCTIONS, Kind
+from nonlinear.export.entries import derive
 from nonlinear.export.rows import names_of, parameter_names, words
 
 _ROW: Kind = "row"
 ENTRIES: dict[object, tuple[Kind, ...]] = {
     prepare_sizes: (_ROW,),
-    prepare: (_ROW, _ROW),
+    derive: (_ROW, _ROW),
     init: (_ROW, _ROW),
     tick: (_ROW, _ROW, _ROW),
     control_tick: (_ROW, _ROW, _ROW),
@@ -41,7 +42,7 @@ STATUS = {
 }
 _ABOUT = {
     "prepare_sizes": "Works out the lengths: call it first, after every change of a count or a delay.",
-    "prepare": "Derives all that does not change with time; call it after every change of p.  s lends its work space.",
+    "derive": "Derives all that does not change with time; call it after every change of p.",
     "init": "State at the first tick, from the start values in p.",
     "tick": "Sense, control and move by one period; returns a status.  Inputs io[DRIVE_IN_...] are held.",
     "control_tick": "The controller alone, on measured current, speed and angle in io; returns the voltage.",
@@ -66,7 +67,7 @@ def template(name: str) -> str:
 def header_text() -> str:
     """``drive.h``: lengths, places in the rows with units and words, prototypes."""
     groups = (
-        ("Parameters p: of a run, then what drive_prepare derives from them", parameter_names()),
+        ("Parameters p: of a run, then what drive_derive derives from them", parameter_names()),
         ("Derived parameters that a program may want", [(n, getattr(at, n)) for n in _DERIVED]),
         ("State s", names_of(0, at.S_NOISE, "S_")),
         ("Inputs of a tick, in io", names_of(0, at.IN_PROBE, "IN_")),

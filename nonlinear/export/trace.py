@@ -86,8 +86,8 @@ def _function(name: str) -> Any:
 
 
 def _rounded(name: str) -> Any:
-    def rounded(self: Traced) -> int:
-        found = int(getattr(math, name)(self.number))
+    def rounded(self: Traced) -> Any:
+        found = np.float64(getattr(math, name)(self.number))
         self.tape.condition(f"{name}({self.name}) == {c_number(float(found))}", True)
         return found
 

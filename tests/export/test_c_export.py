@@ -20,11 +20,13 @@ from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.call import parameters
-from nonlinear._kernels.prepare import prepare, prepare_sizes
+from nonlinear._kernels.prepare import prepare_sizes
+
 from nonlinear._kernels.tick import get, init, set_state, tick
 from nonlinear.export import c_export
 from nonlinear.export.build import compile_files, system_compiler
 from nonlinear.export.c_files import exported
+from nonlinear.export.entries import derive
 from reports.cli.app import build
 
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
@@ -62,10 +64,10 @@ def test_every_row_has_the_same_bits_in_random_drives(library: ctypes.CDLL, seed
         rows.append((p, s, np.zeros(at.IO_SIZE)))
     (p, s, io), (p_c, s_c, io_c) = rows
     prepare_sizes(p)
-    prepare(p, s)
+    derive(p, s)
     init(p, s)
     library.drive_prepare_sizes(pointer(p_c))
-    library.drive_prepare(pointer(p_c), pointer(s_c))
+    library.drive_derive(pointer(p_c), pointer(s_c))
     library.drive_init(pointer(p_c), pointer(s_c))
     assert p.tobytes() == p_c.tobytes()
     for k in range(ticks):
@@ -130,7 +132,7 @@ def test_single_precision_keeps_its_stated_error(name: str, tmp_path: Path) -> N
     p, s, io = (np.zeros(n, np.float32) for n in (ours.p_size, ours.s_size, at.IO_SIZE))
     lib.drive_load_design(pointer(p))
     lib.drive_prepare_sizes(pointer(p))
-    lib.drive_prepare(pointer(p), pointer(s))
+    lib.drive_derive(pointer(p), pointer(s))
     lib.drive_init(pointer(p), pointer(s))
     P, S = parameters(ours.row)
     IO = np.zeros(at.IO_SIZE)

@@ -195,9 +195,10 @@ def test_tuning_between_steps_changes_what_follows(tmp_path: Path) -> None:
     """A gain changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at
     from nonlinear._kernels.call import parameters
-    from nonlinear._kernels.prepare import prepare, prepare_sizes
+    from nonlinear._kernels.prepare import prepare_sizes
     from nonlinear._kernels.tick import tick
     from nonlinear.export.c_files import exported
+    from nonlinear.export.entries import derive
 
     design = load_design("ilr33-amber")
     path = tmp_path / "u.fmu"
@@ -223,7 +224,7 @@ def test_tuning_between_steps_changes_what_follows(tmp_path: Path) -> None:
             unit.setReal([references["control.position.gain"]], [50.0])
             p[: at.SIZE] = exported(with_values(design, {"control.position.gain": 50.0})).row
             prepare_sizes(p)
-            prepare(p, s)
+            derive(p, s)
         unit.doStep(k * 1e-4, 1e-4)
         tick(p, s, row)
         assert unit.getReal([references["motor.angle"]]) == [s[at.S_ANGLE]], k

@@ -5,7 +5,7 @@
  * Units are SI, at the motor shaft unless a name says otherwise (linear axis: read N for N m, m for rad,
  * kg for kg m2).  No function allocates, recurses, keeps state of its own, or does input or output.
  *
- *     drive_prepare_sizes(p);  drive_prepare(p, s);  drive_init(p, s);      once
+ *     drive_prepare_sizes(p);  drive_derive(p, s);  drive_init(p, s);      once
  *     io[DRIVE_IN_COMMAND] = ...;  status = drive_tick(p, s, io);           every tick
  *
  * Made by actuator-lti from the simulator that checked the design; do not edit.

@@ -30,7 +30,7 @@ static int derive(unit_state *m)
     if (!(m->p[DRIVE_STATE_SIZE] <= (double)(DRIVE_S_LENGTH + UNIT_SPARE))) {
         return UNIT_STRUCTURE;
     }
-    drive_prepare(m->p, m->s);
+    drive_derive(m->p, m->s);
     m->changed = 0;
     return UNIT_OK;
 }

@@ -21,7 +21,7 @@ int main(int argc, char **argv)
 
     drive_load_design(p);
     drive_prepare_sizes(p);
-    drive_prepare(p, s);
+    drive_derive(p, s);
     drive_init(p, s);
     (void)printf("time_s,output_angle,motor_speed_rad_s,current_A,voltage_V,flags\n");
     for (long k = 0; (k < ticks) && (status == DRIVE_OK); k += 1) {
