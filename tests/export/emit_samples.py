@@ -2,7 +2,7 @@
 
 import math
 
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import entry, scalar
 
 FIRST, SECOND, THIRD = range(3)
 GAIN = 1.0 / 3.0
@@ -35,7 +35,7 @@ def push(s, at, x):  # type: ignore[no-untyped-def]
     return old
 
 
-@scalar
+@entry
 def everything(p, s, n):  # type: ignore[no-untyped-def]
     """Each construct once."""
     total, last = 0.0, -1
