@@ -11,7 +11,7 @@ from typing import Any
 from nonlinear.emit.kinds import FUNCTIONS, Function, Kind, c_float, c_name
 
 Text = tuple[str, Kind]
-Constant = int | float | tuple[float, ...]
+Constant = int | float | tuple[float, ...] | tuple[int, ...]
 Calls = Callable[[Any, list[Kind], ast.AST, Function], Function]
 
 _TESTS = ("isfinite", "isnan", "isinf")
@@ -102,14 +102,28 @@ class Expressions:
         return name, ("int" if type(value) is int else "float")
 
     def _Subscript(self, node: ast.Subscript) -> Text:
-        return self.element(node), "float"
+        if self._is_length(node):
+            return f"{self.emit(node.value.value)[0]}.length", "int"  # type: ignore[attr-defined]
+        table = self._table(node.value)
+        whole = table is not None and type(self.constants[table][0]) is int  # type: ignore[index]
+        return self.element(node), "int" if whole else "float"
+
+    def _is_length(self, node: ast.Subscript) -> bool:
+        """``row.shape[0]`` of a row that knows its length."""
+        value, index = node.value, node.slice
+        shaped = isinstance(value, ast.Attribute) and value.attr == "shape" and isinstance(value.value, ast.Name)
+        if not shaped or not (isinstance(index, ast.Constant) and index.value == 0):
+            return False
+        assert isinstance(value, ast.Attribute)
+        return self.emit(value.value)[1] == "bytes"
 
     def element(self, node: ast.Subscript) -> str:
         """``row[index]``."""
         table = self._table(node.value)
         row, kind = (table, "row") if table else self.emit(node.value)
-        if kind != "row":
+        if kind not in ("row", "bytes"):
             raise self.function.error(node, "only a row has elements")
+        row = f"{row}.at" if kind == "bytes" else row
         index, index_kind = self.emit(node.slice)
         if index_kind != "int":
             raise self.function.error(node, f"an index that is a {index_kind}; use int()")
@@ -122,7 +136,9 @@ class Expressions:
         value: Any = self.function.scope.get(node.id)
         if getattr(value, "ndim", None) == 1:  # an array of numpy
             value = tuple(value.tolist())
-        if not isinstance(value, tuple) or not all(type(item) is float for item in value):
+        if not isinstance(value, tuple) or not value:
+            return None
+        if any(type(item) is not type(value[0]) for item in value) or type(value[0]) not in (int, float):
             return None
         if self.constants.setdefault(node.id, value) != value:
             raise self.function.error(node, f"the table {node.id} has two values")
@@ -139,9 +155,8 @@ class Expressions:
             raise self.function.error(node, f"the operator {kind.__name__} is not in the subset")
         if "bool" in (a, b) or "row" in (a, b):
             raise self.function.error(node, f"arithmetic of {a} and {b}")
-        whole = (a, b) == ("int", "int")
-        if whole and kind is ast.Div:
-            raise self.function.error(node, "a quotient of whole numbers; use float()")
+        # a quotient is a float in Python, of whole numbers too
+        whole = (a, b) == ("int", "int") and kind is not ast.Div
         if not whole:
             left, right = widened(left, a), widened(right, b)
         return f"({left} {_ARITHMETIC[kind]} {right})", "int" if whole else "float"

@@ -6,7 +6,7 @@ import ast
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["float", "int", "bool", "row"]
+Kind = Literal["float", "int", "bool", "row", "bytes"]  # bytes: a row of small whole numbers and its length
 
 C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
 

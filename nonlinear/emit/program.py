@@ -52,8 +52,10 @@ class Program:
             if isinstance(value, float):
                 lines.append(f"static const double {name} = {c_float(value)};")
             elif isinstance(value, tuple):
-                texts = ", ".join(c_float(item) for item in value)
-                lines.append(f"static const double {name}[{len(value)}] = {{{texts}}};")
+                whole_numbers = type(value[0]) is int
+                texts = ", ".join(str(item) if whole_numbers else c_float(item) for item in value)
+                kind = "int" if whole_numbers else "double"
+                lines.append(f"static const {kind} {name}[{len(value)}] = {{{texts}}};")
         return "\n".join(lines)
 
 
@@ -126,6 +128,8 @@ class _Collector:
             if kind == "row":
                 const = "" if name in function.written else "const "
                 parts.append(f"{const}double *{c_name(name)}")
+            elif kind == "bytes":
+                parts.append(f"{self.prefix}bytes {c_name(name)}")
             else:
                 parts.append(f"{C_TYPES[kind]} {c_name(name)}")
         return f"{self._returned(function)} {self.prefix}{function.name}({', '.join(parts) or 'void'})"

@@ -59,6 +59,11 @@ class Statements:
             if kind not in ("float", "int"):
                 raise self.function.error(target, f"a {kind} stored in a row")
             self._mark_written(target)
+            if self._is_bytes(target):
+                if kind != "int":
+                    raise self.function.error(target, f"a {kind} stored in a row of small whole numbers")
+                self._put(f"{self.expressions.element(target)} = (unsigned char){text};")
+                return
             text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
             self._put(f"{self.expressions.element(target)} = {text};")
         elif isinstance(target, ast.Name):
@@ -66,6 +71,10 @@ class Statements:
             self._put(f"{c_name(target.id)} = {text};")
         else:
             raise self.function.error(target, "this target is not in the subset")
+
+    def _is_bytes(self, target: ast.Subscript) -> bool:
+        name = target.value.id if isinstance(target.value, ast.Name) else ""
+        return self.function.arguments.get(name) == "bytes"
 
     def _declare(self, target: ast.Name, kind: Kind) -> None:
         function, name = self.function, target.id

@@ -108,18 +108,22 @@ def source_text() -> str:
     """``drive.c``: constants, helpers, types, functions."""
     emitted = program()
     body = emitted.functions
-    helpers = [text for name, text in _MINMAX.items() if f"drive_{name}(" in body]
     parts = [
         '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n',
         emitted.constants_text(words()),
         "",
-        *helpers,
+        *helpers_of(body),
         "",
         emitted.types,
         "",
         body,
     ]
     return template("drive_head.c") + "\n".join(parts)
+
+
+def helpers_of(body: str) -> list[str]:
+    """Minimum and maximum as Python has them, those that a program calls."""
+    return [text for name, text in _MINMAX.items() if f"drive_{name}(" in body]
 
 
 def source_hash() -> str:

@@ -5,9 +5,7 @@ from typing import Any
 
 import numba
 
-scalar: Any = numba.njit(
-    error_model="numpy"
-)  # the kernels' own decorator knows when to forget a cache only there
+scalar: Any = numba.njit(error_model="numpy")  # not cached
 
 FIRST, SECOND, THIRD = range(3)
 GAIN = 1.0 / 3.0
@@ -68,7 +66,7 @@ def everything(p, s, n):  # type: ignore[no-untyped-def]
     y, _flag = passed_on(total)
     old = push(s, THIRD, small(y, 10.0))
     floor = math.floor(p[0] * 10.0) / 10.0
-    bits = (n << 2) | 1
+    bits = ((n << 2) | 1) + int((n + 2) / 3)
     wave = math.sin(a) + math.exp(-abs(b)) + math.atan2(a, 1.0 + b * b) + math.sqrt(abs(a)) + math.pi
     return total + old + floor + float(bits) + wave if n > 1 else -total - old + min(n, 2) * wave
 
@@ -111,9 +109,3 @@ def truth(x):  # type: ignore[no-untyped-def]
 def sliced(s):  # type: ignore[no-untyped-def]
     """A slice."""
     s[0:2] = 1.0
-
-
-@scalar
-def quotient(n):  # type: ignore[no-untyped-def]
-    """A quotient of whole numbers."""
-    return n / 2

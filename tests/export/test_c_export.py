@@ -21,7 +21,6 @@ from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.call import parameters
 from nonlinear._kernels.prepare import prepare_sizes
-
 from nonlinear._kernels.tick import get, init, set_state, tick
 from nonlinear.export import c_export
 from nonlinear.export.build import compile_files, system_compiler

@@ -12,7 +12,6 @@ from emit_samples import (
     everything,
     open_order,
     power,
-    quotient,
     sliced,
     truth,
     twice,
@@ -67,7 +66,6 @@ def test_every_construct_gives_the_same_bits(tmp_path: Path) -> None:
         (twice, ["row"], "writes s beside another use of s"),
         (truth, ["float"], "a float as a condition"),
         (sliced, ["row"], "Slice is not in the subset"),
-        (quotient, ["int"], "a quotient of whole numbers"),
         (everything, ["row", "row"], "takes"),
     ],
 )
