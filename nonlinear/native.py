@@ -1,9 +1,9 @@
 """Which compiled form of the kernels runs: the emitted C built at installation, or numba's.
 
 Both give the same bits.  numba compiles at the first call, which takes some twenty seconds; the C library is
-there from the start.  ``python -m nonlinear.native`` builds it (``make install`` does); it is used as long as
-the kernels' source is the one that it was made of.  ``ACTUATOR_LTI_KERNEL`` chooses: ``auto`` (the library where
-there is one), ``c`` (or an error), ``numba``.
+there from the start.  ``python -m nonlinear.native`` builds it (``make install`` does); it is used as long
+as the kernels' source is the one that it was made of.  ``ACTUATOR_LTI_KERNEL`` chooses: ``auto`` (the library
+where there is one), ``c`` (or an error), ``numba``.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ def design_rows(
     InputError
         If the stages of the design do not fit together.
     """
-    rows = np.zeros((count, at.SIZE), dtype=kind)
+    rows: Floats = np.zeros((count, at.SIZE), dtype=kind)
     row = rows.T  # a place of it is a column
     _plant(design, row)
     _friction(design, row, friction_on)

@@ -11,7 +11,7 @@ units are SI, motor side.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 # --- parameters of one run -------------------------------------------------------------------------
 (
@@ -398,7 +398,7 @@ OUT_SIZE = OUT_STEP_BEFORE + 1
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)
 
 
-def length_of(row: Sequence[float]) -> int:
+def length_of(row: Any) -> int:
     """Length of the row of parameters of a run with what is derived from it."""
     if row[LAW] <= 0.0:
         return P_SIZE

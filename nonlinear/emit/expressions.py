@@ -111,10 +111,14 @@ class Expressions:
     def _is_length(self, node: ast.Subscript) -> bool:
         """``row.shape[0]`` of a row that knows its length."""
         value, index = node.value, node.slice
-        shaped = isinstance(value, ast.Attribute) and value.attr == "shape" and isinstance(value.value, ast.Name)
-        if not shaped or not (isinstance(index, ast.Constant) and index.value == 0):
+        if (
+            not isinstance(value, ast.Attribute)
+            or value.attr != "shape"
+            or not isinstance(value.value, ast.Name)
+        ):
             return False
-        assert isinstance(value, ast.Attribute)
+        if not isinstance(index, ast.Constant) or index.value != 0:
+            return False
         return self.emit(value.value)[1] == "bytes"
 
     def element(self, node: ast.Subscript) -> str:

@@ -152,7 +152,8 @@ int fmu_set_keys(const double *k, double *p);
 
 def _design_source(design: Design, trace: KeyTrace) -> str:
     keys = "\n".join(
-        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}}}, /* {key.path} */"
+        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}}},"
+        f" /* {key.path} */"
         for key in trace.keys
     )
     constants = "\n".join(f"    {c_float(_finite(key.value))}, /* {key.path} */" for key in trace.constants)

@@ -56,7 +56,9 @@ def _attributes(design: Design, tool: str) -> dict[str, str]:
 
 
 def _root_2(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
-    root = ET.Element("fmiModelDescription", fmiVersion="2.0", guid=token, **_attributes(design, tool))
+    root = ET.Element(
+        "fmiModelDescription", {"fmiVersion": "2.0", "guid": token, **_attributes(design, tool)}
+    )
     simulation = ET.SubElement(
         root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUstate="true", canSerializeFMUstate="true", canNotUseMemoryManagementFunctions="true",
@@ -69,7 +71,7 @@ def _root_2(design: Design, token: str, sources: Sequence[str], tool: str) -> ET
 
 def _root_3(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
     root = ET.Element(
-        "fmiModelDescription", fmiVersion="3.0", instantiationToken=token, **_attributes(design, tool)
+        "fmiModelDescription", {"fmiVersion": "3.0", "instantiationToken": token, **_attributes(design, tool)}
     )
     ET.SubElement(
         root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
@@ -90,7 +92,7 @@ def _units(variables: Sequence[Variable], version: int) -> ET.Element:
             powers["factor"] = repr(found.factor)
         if "celsius" in str(found.dimension):
             powers["offset"] = "273.15"
-        ET.SubElement(unit, "BaseUnit", **powers)
+        ET.SubElement(unit, "BaseUnit", powers)
     return definitions
 
 
@@ -132,10 +134,9 @@ def _variables_2(root: ET.Element, variables: Sequence[Variable]) -> None:
     types = {"real": "Real", "boolean": "Boolean", "string": "String"}
     listed = ET.SubElement(root, "ModelVariables")
     for item in variables:
-        scalar = ET.SubElement(listed, "ScalarVariable", **_common(item))
-        ET.SubElement(
-            scalar, types[item.kind], **(_bounds(item) if item.kind == "real" else {}), **_start(item)
-        )
+        scalar = ET.SubElement(listed, "ScalarVariable", _common(item))
+        bounds = _bounds(item) if item.kind == "real" else {}
+        ET.SubElement(scalar, types[item.kind], {**bounds, **_start(item)})
     structure = ET.SubElement(root, "ModelStructure")
     index = {item.reference: n + 1 for n, item in enumerate(variables)}
     outputs = [item for item in variables if item.causality == "output"]
@@ -161,11 +162,11 @@ def _variables_3(root: ET.Element, variables: Sequence[Variable]) -> None:
     )  # fmt: skip
     for item in variables:
         if item.kind == "string":
-            element = ET.SubElement(listed, "String", **_common(item))
+            element = ET.SubElement(listed, "String", _common(item))
             ET.SubElement(element, "Start", value=str(item.start))
         else:
             bounds = _bounds(item) if item.kind == "real" else {}
-            ET.SubElement(listed, types[item.kind], **_common(item), **bounds, **_start(item))
+            ET.SubElement(listed, types[item.kind], {**_common(item), **bounds, **_start(item)})
     structure = ET.SubElement(root, "ModelStructure")
     outputs = [item for item in variables if item.causality == "output"]
     for name in ("Output", "InitialUnknown"):

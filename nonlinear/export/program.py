@@ -55,7 +55,7 @@ _ABOUT = {
 @cache
 def program() -> Program:
     """The emitted program."""
-    return emit_c(ENTRIES)  # type: ignore[arg-type]
+    return emit_c(ENTRIES)
 
 
 def template(name: str) -> str:

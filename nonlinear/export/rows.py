@@ -65,7 +65,7 @@ def names_of(first: int, last: int, begin: str = "") -> list[tuple[str, int]]:
 
 
 def parameter_names() -> list[tuple[str, int]]:
-    """The parameters of a run that stand alone, in the order of the row (signals, probes and chains apart)."""
+    """The parameters of a run that stand alone, in the order of the row."""
     ours = list(words())
     block = ours[: ours.index("COMMAND")]
     return [(name, getattr(at, name)) for name in block]

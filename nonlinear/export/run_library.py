@@ -22,7 +22,7 @@ def run_sources() -> dict[str, str]:
         init: [_ROW, _ROW],
         run: [*rows, "bytes", _ROW, _ROW, "float"],
     }
-    emitted = emit_c(kinds)  # type: ignore[arg-type]
+    emitted = emit_c(kinds)
     parts = [
         "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n",
         "typedef struct { unsigned char *at; int length; } drive_bytes;",

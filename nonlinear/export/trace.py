@@ -131,7 +131,7 @@ class Traced:
     def __float__(self) -> float:
         raise NotTraceable("a function of a floating-point number")
 
-    __int__ = __float__  # type: ignore[assignment]
+    __int__ = __float__
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,9 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
-The module is a wasi reactor without imports.  It exports ``memory``, ``p_at``, ``s_at``, ``io_at`` (where the
-rows lie), ``p_most``, ``s_most``, ``io_length``, ``start``, ``retune``, ``tick`` and ``run``.  A host writes the
-row of a run (`nonlinear.parameters.design_row`) at ``p_at()``, calls ``start()``, and then ``tick()`` with inputs
-and outputs at ``io_at()``; the places are those of ``nonlinear._kernels.layout``.
+The module is a wasi reactor without imports.  It exports ``memory``, ``p_at``, ``s_at``, ``io_at`` (where
+the rows lie), ``p_most``, ``s_most``, ``io_length``, ``start``, ``retune``, ``tick`` and ``run``.  A host
+writes the row of a run (`nonlinear.parameters.design_row`) at ``p_at()``, calls ``start()``, and then
+``tick()`` with inputs and outputs at ``io_at()``; the places are those of ``nonlinear._kernels.layout``.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ def _executed(lines: tuple[str, ...], k: list[float], p: dict[int, float]) -> bo
 @needs_compiler
 def test_values_that_are_not_allowed_are_refused(unit: Path) -> None:
     for start in ({"motor.resistance": -1.0}, {"friction.breakaway_ratio": 0.5}):
-        with pytest.raises(Exception, match="failed|Error|ERROR"):
+        with pytest.raises(Exception, match=r"failed|Error|ERROR"):
             run(unit, 1e-3, 0.01, start, logger=lambda *_: None)
 
 

@@ -1,4 +1,4 @@
-"""The library built at installation gives numba's bits, is left when the kernels change, and has one switch."""
+"""The library built at installation gives numba's bits and has one switch."""
 
 from __future__ import annotations
 
