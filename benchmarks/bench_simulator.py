@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from actuator_lti import load_design
-from actuator_lti.design.model import Design, Filter
+from actuator_lti.design.model import Coupling, Design, Filter, LoadFriction
 from benchmarks.c_simulator import CSimulator
 from benchmarks.control_cascade import seconds_per_second
 from benchmarks.row import Row
@@ -51,6 +51,7 @@ def rows(quick: bool = False) -> Iterator[Row]:
         note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
     )
     yield from wider_drives(1 if quick else 5)
+    yield two_mass_with_play(best, quick)
     yield two_threads(quick)
     yield from constant_cost(quick)
     yield from first_calls()
@@ -150,6 +151,31 @@ def wider_drives(repeats: int) -> Iterator[Row]:
         measured, reference = np.array(pairs).min(axis=0)
         name = f"time with {name}, over that without"
         yield Row(group=GROUP, name=name, measured=float(measured / reference), unit="x", target=target)
+
+
+def two_mass_with_play(best: float, quick: bool) -> Row:
+    """The baseline behind a coupling with play, against its own time a tick, in the same run."""
+    rigid = load_design("ilr33-amber")
+    stiffness, play = 100.0, np.radians(0.1)
+    coupling = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=0.01, play_rad=float(play))
+    friction = LoadFriction(dry_torque_Nm=0.2, viscous_Nms_rad=0.05)
+    load = replace(rigid.load, inertia_kgm2=5e-3, friction=friction)
+    rows = Rows.of(replace(rigid, coupling=coupling, load=load))
+    rows["ticks"] = round(DURATION_S / rows.value("period"))
+    rows["load"] = 4.0
+    rows.sine("command", np.radians(5.0), 1.0)
+    row = rows.values[0]
+    history = np.zeros((8 + at.ELASTIC_COLUMNS, int(row[at.TICKS])))
+    flags, out, shared = np.zeros(history.shape[1], np.uint8), np.zeros(at.OUT_SIZE), np.zeros(2)
+    taken = best_of(lambda: call(row, np.zeros(1), history, flags, out, shared), 2 if quick else 8)
+    return Row(
+        group=GROUP,
+        name="two masses with play and both sides' friction over the baseline, time a tick",
+        measured=taken / best,
+        unit="x",
+        target=4.0,
+        note=f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_EVENTS]:.0f} events",
+    )
 
 
 def two_threads(quick: bool) -> Row:

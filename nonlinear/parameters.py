@@ -11,6 +11,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
+from nonlinear.elastic import put_drive_train
 from nonlinear.filters import Section, command_section, section
 
 Floats = npt.NDArray[np.float64]
@@ -77,6 +78,7 @@ def design_rows(
     _friction(design, row, friction_on)
     _controllers(design, row)
     _load(design, row)
+    put_drive_train(design, row, friction_on=friction_on)
     _command(design, row)
     _supply(design, row)
     _instruments(design, row)

@@ -107,7 +107,8 @@ class BatchResult:
     @property
     def final_output_rad(self) -> Floats:
         """Output angle after the last tick."""
-        return self.outs[:, at.OUT_ANGLE] / self.rows[:, at.RATIO]
+        rigid = self.outs[:, at.OUT_ANGLE] / self.rows[:, at.RATIO]
+        return np.where(self.rows[:, at.ELASTIC_DRIVE] > 0.0, self.outs[:, at.OUT_OUTPUT], rigid)
 
     def limit_fraction(self, name: str) -> Floats:
         """Fraction of the ticks in which a limiter acted: speed, acceleration, current, voltage."""

@@ -125,6 +125,14 @@ def _check_point(row: Floats, point: str) -> None:
 def put_state(row: Floats, state: State) -> None:
     """Write the initial state."""
     row[at.ANGLE_START], row[at.SPEED_START] = state.motor_angle_rad, state.motor_speed_rad_s
+    if row[at.ELASTIC_DRIVE]:
+        angle, speed = state.motor_angle_rad / row[at.RATIO], state.motor_speed_rad_s / row[at.RATIO]
+        behind = row[at.RATIO] / row[at.RATIO_TO_COUPLING]
+        if state.output_angle_rad is not None:
+            row[at.TWIST_START] = behind * (angle - state.output_angle_rad)
+        row[at.LOAD_SPEED_START] = behind * (
+            speed if state.output_speed_rad_s is None else state.output_speed_rad_s
+        )
     row[at.CURRENT_START] = 0.0 if row[at.SOURCE] else state.current_A
     row[at.CURRENT_INTEGRATOR_START] = state.current_integral_V
     row[at.VELOCITY_INTEGRATOR_START] = state.velocity_integral

@@ -148,6 +148,7 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
     probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
     rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
+    columns += at.ELASTIC_COLUMNS * int(row[at.ELASTIC_DRIVE])
     if 8 * rows * columns > HISTORY_BYTES.most:
         message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
         raise InputError(f"{message}; use record_every, or simulate_many with reducers")

@@ -51,6 +51,7 @@ class LimitUse:
 class State:
     """State of the drive at an instant, motor side; also what a run may start from.
 
+    Output angle and speed are states of their own in an elastic drive; ``None`` is no twist, and one speed.
     Beside these, past encoder readings are taken as those of constant speed, past voltages as ``voltage_V``.
     """
 
@@ -62,6 +63,8 @@ class State:
     speed_command_rad_s: float = 0.0
     current_command_A: float = 0.0
     voltage_V: float = 0.0
+    output_angle_rad: float | None = None
+    output_speed_rad_s: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +72,9 @@ class Energy:
     """Where the electrical energy of a run went, all in J.
 
     ``input = copper + magnetic + kinetic + friction (dry, viscous, offset) + output work + conversion``;
+    An elastic drive adds ``spring + coupling damping + parting + load friction (dry, viscous, offset)``:
+    parting is the spring energy left when contact ends; a self-locking stage's own loss counts as dry
+    friction.
     ``conversion`` is ``(kE - kM) i w`` integrated, zero for a motor whose constants agree.
 
     The last four are the supply's own account, where one is modelled, of the bus power ``u i`` sampled at the
@@ -88,6 +94,12 @@ class Energy:
     supply_loss_J: float = 0.0
     brake_J: float = 0.0
     bus_capacitor_J: float = 0.0
+    spring_J: float = 0.0
+    coupling_damping_J: float = 0.0
+    parting_J: float = 0.0
+    load_dry_friction_J: float = 0.0
+    load_viscous_friction_J: float = 0.0
+    load_offset_friction_J: float = 0.0
 
     @property
     def balance_error_J(self) -> float:
@@ -98,6 +110,12 @@ class Energy:
             + self.kinetic_J
             + self.dry_friction_J
             + self.viscous_friction_J
+            + self.spring_J
+            + self.coupling_damping_J
+            + self.parting_J
+            + self.load_dry_friction_J
+            + self.load_viscous_friction_J
+            + self.load_offset_friction_J
         )
         return self.electrical_input_J - (
             out + self.offset_friction_J + self.output_work_J + self.conversion_J
@@ -143,6 +161,8 @@ class Trajectory:
         If asked for.
     final : State
         State after the last tick.
+    output_speed_rad_s, twist_rad, coupling_torque_Nm : ndarray or None
+        Of an elastic drive: speed of the output shaft, twist delta and torque T_s at the coupling's shaft.
     parameters_hash : str
         SHA-256 of the kernel's parameters.
     """
@@ -168,6 +188,9 @@ class Trajectory:
     final: State
     energy: Energy | None = None
     probes: Mapping[str, ProbeRecord] = field(default_factory=dict)
+    output_speed_rad_s: Floats | None = None
+    twist_rad: Floats | None = None
+    coupling_torque_Nm: Floats | None = None
     parameters_hash: str = ""
 
     @property
@@ -201,7 +224,7 @@ class Trajectory:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
-        names = (
+        names: tuple[str, ...] = (
             "time_s",
             "reference_rad",
             "output_angle_rad",
@@ -212,6 +235,8 @@ class Trajectory:
             "current_command_A",
             "speed_command_rad_s",
         )
+        if self.twist_rad is not None:
+            names += ("output_speed_rad_s", "twist_rad", "coupling_torque_Nm")
         linear = self.axis == "linear"
         out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
         for name in self.limits:

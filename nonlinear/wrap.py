@@ -38,6 +38,8 @@ def wrap(
         )
         for k, point in enumerate(probing)
     }
+    behind = at.HISTORY_PROBES + 2 * len(probing)
+    elastic = history[behind:] if row[at.ELASTIC_DRIVE] else [None] * at.ELASTIC_COLUMNS
     return Trajectory(
         design_name=design.name,
         axis=design.axis,
@@ -51,9 +53,12 @@ def wrap(
         events_per_tick=int(out[at.OUT_MAX_EVENTS]),
         stick_fraction=float(out[at.OUT_STICK_TICKS] / row[at.TICKS]),
         status=status,
-        final=final_state(out),
+        final=final_state(row, out),
         energy=energy_of(row, out) if row[at.WITH_ENERGY] else None,
         probes=probes,
+        output_speed_rad_s=elastic[0],
+        twist_rad=elastic[1],
+        coupling_torque_Nm=elastic[2],
         parameters_hash=digest,
     )
 
@@ -74,7 +79,7 @@ def limit_uses(row: Floats, out: Floats, axis: str = "rotary") -> dict[str, Limi
     return uses
 
 
-def final_state(out: Floats) -> State:
+def final_state(row: Floats, out: Floats) -> State:
     """State after the last tick."""
     return State(
         motor_angle_rad=float(out[at.OUT_ANGLE]),
@@ -85,6 +90,8 @@ def final_state(out: Floats) -> State:
         speed_command_rad_s=float(out[at.OUT_SPEED_COMMAND]),
         current_command_A=float(out[at.OUT_CURRENT_COMMAND]),
         voltage_V=float(out[at.OUT_VOLTAGE]),
+        output_angle_rad=float(out[at.OUT_OUTPUT]) if row[at.ELASTIC_DRIVE] else None,
+        output_speed_rad_s=float(out[at.OUT_OUTPUT_SPEED]) if row[at.ELASTIC_DRIVE] else None,
     )
 
 
@@ -96,7 +103,7 @@ def energy_of(row: Floats, out: Floats) -> Energy:
         electrical_input_J=float(e[at.ENERGY_INPUT]),
         copper_loss_J=float(e[at.ENERGY_COPPER]),
         magnetic_J=float(stored * (out[at.OUT_CURRENT] ** 2 - row[at.CURRENT_START] ** 2)),
-        kinetic_J=float(0.5 * row[at.INERTIA] * (out[at.OUT_SPEED] ** 2 - row[at.SPEED_START] ** 2)),
+        kinetic_J=kinetic_energy(row, out),
         dry_friction_J=float(e[at.ENERGY_DRY]),
         viscous_friction_J=float(e[at.ENERGY_VISCOUS]),
         offset_friction_J=float(e[at.ENERGY_OFFSET]),
@@ -106,4 +113,27 @@ def energy_of(row: Floats, out: Floats) -> Energy:
         supply_loss_J=float(e[at.ENERGY_SUPPLY_LOSS]),
         brake_J=float(e[at.ENERGY_BRAKE]),
         bus_capacitor_J=float(e[at.ENERGY_CAPACITOR]),
+        spring_J=spring_energy(row, out[at.OUT_TWIST]) - spring_energy(row, row[at.TWIST_START]),
+        coupling_damping_J=float(e[at.ENERGY_DAMPING]),
+        parting_J=float(e[at.ENERGY_PARTING]),
+        load_dry_friction_J=float(e[at.ENERGY_LOAD_DRY]),
+        load_viscous_friction_J=float(e[at.ENERGY_LOAD_VISCOUS]),
+        load_offset_friction_J=float(e[at.ENERGY_LOAD_OFFSET]),
     )
+
+
+def kinetic_energy(row: Floats, out: Floats) -> float:
+    """Change of the kinetic energy of the run, of both sides of a coupling."""
+    J = row[at.MOTOR_INERTIA] if row[at.ELASTIC_DRIVE] else row[at.INERTIA]
+    total = 0.5 * J * (out[at.OUT_SPEED] ** 2 - row[at.SPEED_START] ** 2)
+    if row[at.ELASTIC_DRIVE] and not row[at.RIGID]:
+        W = out[at.OUT_OUTPUT_SPEED] * row[at.RATIO] / row[at.RATIO_TO_COUPLING]
+        total += 0.5 * row[at.LOAD_INERTIA] * (W**2 - row[at.LOAD_SPEED_START] ** 2)
+    return float(total)
+
+
+def spring_energy(row: Floats, twist_rad: float) -> float:
+    """k max(0, |delta| - b)^2 / 2."""
+    if not row[at.ELASTIC_DRIVE] or row[at.RIGID]:
+        return 0.0
+    return float(0.5 * row[at.STIFFNESS] * max(0.0, abs(twist_rad) - row[at.HALF_PLAY]) ** 2)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, isfinite, log
 
 from actuator_lti.design.checks_control import check_control
+from actuator_lti.design.checks_elastic import check_elastic
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
@@ -25,7 +26,17 @@ def check_design(design: Design, where: str) -> None:
     InputError
         One line: key, value and what is allowed.
     """
-    for check in (_motor, _cascade, _sampling, check_control, _limits, _requirements, _correlations):
+    checks = (
+        _motor,
+        _cascade,
+        _sampling,
+        check_control,
+        check_elastic,
+        _limits,
+        _requirements,
+        _correlations,
+    )
+    for check in checks:
         check(design, where)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import isfinite, pi
 
+from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.model import Design
 
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
@@ -20,7 +21,18 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     ()
     """
     found: list[str] = []
-    for check in (_sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor):
+    checks = (
+        _sampling,
+        _crossovers,
+        _limits,
+        _unused,
+        _loads,
+        _pedigree,
+        _encoder,
+        _ac_motor,
+        elastic_warnings,
+    )
+    for check in checks:
         found.extend(check(design))
     return tuple(found)
 

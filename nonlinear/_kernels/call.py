@@ -6,11 +6,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nonlinear._kernels import layout
+from nonlinear._kernels.elastic_prepare import prepare_elastic
 from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.prepare import prepare, prepare_sizes
 from nonlinear._kernels.run import run
 from nonlinear._kernels.smooth import prepare_tanh
-from nonlinear._kernels.tick import init
+from nonlinear._kernels.tick import init, init_elastic
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,6 +28,9 @@ def parameters(row: Floats) -> tuple[Floats, Floats]:
     if row[layout.LAW] > 0.0:
         prepare_tanh(p, s)
     init(p, s)
+    if row[layout.ELASTIC_DRIVE] > 0.0:
+        p = prepare_elastic(p)
+        init_elastic(p, s)
     return p, s
 
 

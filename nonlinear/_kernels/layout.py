@@ -124,8 +124,23 @@ from typing import Any
     SEED,
     GRAVITY,  # m g l, N m
     GRAVITY_ANGLE,  # offset
+    RIGID,  # of an elastic drive train; 1: a friction map, but no coupling
+    RATIO_TO_COUPLING,  # N_c; N without a coupling
+    MOTOR_INERTIA,  # J_m; J without a coupling
+    LOAD_INERTIA,  # J_l at the coupling's shaft
+    STIFFNESS,  # k
+    COUPLING_DAMPING,  # c
+    HALF_PLAY,  # b
+    LOAD_DRY,  # C0_l
+    LOAD_VISCOUS,  # Cv_l
+    LOAD_BREAKAWAY,
+    LOAD_OFFSET,
+    TWIST_START,  # delta
+    LOAD_SPEED_START,  # W
+    MAP_COUNT,  # points of the friction map for w > 0; 0: no map
+    MAP_COUNT_REVERSE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(110)
+) = range(125)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -154,7 +169,11 @@ COMMAND_CHAIN = PROBES + 4 * PROBE_SIZE
 SPEED_CHAIN = COMMAND_CHAIN + SECTION
 TORQUE_CHAIN = SPEED_CHAIN + MAX_SECTIONS * SECTION
 
-SIZE = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # what describes a run; what follows is derived from it
+# --- friction map, used where ELASTIC_DRIVE is 1 ----------------------------------------------------
+MAX_POINTS = 16  # per side
+MAP = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # points (|w|, T) for w > 0, then for w < 0
+
+SIZE = MAP + 4 * MAX_POINTS  # what describes a run; what follows is derived from it
 
 # --- derived: one transition x+ = A x + b u + c T with x = (i, w, th), and one direction of slip ----------
 A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
@@ -229,6 +248,7 @@ TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
     S_DRY,  # dry friction of this tick, forward
     S_DRY_REVERSE,
     S_TORQUE,  # torque beside motor and dry friction
+    S_EXTRA,  # its part that is an extra torque at the motor shaft
     S_UNTIL_OUTER,  # ticks until the outermost stage is updated
     S_UNTIL_VELOCITY,
     S_CURRENT_INTEGRATOR,
@@ -266,7 +286,7 @@ TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
     S_OVERLOADED,
     S_EVENTS,  # in all
     S_MAX_EVENTS,  # most in one tick
-) = range(50)
+) = range(51)
 STATE_NAMES = frozenset(name for name in dir() if name.startswith("S_"))
 S_NOISE = S_MAX_EVENTS + 1  # four random streams of two numbers: current, angle, output angle, jitter
 NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)
@@ -283,14 +303,19 @@ S_ENERGY = S_NOISE + 8
     ENERGY_SUPPLY_LOSS,  # in that resistance
     ENERGY_BRAKE,  # in the brake
     ENERGY_CAPACITOR,  # taken up by the bus
-) = range(11)
-ENERGY_SIZE = 11
+    ENERGY_DAMPING,  # of the coupling
+    ENERGY_PARTING,  # spring energy left when contact ends
+    ENERGY_LOAD_DRY,  # friction behind the coupling
+    ENERGY_LOAD_VISCOUS,
+    ENERGY_LOAD_OFFSET,
+) = range(16)
+ENERGY_SIZE = 16
 S_COMMAND_CHAIN = S_ENERGY + ENERGY_SIZE
 S_SPEED_CHAIN = S_COMMAND_CHAIN + 2
 S_TORQUE_CHAIN = S_SPEED_CHAIN + 2 * MAX_SECTIONS
 S_PROBE_PLACES = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
 ELASTIC_STATE = S_PROBE_PLACES + 4
-ELASTIC_STATE_SIZE = 1
+ELASTIC_STATE_SIZE = 179
 S_QUEUE = ELASTIC_STATE + ELASTIC_STATE_SIZE  # the delay line, oldest first; then angles, average, rings
 WORK_SIZE = 4 * 49 + 24  # four matrices of 7 by 7, and what is made of them
 WORK_MORE = 4 * 49
@@ -325,7 +350,10 @@ BLOCK_SIZE = 7 * BLOCK
 ) = range(IN_PROBE + 4, IN_PROBE + 12)
 IO_ANGLE = IO_PROBES + 8
 IO_FLAGS = IO_ANGLE + 1
-IO_SIZE = IO_FLAGS + 1
+IO_OUTPUT_SPEED = IO_FLAGS + 1  # of an elastic drive: speed of the output shaft, twist, T_s
+IO_TWIST = IO_OUTPUT_SPEED + 1
+IO_COUPLING_TORQUE = IO_TWIST + 1
+IO_SIZE = IO_COUPLING_TORQUE + 1
 
 # --- signals that are recorded and reduced, in this order ------------------------------------------
 SIGNALS = (
@@ -347,9 +375,11 @@ SIGNALS = (
 )
 BASE_SIGNALS = 7
 ALL_SIGNALS = 15
-# columns of the history: the base signals, then the motor angle, then before and after of each active probe
+# columns of the history: the base signals, then the motor angle, then before and after of each active probe,
+# then output speed, twist and coupling torque of an elastic drive
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
+ELASTIC_COLUMNS = 3
 
 # --- limiters: name, and its bit in the flags ---------------------------------------------------------
 LIMITERS = ("speed", "acceleration", "current", "voltage", "torque-command", "overload", "profile")
@@ -373,8 +403,11 @@ LIMITER_COUNT = 7
     OUT_SPEED_COMMAND,
     OUT_CURRENT_COMMAND,
     OUT_VOLTAGE,
+    OUT_OUTPUT,  # of an elastic drive: angle and speed of the output shaft, twist
+    OUT_OUTPUT_SPEED,
+    OUT_TWIST,
     OUT_LIMIT_TICKS,  # of each limiter: ticks active
-) = range(13)
+) = range(16)
 OUT_LIMIT_FIRST = OUT_LIMIT_TICKS + LIMITER_COUNT  # first tick, -1 if never
 OUT_ENERGY = OUT_LIMIT_FIRST + LIMITER_COUNT
 OUT_STEP = OUT_ENERGY + ENERGY_SIZE

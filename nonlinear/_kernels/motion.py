@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from nonlinear._kernels import layout
+from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.compiled import inlined, scalar, woven
+from nonlinear._kernels.elastic import elastic_motion
 from nonlinear._kernels.energy import energy_stick, energy_whole
 from nonlinear._kernels.segment import segment, slip_step
 from nonlinear._kernels.sense import output_angle
@@ -28,7 +29,7 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
 def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
     """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
     dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
-    s[layout.S_LOAD] = moment
+    s[layout.S_LOAD], s[layout.S_EXTRA] = moment, torque
     s[layout.S_DRY], s[layout.S_DRY_REVERSE] = p[layout.DRY] + dry, p[layout.DRY_REVERSE] + dry
     s[layout.S_TORQUE] = p[layout.BACK_DRIVABLE] / p[layout.RATIO] * moment - p[layout.OFFSET] + torque
 
@@ -88,6 +89,9 @@ def closely(p, s, part, u, events, rare):  # type: ignore[no-untyped-def]
 
     With ``None`` for ``rare``, what a rigid drive with dry friction does not need is not even compiled.
     """
+    if rare is not None and p[layout.ELASTIC_DRIVE] > 0.0:
+        status = elastic_motion(p, s, part, u, s[layout.S_LOAD], s[layout.S_EXTRA])
+        return events + s[elastic_layout.ES_HAPPENED] if status == layout.OK else -1.0
     if rare is not None and p[layout.LAW] > 0.0:
         tanh_segment(p, s, part, u)
         return events

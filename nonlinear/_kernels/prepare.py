@@ -23,6 +23,7 @@ def prepare_sizes(p):  # type: ignore[no-untyped-def]
         longest = max(longest, p[at + layout.PROBE_DELAY])
         probing = max(probing, p[at + layout.PROBE_ON])
     p[layout.PROBING], p[layout.NOTING] = probing, max(probing, p[layout.OVERLOAD])
+    p[layout.NOTING] = max(p[layout.NOTING], p[layout.ELASTIC_DRIVE])
     p[layout.PROBE_RING] = longest + layout.MAX_TAPS + 1.0 if probing > 0.0 else 1.0
     p[layout.AT_WORK] = p[layout.AT_PROBES] + 4.0 * p[layout.PROBE_RING]
     p[layout.STATE_SIZE] = p[layout.AT_WORK] + layout.WORK_SIZE

@@ -18,16 +18,19 @@ def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-
     history[6 * rows + row] = io[layout.IO_SPEED_COMMAND]
     history[7 * rows + row] = io[layout.IO_ANGLE]
     flag_history[row] = int(io[layout.IO_FLAGS])
-    if p[layout.PROBING] > 0.0:
-        record_probes(p, io, history, rows, row)
+    if p[layout.PROBING] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0:
+        record_more(p, io, history, rows, row)
 
 
 @scalar
-def record_probes(p, io, history, rows, row):  # type: ignore[no-untyped-def]
-    """Write what stands in front of and behind each active probe, in the order of the points."""
+def record_more(p, io, history, rows, row):  # type: ignore[no-untyped-def]
+    """Write both sides of each active probe, in the order of the points, then what an elastic drive adds."""
     col = layout.HISTORY_PROBES
     for point in range(4):
         if p[layout.PROBES + point * layout.PROBE_SIZE] > 0.0:
             history[col * rows + row] = io[layout.IO_PROBES + 2 * point]
             history[(col + 1) * rows + row] = io[layout.IO_PROBES + 2 * point + 1]
             col += 2
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        for j in range(layout.ELASTIC_COLUMNS):
+            history[(col + j) * rows + row] = io[layout.IO_OUTPUT_SPEED + j]

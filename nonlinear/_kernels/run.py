@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nonlinear._kernels import layout
+from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.record import record
 from nonlinear._kernels.reduce import clear, note_limits, reduce
@@ -41,7 +41,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out, rare): 
 
 
 @scalar
-def finish(s, k, out):  # type: ignore[no-untyped-def]
+def finish(p, s, k, out):  # type: ignore[no-untyped-def]
     """Write the final state and the counts into the results."""
     out[layout.OUT_TICKS] = k
     out[layout.OUT_EVENTS], out[layout.OUT_MAX_EVENTS] = s[layout.S_EVENTS], s[layout.S_MAX_EVENTS]
@@ -52,6 +52,9 @@ def finish(s, k, out):  # type: ignore[no-untyped-def]
     out[layout.OUT_SPEED_COMMAND] = s[layout.S_SPEED_COMMAND]
     out[layout.OUT_CURRENT_COMMAND] = s[layout.S_CURRENT_REFERENCE]
     out[layout.OUT_VOLTAGE] = s[layout.S_VOLTAGE]
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        out[layout.OUT_OUTPUT], out[layout.OUT_OUTPUT_SPEED] = s[layout.S_OUTPUT], s[layout.S_OUTPUT_SPEED]
+        out[layout.OUT_TWIST] = s[elastic_layout.ES_TWIST]
     for j in range(layout.ENERGY_SIZE):
         out[layout.OUT_ENERGY + j] = s[layout.S_ENERGY + j]
 
@@ -76,5 +79,5 @@ def run(p, s, io, block, tables, history, flag_history, out, shared, rare):  # t
         shared[0] = k
         if shared[1] != 0.0 and s[layout.S_STATUS] == 0.0:
             s[layout.S_STATUS] = float(layout.CANCELLED)
-    finish(s, k, out)
+    finish(p, s, k, out)
     return int(s[layout.S_STATUS])

@@ -6,6 +6,7 @@ import math
 
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.elastic_modes import elastic_slopes
 from nonlinear._kernels.modal import derivative
 from nonlinear._kernels.random import normal
 from nonlinear._kernels.regulator import clamp
@@ -21,6 +22,9 @@ def output_angle(p, s):  # type: ignore[no-untyped-def]
 @scalar
 def slopes(p, s):  # type: ignore[no-untyped-def]
     """(i', w') at the sampling instant under the voltage that acted last."""
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        di, dw, _dW, _dd = elastic_slopes(p, s)
+        return di, dw
     i, w, d, u = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_DIRECTION], s[layout.S_HELD]
     if d == 0.0:
         return (u - p[layout.RESISTANCE] * i) * p[layout.LOCKED_GAIN] * p[layout.RELAX], 0.0

@@ -5,9 +5,10 @@ All rows are flat.  A state copied out and set again elsewhere goes on with the 
 
 from __future__ import annotations
 
-from nonlinear._kernels import layout
+from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.control import control
+from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start
 from nonlinear._kernels.estimate import TRACKING, counted
 from nonlinear._kernels.filters import settle
 from nonlinear._kernels.motion import motion, put_load
@@ -97,6 +98,14 @@ def init(p, s):  # type: ignore[no-untyped-def]
     seed_streams(s, p[layout.SEED])
 
 
+@entry
+def init_elastic(p, s):  # type: ignore[no-untyped-def]
+    """What `init` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
+    elastic_start(p, s)
+    fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
+    s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
+
+
 @woven
 def decide(p, s, io):  # type: ignore[no-untyped-def]
     """Sense and control at t_k, and note what there is to record."""
@@ -120,7 +129,10 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
 
 @scalar
 def note_more(p, s, io):  # type: ignore[no-untyped-def]
-    """Note what stands in front of and behind each probe, and the current command under overload."""
+    """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        io[layout.IO_OUTPUT_SPEED], io[layout.IO_TWIST] = s[layout.S_OUTPUT_SPEED], s[elastic_layout.ES_TWIST]
+        io[layout.IO_COUPLING_TORQUE] = coupling_torque(p, s)
     if p[layout.OVERLOAD] > 0.0:
         io[layout.IO_CURRENT_COMMAND] = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     at = layout.IO_PROBES

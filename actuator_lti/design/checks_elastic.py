@@ -1,0 +1,73 @@
+"""What a coupling, the load behind it and a self-locking stage ask of each other (model.md section 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+
+
+def check_elastic(design: Design, where: str) -> None:
+    """Refuse a drive train that the event-driven plant cannot be.
+
+    Raises
+    ------
+    InputError
+        One line: a coupling or play without an inertia behind it, with the tanh law, or before the
+        self-locking stage; a self-locking stage whose friction would give energy; friction of a load that
+        has no coupling before it; a breakaway ratio below 1.
+    """
+
+    def refuse(key: str, value: object, allowed: str) -> InputError:
+        return InputError(f"{key} = {value}: {allowed}", where=where)
+
+    coupling, friction = design.coupling, design.load.friction
+    if friction is not None and friction.breakaway_ratio < 1.0:
+        raise refuse("load.friction.breakaway_ratio", f"{friction.breakaway_ratio:g}", "allowed: at least 1")
+    if coupling is None:
+        if friction is not None:
+            raise refuse(
+                "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
+            )
+        return
+    if design.load_side_inertia_kgm2 <= 0.0:
+        raise refuse(
+            "coupling.stiffness",
+            f"{coupling.stiffness_Nm_rad:g}",
+            "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
+        )
+    if design.friction.law == "tanh":
+        raise refuse("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"')
+    if design.load.path == "self-locking":
+        _self_locking(design, where)
+
+
+def _self_locking(design: Design, where: str) -> None:
+    """The self-locking stage is the last gear; the coupling comes behind it."""
+    if design.ratio_behind_coupling != 1.0 or design.gears_before_coupling < len(design.gears):
+        raise InputError(
+            f'coupling.after = "{design.coupling.after if design.coupling else ""}": lies before the '
+            "self-locking stage; allowed: the last gear, or load.path = back-drivable",
+            where=where,
+        )
+    least = 1.0 / design.ratio_to_coupling
+    if design.friction.load_coefficient < least * (1 - 1e-12):
+        raise InputError(
+            f"friction.load_coefficient = {design.friction.load_coefficient:g}: a self-locking stage "
+            f"with less than 1/N_c gives energy; allowed: at least {least:g}",
+            where=where,
+        )
+
+
+def elastic_warnings(design: Design) -> Iterator[str]:
+    """A rigid self-locking drive whose load friction is too small to lock it."""
+    least = 1.0 / design.total_ratio
+    loaded = design.load.moment_max_Nm > 0.0
+    rigid = design.coupling is None and design.load.path == "self-locking"
+    coefficient = design.friction.load_coefficient
+    if rigid and loaded and coefficient < least * (1 - 1e-12):
+        yield (
+            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
+            "self-locking drive cannot hold its load"
+        )

@@ -1,0 +1,190 @@
+"""The event-driven, piecewise-affine plant of model.md section 6: one held segment with all its events.
+
+A whole segment is one precomputed transition wherever a bound shows that no guard can cross in it.  Otherwise
+the segment is walked: by precomputed dyadic steps where the plant is stiff, and by Taylor series over short
+intervals, in which the first fall of a guard is located to rounding.
+"""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import elastic_layout as at
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.elastic_energy import add_energies
+from nonlinear._kernels.elastic_modes import (
+    change_mode,
+    elastic_slopes,
+    guard_offset,
+    guard_state,
+    put_output,
+)
+from nonlinear._kernels.elastic_series import (
+    AT_ONCE,
+    NEVER,
+    fill_polynomial,
+    fill_series,
+    first_fall,
+    series_state,
+)
+
+FINITE = 1e15
+LARGEST = 1e300
+
+
+@scalar
+def elastic_motion(p, s, part, held, M, extra):  # type: ignore[no-untyped-def]
+    """Advance the plant by one held segment; returns a status of ``layout``.
+
+    ``part`` 0 is the first f of the tick, 1 the rest; ``held`` the voltage (or a source's input), ``M`` the
+    moment at the output shaft, ``extra`` a torque at the motor shaft.  At most ``MAX_EVENTS`` events.
+    """
+    whole = p[layout.LENGTH + part]
+    s[at.ES_HAPPENED] = 0.0
+    if whole <= 0.0:
+        return layout.OK
+    s[at.ES_INPUT + at.IN_U], s[at.ES_INPUT + at.IN_M] = held, M
+    s[at.ES_INPUT + at.IN_ABS_M], s[at.ES_INPUT + at.IN_EXTRA] = abs(M), extra
+    put_torques(p, s)
+    if p[layout.WITH_ENERGY] == 0.0 and stride(p, s, part):
+        return layout.OK
+    return walk(p, s, whole)
+
+
+@scalar
+def put_torques(p, s):  # type: ignore[no-untyped-def]
+    """Held torques on both sides in the present mode."""
+    x = at.ES_INPUT
+    source = p[layout.SOURCE_GAIN] * s[x + at.IN_U]
+    outside = source + s[x + at.IN_EXTRA] + p[at.EL_BACK] * s[x + at.IN_M]
+    s[x + at.IN_MOTOR] = outside + s[at.ES_MOTOR_TORQUE] + s[at.ES_MOTOR_DRY] * s[x + at.IN_ABS_M]
+    s[x + at.IN_LOAD] = s[x + at.IN_M] / p[at.EL_RATIO_BEHIND] + s[at.ES_LOAD_TORQUE]
+
+
+@scalar
+def speed_of_change(p, s):  # type: ignore[no-untyped-def]
+    """Norm of x' in the units of energy; it bounds every derivative of a guard."""
+    di, dw, dW, dd = elastic_slopes(p, s)
+    weight = int(s[at.ES_MODE]) + at.MODE_WEIGHT
+    di, dw, dW, dd = di * p[weight], dw * p[weight + 1], dW * p[weight + 2], dd * p[weight + 3]
+    return math.sqrt(di * di + dw * dw + dW * dW + dd * dd)
+
+
+@scalar
+def stride(p, s, number):  # type: ignore[no-untyped-def]
+    """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j."""
+    m = int(s[at.ES_MODE])
+    o = m + at.MODE_CHORD + 3 + int(p[at.EL_LEVELS]) + number * at.STEP_SIZE
+    i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
+    x = at.ES_INPUT
+    u, a, b = s[x + at.IN_U], s[x + at.IN_MOTOR], s[x + at.IN_LOAD]
+    i1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
+    o += 7
+    w1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
+    o += 7
+    W1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
+    o += 7
+    d1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
+    o += 7
+    turned = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d
+    turned += p[o + 4] * u + p[o + 5] * a + p[o + 6] * b
+    guards = int(s[at.ES_GUARDS])
+    if guards > 0:
+        chord = p[m + at.MODE_CHORD + number] * speed_of_change(p, s)
+        for j in range(guards):
+            g = at.ES_GUARD + j * at.GUARD_SIZE
+            offset = guard_offset(s, g)
+            before = guard_state(s, g) + offset
+            after = (
+                s[g + at.G_I] * i1 + s[g + at.G_W] * w1 + (s[g + at.G_V] * W1 + s[g + at.G_D] * d1) + offset
+            )
+            if not (min(before, after) > s[g + at.G_CURVE] * chord):
+                return False
+    put_state(p, s, i1, w1, W1, d1, turned)
+    return True
+
+
+@scalar
+def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
+    """Write the state; the load's angle is what the motor's angle and the twist leave, or stays at rest."""
+    s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
+    s[layout.S_ANGLE] += turned
+    if s[at.ES_LOAD] != 0.0:
+        s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - d
+    put_output(p, s)
+
+
+@scalar
+def walk(p, s, whole):  # type: ignore[no-untyped-def]
+    """Advance with every event located."""
+    levels, energy = int(p[at.EL_LEVELS]), p[layout.WITH_ENERGY] > 0.0
+    shortest = math.ldexp(p[layout.PERIOD], -levels)
+    left, level, events, steps = whole, 0, 0, 0
+    while left > 0.0:
+        steps += 1
+        if events > int(p[layout.MAX_EVENTS]) or steps > at.MAX_STEPS:
+            return layout.TOO_MANY_EVENTS
+        if not (abs(s[layout.S_SPEED]) < FINITE and abs(s[at.ES_LOAD_SPEED]) < FINITE):
+            return layout.NOT_FINITE
+        if levels > 0 and not energy and left > shortest:
+            while level < levels and math.ldexp(p[layout.PERIOD], -level) > left:
+                level += 1
+            if stride(p, s, 2 + level):
+                left -= math.ldexp(p[layout.PERIOD], -level)
+                level = max(level - 1, 0)
+                continue
+            if level < levels:
+                level += 1
+                continue
+        h = min(left, shortest)
+        fill_series(p, s)
+        t, event = first_event(p, s, h)
+        if energy:
+            add_energies(p, s, t)
+        if t > 0.0:
+            i, w, W, d, turned = series_state(p, s, t)
+            put_state(p, s, i, w, W, d, turned)
+            left -= t
+        if event != at.NO_EVENT:
+            change_mode(p, s, event)
+            put_torques(p, s)
+            events += 1
+            s[at.ES_HAPPENED] += 1.0
+            level = max(level - 1, 0)
+    return layout.OK
+
+
+@scalar
+def ends_rest(event):  # type: ignore[no-untyped-def]
+    """Whether an event is a breakaway of either side."""
+    return event == at.MOTOR_UP or event == at.MOTOR_DOWN or event == at.LOAD_UP or event == at.LOAD_DOWN
+
+
+@scalar
+def first_event(p, s, h):  # type: ignore[no-untyped-def]
+    """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
+    best, event = h, at.NO_EVENT
+    m, n = int(s[at.ES_MODE]), int(p[at.EL_TERMS])
+    i, w, W, d, _turned = series_state(p, s, h)
+    chord = 0.125 * h * h * p[m + at.MODE_GROWTH] * speed_of_change(p, s)
+    if not (chord < LARGEST):
+        return best, event
+    for j in range(int(s[at.ES_GUARDS])):
+        g = at.ES_GUARD + j * at.GUARD_SIZE
+        offset = guard_offset(s, g)
+        before = guard_state(s, g) + offset
+        after = s[g + at.G_I] * i + s[g + at.G_W] * w + (s[g + at.G_V] * W + s[g + at.G_D] * d) + offset
+        if min(before, after) > s[g + at.G_CURVE] * chord:
+            continue
+        tolerance = fill_polynomial(p, s, g, offset, h)
+        number = int(s[g + at.G_EVENT])
+        t = AT_ONCE
+        # a step of the inputs can break a rest at once, even if it would hold again later
+        if not (ends_rest(number) and before < -tolerance):
+            t = first_fall(s, n, best, tolerance)
+        if t == AT_ONCE:
+            t = 0.0
+        if t != NEVER and (t < best or event == at.NO_EVENT):
+            best, event = t, number
+    return best, event

@@ -1,0 +1,357 @@
+"""The mode of the event-driven plant: what holds in it, what ends it, and what comes next.
+
+Every guard is an affine function of the state and the held inputs.  Two guards of one event are one
+expression and its negation, so that rounding cannot let both be false.
+"""
+
+from __future__ import annotations
+
+import math
+
+from nonlinear._kernels import elastic_layout as at
+from nonlinear._kernels import layout
+from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.elastic_series import rounding_of
+
+
+@scalar
+def contact_side(s):  # type: ignore[no-untyped-def]
+    """1 or -1 while the coupling transmits torque on that side, else 0."""
+    code = s[at.ES_CONTACT]
+    return code if abs(code) == 1.0 else 0.0
+
+
+@scalar
+def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
+    """side T_s as if in contact: k (side delta - b) + side c delta'."""
+    rate = s[layout.S_SPEED] / p[layout.RATIO_TO_COUPLING] - s[at.ES_LOAD_SPEED]
+    stretch = side * s[at.ES_TWIST] - p[layout.HALF_PLAY]
+    return p[layout.STIFFNESS] * stretch + side * p[layout.COUPLING_DAMPING] * rate
+
+
+@scalar
+def coupling_torque(p, s):  # type: ignore[no-untyped-def]
+    """T_s in this state, at the coupling's shaft."""
+    side = contact_side(s)
+    return side * spring_expression(p, s, side)
+
+
+@scalar
+def map_place(p, s):  # type: ignore[no-untyped-def]
+    """Place of the segment of the friction map that holds."""
+    side = 0 if s[layout.S_DIRECTION] >= 0.0 else at.MAP_SIDE
+    return at.EL_MAP + side + int(s[at.ES_SEGMENT]) * at.MAP_SEGMENT
+
+
+@scalar
+def mode_number(p, s):  # type: ignore[no-untyped-def]
+    """Number of the mode in the block of parameters."""
+    motor = 0
+    if s[layout.S_DIRECTION] > 0.0:
+        motor = 1 + int(s[at.ES_SEGMENT])
+    if s[layout.S_DIRECTION] < 0.0:
+        motor = 1 + int(p[at.EL_SEGMENTS]) + int(s[at.ES_SEGMENT])
+    side = contact_side(s)
+    contact = 0 if side == 0.0 else (1 if side > 0.0 else 2)
+    load = 1 if s[at.ES_LOAD] != 0.0 else 0
+    return 6 * motor + 2 * contact + load
+
+
+@scalar
+def enter_mode(p, s):  # type: ignore[no-untyped-def]
+    """Write what follows from the discrete state: place of the mode, constant torques, guards."""
+    mode = at.EL_MODES + mode_number(p, s) * int(p[at.EL_MODE_SIZE])
+    s[at.ES_MODE] = float(mode)
+    side, direction, load = contact_side(s), s[layout.S_DIRECTION], s[at.ES_LOAD]
+    preload = side * p[layout.STIFFNESS] * p[layout.HALF_PLAY]
+    share = p[at.EL_REACTION] + direction * side * p[at.EL_LOAD_COEFFICIENT]
+    level = p[map_place(p, s) + at.MAP_LEVEL]
+    s[at.ES_MOTOR_TORQUE] = share * preload - p[layout.OFFSET] - direction * level
+    s[at.ES_MOTOR_DRY] = -direction * p[at.EL_LOAD_COEFFICIENT] if p[layout.RIGID] > 0.0 else 0.0
+    s[at.ES_LOAD_TORQUE] = -preload - load * p[layout.LOAD_DRY] - p[layout.LOAD_OFFSET]
+    s[at.ES_GUARDS] = 0.0
+    if p[layout.RIGID] == 0.0:
+        contact_guards(p, s)
+    if p[at.EL_SMOOTH] == 0.0:
+        motor_guards(p, s)
+    if p[layout.RIGID] == 0.0 and p[at.EL_LOAD_SMOOTH] == 0.0:
+        load_guards(p, s)
+    for j in range(int(s[at.ES_GUARDS])):
+        put_curvature(p, s, mode, at.ES_GUARD + j * at.GUARD_SIZE)
+
+
+@scalar
+def new_guard(s, event):  # type: ignore[no-untyped-def]
+    """Append an empty guard; returns its place."""
+    count = int(s[at.ES_GUARDS])
+    g = at.ES_GUARD + count * at.GUARD_SIZE
+    for j in range(at.GUARD_SIZE):
+        s[g + j] = 0.0
+    s[g + at.G_EVENT] = float(event)
+    s[at.ES_GUARDS] = float(count + 1)
+    return g
+
+
+@scalar
+def twist_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
+    """sign (side delta - b) > 0."""
+    g = new_guard(s, event)
+    s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * p[layout.HALF_PLAY]
+
+
+@scalar
+def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
+    """sign (k (side delta - b) + side c delta') > 0."""
+    g = new_guard(s, event)
+    k, c = p[layout.STIFFNESS], p[layout.COUPLING_DAMPING]
+    s[g + at.G_W], s[g + at.G_V] = sign * side * c / p[layout.RATIO_TO_COUPLING], -sign * side * c
+    s[g + at.G_D], s[g + at.G_ONE] = sign * side * k, -sign * k * p[layout.HALF_PLAY]
+
+
+@scalar
+def contact_guards(p, s):  # type: ignore[no-untyped-def]
+    """Guards of contact, of the gap, and of the time between parting and the gap."""
+    code = s[at.ES_CONTACT]
+    if code == at.GAP:
+        twist_guard(p, s, -1.0, 1.0, at.MEET_PLUS)
+        twist_guard(p, s, -1.0, -1.0, at.MEET_MINUS)
+    elif abs(code) == 2.0:
+        spring_guard(p, s, -1.0, 0.5 * code, at.REJOIN)
+        twist_guard(p, s, 1.0, 0.5 * code, at.INSIDE)
+    elif p[layout.HALF_PLAY] == 0.0:
+        if p[at.EL_LOAD_COEFFICIENT] > 0.0:
+            spring_guard(p, s, 1.0, code, at.FLIP)
+    elif p[layout.COUPLING_DAMPING] == 0.0:
+        twist_guard(p, s, 1.0, code, at.PART)
+    else:
+        spring_guard(p, s, 1.0, code, at.PART)
+
+
+@scalar
+def motor_guards(p, s):  # type: ignore[no-untyped-def]
+    """Slip: the speed stays on its segment.  Rest: the drive torque stays within the breakaway level."""
+    direction = s[layout.S_DIRECTION]
+    if direction == 0.0:
+        motor_rest_guard(p, s, 1.0, at.MOTOR_UP)
+        motor_rest_guard(p, s, -1.0, at.MOTOR_DOWN)
+        return
+    place = map_place(p, s)
+    g = new_guard(s, at.MOTOR_LOWER)
+    s[g + at.G_W], s[g + at.G_ONE] = direction, -p[place + at.MAP_SPEED]
+    side = 0 if direction > 0.0 else 1
+    if int(s[at.ES_SEGMENT]) + 1 < int(p[at.EL_SEGMENTS + side]):
+        g = new_guard(s, at.MOTOR_UPPER)
+        s[g + at.G_W], s[g + at.G_ONE] = -direction, p[place + at.MAP_SEGMENT + at.MAP_SPEED]
+
+
+@scalar
+def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
+    """ratio (T0 + CM' |T_s|) - sign (kM i - offset - T_s/N_c + ...) > 0, with w = 0 in T_s."""
+    g = new_guard(s, event)
+    ratio, CM = p[layout.BREAKAWAY], p[at.EL_LOAD_COEFFICIENT]
+    level = p[at.EL_MAP + (0 if sign > 0.0 else at.MAP_SIDE) + at.MAP_LEVEL]
+    side = contact_side(s)
+    torque = ratio * CM * side + sign * p[at.EL_REACTION]  # factor of T_s
+    s[g + at.G_V] = -torque * abs(side) * p[layout.COUPLING_DAMPING]
+    s[g + at.G_D] = torque * abs(side) * p[layout.STIFFNESS]
+    preload = side * p[layout.STIFFNESS] * p[layout.HALF_PLAY]
+    s[g + at.G_ONE] = ratio * level + sign * p[layout.OFFSET] - torque * preload
+    if p[layout.SOURCE] > 0.0:
+        s[g + at.G_U] = -sign * p[layout.SOURCE_GAIN]
+    else:
+        s[g + at.G_I] = -sign * p[layout.TORQUE_CONSTANT]
+    s[g + at.G_M] = -sign * p[at.EL_BACK]
+    s[g + at.G_ABS_M] = ratio * CM if p[layout.RIGID] > 0.0 else 0.0
+    s[g + at.G_EXTRA] = -sign
+
+
+@scalar
+def load_guards(p, s):  # type: ignore[no-untyped-def]
+    """Slip: W keeps its sign.  Rest: |T_s + M_ext/N_r - offset_l| within its breakaway level."""
+    direction = s[at.ES_LOAD]
+    if direction != 0.0:
+        g = new_guard(s, at.LOAD_LANDS)
+        s[g + at.G_V] = direction
+        return
+    load_rest_guard(p, s, 1.0, at.LOAD_UP)
+    load_rest_guard(p, s, -1.0, at.LOAD_DOWN)
+
+
+@scalar
+def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
+    """ratio_l C0_l - sign (T_s + M_ext/N_r - offset_l) > 0, with W = 0 in T_s."""
+    g = new_guard(s, event)
+    side = contact_side(s)
+    k, c = abs(side) * p[layout.STIFFNESS], abs(side) * p[layout.COUPLING_DAMPING]
+    s[g + at.G_W], s[g + at.G_D] = -sign * c / p[layout.RATIO_TO_COUPLING], -sign * k
+    level = p[layout.LOAD_BREAKAWAY] * p[layout.LOAD_DRY]
+    s[g + at.G_ONE] = level + sign * (p[layout.LOAD_OFFSET] + side * k * p[layout.HALF_PLAY])
+    s[g + at.G_M] = -sign / p[at.EL_RATIO_BEHIND]
+
+
+@scalar
+def put_curvature(p, s, mode, g):  # type: ignore[no-untyped-def]
+    """Bound of |g''| over the norm of x': the norm of G A dual to that of the energy."""
+    gi, gw, gv, gd = s[g + at.G_I], s[g + at.G_W], s[g + at.G_V], s[g + at.G_D]
+    row_i = gi * p[mode + at.A_II] + gw * p[mode + at.A_WI]
+    row_w = gi * p[mode + at.A_IW] + gw * p[mode + at.A_WW] + gv * p[mode + at.A_VW] + gd * p[mode + at.A_DW]
+    row_v = gw * p[mode + at.A_WV] + gv * p[mode + at.A_VV] + gd * p[mode + at.A_DV]
+    row_d = gw * p[mode + at.A_WD] + gv * p[mode + at.A_VD]
+    total = 0.0
+    at_weight = mode + at.MODE_WEIGHT
+    if p[at_weight] > 0.0:
+        total += (row_i / p[at_weight]) * (row_i / p[at_weight])
+    total += (row_w / p[at_weight + 1]) * (row_w / p[at_weight + 1])
+    total += (row_v / p[at_weight + 2]) * (row_v / p[at_weight + 2])
+    if p[at_weight + 3] > 0.0:
+        total += (row_d / p[at_weight + 3]) * (row_d / p[at_weight + 3])
+    s[g + at.G_CURVE] = math.sqrt(total)
+
+
+@scalar
+def guard_offset(s, g):  # type: ignore[no-untyped-def]
+    """The part of a guard that does not depend on the state."""
+    value = s[g + at.G_ONE]
+    value += s[g + at.G_U] * s[at.ES_INPUT + at.IN_U]
+    value += s[g + at.G_M] * s[at.ES_INPUT + at.IN_M]
+    value += s[g + at.G_ABS_M] * s[at.ES_INPUT + at.IN_ABS_M]
+    return value + s[g + at.G_EXTRA] * s[at.ES_INPUT + at.IN_EXTRA]
+
+
+@scalar
+def guard_state(s, g):  # type: ignore[no-untyped-def]
+    """The part of a guard that is linear in (i, w, W, delta)."""
+    value = s[g + at.G_I] * s[layout.S_CURRENT] + s[g + at.G_W] * s[layout.S_SPEED]
+    return value + (s[g + at.G_V] * s[at.ES_LOAD_SPEED] + s[g + at.G_D] * s[at.ES_TWIST])
+
+
+@scalar
+def fails(p, s, event):  # type: ignore[no-untyped-def]
+    """Whether the guard of an event is broken by more than the rounding of a short interval."""
+    h = math.ldexp(p[layout.PERIOD], -int(p[at.EL_LEVELS]))
+    for j in range(int(s[at.ES_GUARDS])):
+        g = at.ES_GUARD + j * at.GUARD_SIZE
+        if s[g + at.G_EVENT] == float(event):
+            offset = guard_offset(s, g)
+            return guard_state(s, g) + offset < -rounding_of(p, s, g, offset, h)
+    return False
+
+
+@scalar
+def elastic_slopes(p, s):  # type: ignore[no-untyped-def]
+    """(i', w', W', delta') in the present mode under the inputs that were held last."""
+    m = int(s[at.ES_MODE])
+    i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
+    x = at.ES_INPUT
+    di = p[m + at.A_II] * i + p[m + at.A_IW] * w + p[m + at.B_I] * s[x + at.IN_U]
+    dw = p[m + at.A_WI] * i + p[m + at.A_WW] * w + p[m + at.A_WV] * W + p[m + at.A_WD] * d
+    dw += p[m + at.B_W] * s[x + at.IN_MOTOR]
+    dW = p[m + at.A_VW] * w + p[m + at.A_VV] * W + p[m + at.A_VD] * d + p[m + at.B_V] * s[x + at.IN_LOAD]
+    return di, dw, dW, p[m + at.A_DW] * w + p[m + at.A_DV] * W
+
+
+@scalar
+def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
+    """The motor slips in a direction at its present speed: find the segment of its map."""
+    s[layout.S_DIRECTION], s[at.ES_SEGMENT] = direction, 0.0
+    side = 0 if direction >= 0.0 else 1
+    for j in range(1, int(p[at.EL_SEGMENTS + side])):
+        speed = p[at.EL_MAP + side * at.MAP_SIDE + j * at.MAP_SEGMENT + at.MAP_SPEED]
+        if direction * s[layout.S_SPEED] > speed:
+            s[at.ES_SEGMENT] = float(j)
+
+
+@scalar
+def elastic_start(p, s):  # type: ignore[no-untyped-def]
+    """Set load side, twist and discrete state at t_0; the motor's own state stands in ``s``."""
+    s[at.ES_TWIST], s[at.ES_LOAD_SPEED] = p[layout.TWIST_START], p[layout.LOAD_SPEED_START]
+    w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
+    start_segment(p, s, 1.0 if p[at.EL_SMOOTH] > 0.0 or w > 0.0 else (-1.0 if w < 0.0 else 0.0))
+    if p[layout.RIGID] == 0.0:
+        s[at.ES_LOAD] = 1.0 if p[at.EL_LOAD_SMOOTH] > 0.0 or W > 0.0 else (-1.0 if W < 0.0 else 0.0)
+        start_contact(p, s)
+    s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - s[at.ES_TWIST]
+    put_output(p, s)
+    enter_mode(p, s)
+
+
+@scalar
+def start_contact(p, s):  # type: ignore[no-untyped-def]
+    """Contact as the state says."""
+    if p[layout.HALF_PLAY] == 0.0:
+        negative = p[at.EL_LOAD_COEFFICIENT] > 0.0 and spring_expression(p, s, 1.0) < 0.0
+        s[at.ES_CONTACT] = -1.0 if negative else 1.0
+    elif s[at.ES_TWIST] > p[layout.HALF_PLAY]:
+        s[at.ES_CONTACT] = 1.0 if spring_expression(p, s, 1.0) > 0.0 else 2.0
+    elif -s[at.ES_TWIST] > p[layout.HALF_PLAY]:
+        s[at.ES_CONTACT] = -1.0 if spring_expression(p, s, -1.0) > 0.0 else -2.0
+
+
+@scalar
+def put_output(p, s):  # type: ignore[no-untyped-def]
+    """Angle and speed of the output shaft; of a rigid drive, those of the motor."""
+    if p[layout.RIGID] > 0.0:
+        s[layout.S_OUTPUT] = s[layout.S_ANGLE] / p[layout.RATIO]
+        s[layout.S_OUTPUT_SPEED] = s[layout.S_SPEED] / p[layout.RATIO]
+        return
+    s[layout.S_OUTPUT] = s[at.ES_LOAD_ANGLE] / p[at.EL_RATIO_BEHIND]
+    s[layout.S_OUTPUT_SPEED] = s[at.ES_LOAD_SPEED] / p[at.EL_RATIO_BEHIND]
+
+
+@scalar
+def change_contact(p, s, event):  # type: ignore[no-untyped-def]
+    """The coupling meets, parts, or its torque changes sign."""
+    code = s[at.ES_CONTACT]
+    if event == at.FLIP:
+        s[at.ES_CONTACT] = -code
+    elif event == at.PART:
+        s[at.ES_CONTACT] = at.GAP if p[layout.COUPLING_DAMPING] == 0.0 else 2.0 * code
+    elif event == at.REJOIN:
+        s[at.ES_CONTACT] = 0.5 * code
+    elif event == at.INSIDE:
+        s[at.ES_CONTACT] = at.GAP
+    else:
+        side = 1.0 if event == at.MEET_PLUS else -1.0
+        waits = p[layout.COUPLING_DAMPING] > 0.0 and spring_expression(p, s, side) <= 0.0
+        s[at.ES_CONTACT] = 2.0 * side if waits else side
+
+
+@scalar
+def land_motor(p, s):  # type: ignore[no-untyped-def]
+    """The motor's speed has come to zero: rest if the drive torque is within its level, else reversal."""
+    direction = s[layout.S_DIRECTION]
+    s[layout.S_SPEED], s[layout.S_DIRECTION], s[at.ES_SEGMENT] = 0.0, 0.0, 0.0
+    enter_mode(p, s)
+    if fails(p, s, at.MOTOR_DOWN if direction > 0.0 else at.MOTOR_UP):
+        s[layout.S_DIRECTION] = -direction
+
+
+@scalar
+def land_load(p, s):  # type: ignore[no-untyped-def]
+    """The load's speed has come to zero: the same with its own level."""
+    direction = s[at.ES_LOAD]
+    s[at.ES_LOAD_SPEED], s[at.ES_LOAD] = 0.0, 0.0
+    enter_mode(p, s)
+    if fails(p, s, at.LOAD_DOWN if direction > 0.0 else at.LOAD_UP):
+        s[at.ES_LOAD] = -direction
+
+
+@scalar
+def change_mode(p, s, event):  # type: ignore[no-untyped-def]
+    """What an event does to the discrete state; only the speed that stops is set, to exactly 0."""
+    if event <= at.INSIDE:
+        change_contact(p, s, event)
+    elif event == at.MOTOR_UP or event == at.MOTOR_DOWN:
+        s[layout.S_DIRECTION] = 1.0 if event == at.MOTOR_UP else -1.0
+    elif event == at.MOTOR_UPPER:
+        s[at.ES_SEGMENT] += 1.0
+    elif event == at.MOTOR_LOWER:
+        if s[at.ES_SEGMENT] > 0.0:
+            s[at.ES_SEGMENT] -= 1.0
+        else:
+            land_motor(p, s)
+    elif event == at.LOAD_LANDS:
+        land_load(p, s)
+    else:
+        s[at.ES_LOAD] = 1.0 if event == at.LOAD_UP else -1.0
+    enter_mode(p, s)

@@ -1,0 +1,159 @@
+"""The event-driven plant against closed forms and published reference numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nonlinear import commands, simulate
+from nonlinear._kernels import layout
+from tests.nonlinear.elastic_drive import drive_f, run_plant, stribeck, two_mass
+
+K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
+REDUCED = 1.0 / (1.0 / J_L + 1.0 / (J_M * N * N))  # inertia of the relative motion
+RESONANCE = np.sqrt(K / REDUCED)
+IDEAL = {"damping_Nms_rad": 0.0}
+
+
+def test_reference_number_k5() -> None:
+    run = simulate(drive_f(), commands.step(0.1), 0.1, energy=True)
+    assert run.coupling_torque_Nm is not None
+    assert run.output_speed_rad_s is not None
+    assert run.motor_angle_rad[499] == pytest.approx(0.882029497378, abs=1e-12)
+    assert run.motor_speed_rad_s[499] == pytest.approx(1.6424769357, abs=1e-10)
+    assert run.current_A[499] == pytest.approx(-0.00270770144038, abs=1e-14)
+    assert run.output_angle_rad[499] == pytest.approx(0.0969298356075, abs=1e-13)
+    assert run.output_speed_rad_s[499] == pytest.approx(0.180917733342, abs=1e-12)
+    assert run.coupling_torque_Nm[499] == 0.0
+    assert run.coupling_torque_Nm.min() == pytest.approx(-0.445253372927, abs=1e-12)
+    assert run.coupling_torque_Nm.max() == pytest.approx(0.638947611306, abs=1e-12)
+    assert run.energy is not None
+    assert run.energy.relative_error < 1e-9
+
+
+def test_free_vibration_of_two_masses() -> None:
+    design, ticks = two_mass(1e-3, source=True, coupling=IDEAL | {"play_rad": 0.0}), np.arange(201)
+    run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, 0.5, 0.0))
+    twist = run.states[:, 3] / N - run.states[:, 4]
+    np.testing.assert_allclose(twist, 0.05 * np.cos(RESONANCE * ticks * 1e-3), atol=1e-13)
+    common = J_M * N * run.states[:, 3] + J_L * run.states[:, 4]
+    np.testing.assert_allclose(common, common[0], rtol=1e-13)
+
+
+def bounce(t: np.ndarray, v: float) -> np.ndarray:
+    """Twist of two free masses that rebound from both sides of the play, from the middle with rate v."""
+    flight, contact = 2 * B / v, np.pi / RESONANCE
+    phase, sign = np.mod(t + flight / 2, flight + contact), np.floor((t + flight / 2) / (flight + contact))
+    free = -B + v * phase
+    pressed = B + v / RESONANCE * np.sin(RESONANCE * (phase - flight))
+    return np.where(sign % 2 == 0, 1.0, -1.0) * np.where(phase < flight, free, pressed)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-15, -1e-15, 1e-9, -1e-9])
+def test_impact_at_the_edge_of_a_tick(offset: float) -> None:
+    v = 4.0
+    Ts = B / v / 5 * (1 + offset)  # contact begins at the end of the fifth tick
+    design = two_mass(Ts, source=True, coupling=IDEAL)
+    run = run_plant(design, np.zeros(60), start=(0.0, v * N, 0.0, 0.0, 0.0))
+    twist = run.states[:, 3] / N - run.states[:, 4]
+    np.testing.assert_allclose(twist, bounce(np.arange(61) * Ts, v), atol=1e-13)
+    mass, momentum = J_L + J_M * N * N, J_M * N * N * v
+    centre = (J_M * N * run.states[:, 3] + J_L * run.states[:, 4]) / mass
+    np.testing.assert_allclose(centre, momentum / mass * np.arange(61) * Ts, atol=1e-13)
+
+
+def test_play_crossed_many_times_in_a_tick() -> None:
+    v = 20.0
+    Ts = 5.3 * (2 * B / v + np.pi / RESONANCE)
+    run = run_plant(
+        two_mass(Ts, source=True, coupling=IDEAL), np.zeros(20), start=(0.0, v * N, 0.0, 0.0, 0.0)
+    )
+    assert max(run.events) >= 10
+    twist = run.states[:, 3] / N - run.states[:, 4]
+    np.testing.assert_allclose(twist, bounce(np.arange(21) * Ts, v), atol=1e-12)
+
+
+def test_damped_contact_parts_at_no_torque() -> None:
+    """One rebound: T_s = 0 ends contact while the spring is still pressed, and its energy is lost."""
+    c, v, Ts = 0.2, 3.0, 1e-4
+    design = two_mass(Ts, source=True, coupling={"damping_Nms_rad": c})
+    start = (0.0, v * N, 0.0, B * N, 0.0)  # at the edge of the play
+    run = run_plant(design, np.zeros(90), start=start, WITH_ENERGY=1.0)
+    a = 0.5 * c / REDUCED
+    wd = np.sqrt(K / REDUCED - a * a)
+    # x = v exp(-a t) sin(wd t)/wd; K x + c x' = 0 at tan(wd t) = -c wd/(K - c a)
+    t = (np.pi - np.arctan2(c * wd, K - c * a)) / wd
+    x = v * np.exp(-a * t) * np.sin(wd * t) / wd
+    rate = -K * x / c
+    parting = 0.5 * K * x * x
+    energy = dict(zip(("damping", "parting"), run.ledgers[90, layout.ENERGY_DAMPING :], strict=False))
+    assert energy["parting"] == pytest.approx(parting, rel=1e-10)
+    assert energy["damping"] == pytest.approx(0.5 * REDUCED * (v * v - rate * rate) - parting, rel=1e-10)
+    assert run.states[90, 1] / N - run.states[90, 2] == pytest.approx(rate, rel=1e-11)
+
+
+def test_motor_swings_on_its_spring_while_the_load_sticks() -> None:
+    design = two_mass(
+        1e-3, source=True, coupling=IDEAL | {"play_rad": 0.0}, load_friction={"dry_torque_Nm": 50.0}
+    )
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
+    w0 = np.sqrt(K / (J_M * N * N))
+    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
+    assert not run.states[:, 4].any()
+
+
+def test_load_swings_behind_a_self_locking_stage() -> None:
+    parts = {"path": "self-locking", "friction": {"load_coefficient": 0.2}}
+    design = two_mass(1e-3, coupling=IDEAL | {"play_rad": 0.0}, **parts)
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
+    np.testing.assert_allclose(
+        run.states[:, 4], 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3), atol=1e-13
+    )
+    assert np.abs(run.states[:, 3]).max() < 1e-18
+
+
+def rms_difference(first: np.ndarray, second: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((first - second) ** 2)))
+
+
+def test_stiff_coupling_tends_to_the_rigid_drive() -> None:
+    """The difference falls with 1/k, to where rounding of a vibration of 1e6 rad/s is."""
+    rigid = simulate(replace(drive_f(), coupling=None), commands.step(0.1), 0.05)
+    differences = []
+    for k in (1e4, 1e5, 1e6):
+        coupling = replace(drive_f().coupling, stiffness_Nm_rad=k, damping_Nms_rad=1e-4 * k, play_rad=0.0)
+        run = simulate(replace(drive_f(), coupling=coupling), commands.step(0.1), 0.05)
+        differences.append(rms_difference(run.motor_angle_rad, rigid.motor_angle_rad))
+    assert differences[0] < 1e-3
+    assert differences[1] == pytest.approx(differences[0] / 10, rel=0.1)
+    assert differences[2] == pytest.approx(differences[1] / 10, rel=0.1)
+
+
+def test_no_play_is_the_limit_of_little_play() -> None:
+    """Without damping; the difference falls with b."""
+    coupling = replace(drive_f().coupling, damping_Nms_rad=0.0, play_rad=0.0)
+    without = simulate(replace(drive_f(), coupling=coupling), commands.step(0.1), 0.05)
+    differences = []
+    for play in (1e-6, 1e-8):
+        design = replace(drive_f(), coupling=replace(coupling, play_rad=play))
+        run = simulate(design, commands.step(0.1), 0.05)
+        differences.append(rms_difference(run.motor_angle_rad, without.motor_angle_rad))
+    assert differences[0] < 1e-4
+    assert differences[1] < 0.02 * differences[0]
+
+
+def test_map_of_one_line_is_c0_and_cv() -> None:
+    points = stribeck((0.0, 0.02), (50.0, 0.02 + 50 * 1e-4))
+    plain = {"dry_torque_Nm": 0.02, "viscous_Nms_rad": 1e-4, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
+    mapped = {"points": points, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
+    voltages = 4.0 * np.sign(np.sin(0.2 * np.arange(80) + 0.1))
+    rigid = two_mass(1e-3, coupling=None, friction=mapped)
+    with_map = run_plant(rigid, voltages, 0.5)
+    without = run_plant(replace(rigid, friction=replace(rigid.friction, points=(), **plain)), voltages, 0.5)
+    scale = np.abs(without.states).max()
+    np.testing.assert_allclose(
+        with_map.states[:, [0, 1, 3]], without.states[:, [0, 1, 3]], atol=1e-11 * scale
+    )
+    assert sum(with_map.events) == sum(without.events) >= 5
