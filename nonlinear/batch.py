@@ -199,7 +199,7 @@ def _run_span(
     rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray, shared: Floats
 ) -> None:
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    from nonlinear._kernels.call import call
+    from nonlinear.native import call
 
     history, flags = np.empty((0, 0)), np.empty(0, np.uint8)
     for r in range(start, stop):

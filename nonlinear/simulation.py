@@ -169,7 +169,7 @@ def _call(
     row: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None
 ) -> int:
     """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
-    from nonlinear._kernels.call import call
+    from nonlinear.native import call
 
     shared = np.zeros(2)
     look = watch()

@@ -259,13 +259,13 @@ class Trajectory:
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write a CSV file (comma, point, 17 digits); the header carries the units."""
-        from nonlinear.export import write_csv
+        from nonlinear.trajectory_files import write_csv
 
         write_csv(self, path)
 
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write a Parquet file, the design's name and the parameters' hash in its metadata."""
-        from nonlinear.export import write_parquet
+        from nonlinear.trajectory_files import write_parquet
 
         write_parquet(self, path)
 

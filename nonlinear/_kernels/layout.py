@@ -11,6 +11,8 @@ units are SI, motor side.
 
 from __future__ import annotations
 
+from typing import Any
+
 # --- parameters of one run -------------------------------------------------------------------------
 (
     TICKS,  # number of ticks n; rows k = 0 .. n-1 are sampled at t_k = k Ts
@@ -427,3 +429,10 @@ OUT_SIZE = OUT_STEP_BEFORE + 1
 
 # --- status ----------------------------------------------------------------------------------------
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)
+
+
+def length_of(row: Any) -> int:
+    """Length of the row of parameters of a run with what is derived from it."""
+    if row[LAW] <= 0.0:
+        return P_SIZE
+    return P_SIZE + TANH_SIZE + (TANH_FORMS_SIZE if row[WITH_ENERGY] > 0.0 else 0)

@@ -13,6 +13,7 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Linear loops": ("margins", "stiffness", "report", "pdf"),
     "Nonlinear checks": ("simulate", "validate"),
     "Bench records": ("identify", "correlate"),
+    "Out of Python": ("export",),
     "Variants and history": ("compare", "montecarlo", "tune", "nightly"),
 }
 
