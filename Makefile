@@ -12,7 +12,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links
 
-.PHONY: report test machines check bench clean install browser fuzz lock limits docs release
+.PHONY: wasm report test machines check bench clean install browser fuzz lock limits docs release
 
 install: $(STAMP)
 
@@ -20,6 +20,7 @@ $(STAMP): pyproject.toml requirements.lock
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --require-hashes --requirement requirements.lock
 	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m nonlinear.native
 	touch $(STAMP)
 
 report: $(STAMP)
@@ -74,6 +75,10 @@ release: $(RELEASE)
 	$(BIN)/cyclonedx-py requirements --output-reproducible --pyproject pyproject.toml \
 	  --output-file dist/actuator-lti.cdx.json dist/runtime.lock
 	$(BIN)/python -m build --no-isolation --outdir dist
+
+wasm: $(STAMP)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[export]'
+	$(BIN)/python -m nonlinear.export.wasm_module
 
 clean:
 	rm -rf $(OUT) .pytest_cache .mypy_cache .ruff_cache .hypothesis

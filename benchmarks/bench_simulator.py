@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from actuator_lti import load_design
-from actuator_lti.design.model import Coupling, LoadFriction
+from actuator_lti.design.model import Coupling, Design, Filter, LoadFriction
 from benchmarks.c_simulator import CSimulator
 from benchmarks.control_cascade import seconds_per_second
 from benchmarks.row import Row
@@ -50,6 +50,7 @@ def rows(quick: bool = False) -> Iterator[Row]:
         comparison=">=",
         note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
     )
+    yield from wider_drives(1 if quick else 5)
     yield two_mass_with_play(best, quick)
     yield two_threads(quick)
     yield from constant_cost(quick)
@@ -61,9 +62,9 @@ def sawtooth_row() -> np.ndarray:
     return sawtooth().values[0]
 
 
-def sawtooth() -> Rows:
-    """The same as one row of a batch."""
-    rows = Rows.of(load_design("ilr33-amber"))
+def sawtooth(design: Design | None = None) -> Rows:
+    """The same as one row of a batch, of the baseline or another drive."""
+    rows = Rows.of(design or load_design("ilr33-amber"))
     rows["ticks"] = round(DURATION_S / rows.value("period"))
     rows["load"] = 4.0
     rows.sine("command", np.radians(5.0), 1.0)
@@ -108,7 +109,7 @@ def against_c(row: np.ndarray, repeats: int) -> Row:
         name="time over that of C (-O3 -march=native), 10 s run",
         measured=float(here / there),
         unit="x",
-        target=1.3,
+        target=1.2,
         note=f"C: {1e9 * there / row[at.TICKS]:.1f} ns a tick",
     )
 
@@ -125,6 +126,31 @@ def against_control(best: float) -> Row:
         comparison=">=",
         note=f"control: {slow:.0f} s for a simulated second, from its first 20 ms",
     )
+
+
+def wider_drives(repeats: int) -> Iterator[Row]:
+    """Filters, energies and the tanh law, over the same run without them, in turns."""
+    base = load_design("ilr33-amber")
+    filters = (
+        Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=2000.0, depth=0.1),
+        Filter(kind="notch", frequency_rad_s=9000.0, width_rad_s=4000.0, depth=0.1),
+        Filter(kind="lowpass", frequency_rad_s=12_000.0),
+    )
+    velocity = replace(base.controller.velocity, filters=filters)
+    filtered = replace(base, controller=replace(base.controller, velocity=velocity))
+    smooth = replace(base, friction=replace(base.friction, law="tanh"))
+    cases = (
+        ("two notches and a low-pass", base, filtered, 0.0, 1.5),
+        ("energies, dry friction", base, base, 1.0, 2.0),
+        ("energies, tanh law", smooth, smooth, 1.0, 2.0),
+    )
+    for name, without, design, energy, target in cases:
+        plain, rows = sawtooth(without).values[0], sawtooth(design)
+        rows["with_energy"] = energy
+        pairs = [[numba_seconds(row, repeats) for row in (rows.values[0], plain)] for _ in range(4)]
+        measured, reference = np.array(pairs).min(axis=0)
+        name = f"time with {name}, over that without"
+        yield Row(group=GROUP, name=name, measured=float(measured / reference), unit="x", target=target)
 
 
 def two_mass_with_play(best: float, quick: bool) -> Row:

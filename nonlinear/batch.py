@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -29,9 +29,11 @@ from nonlinear.probe import Probe
 from nonlinear.reduced import BatchResult
 from nonlinear.setup import Tables, check_frequency, put_load, put_probes, put_signal, put_state, ticks_of
 from nonlinear.trajectory import State
+from nonlinear.watch import watch
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+LOOK_S = 0.1  # between two looks of who watches
 CHUNK_TICKS = 2_000_000  # ticks one thread does between two looks at the queue
 
 
@@ -175,11 +177,16 @@ def run_rows(
         waiting = [pool.submit(_run_span, rows, series, a, b, outs, statuses, shared) for a, b in spans]
         sizes = {future: b - a for future, (a, b) in zip(waiting, spans, strict=True)}
         try:
-            for future in as_completed(waiting):
-                future.result()
-                done += sizes[future]
-                if progress is not None:
-                    progress(done, n)
+            pending, look = set(waiting), watch()
+            while pending:
+                ended, pending = wait(pending, None if look is None else LOOK_S, FIRST_COMPLETED)
+                if look is not None:
+                    look()
+                for future in ended:
+                    future.result()
+                    done += sizes[future]
+                    if progress is not None:
+                        progress(done, n)
         except BaseException:
             shared[1] = 1.0  # stops the runs that are under way
             for future in waiting:
@@ -192,7 +199,7 @@ def _run_span(
     rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray, shared: Floats
 ) -> None:
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    from nonlinear._kernels.call import call
+    from nonlinear.native import call
 
     history, flags = np.empty((0, 0)), np.empty(0, np.uint8)
     for r in range(start, stop):

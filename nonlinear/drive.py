@@ -100,8 +100,8 @@ class Drive:
     ) -> float:
         """One tick of the controller alone on measured values (motor side); returns the voltage.
 
-        ``output_angle_rad`` and ``output_speed_rad_s`` are needed where the output's sensor is used, ``bus_V``
-        where the supply is modelled.
+        ``output_angle_rad`` and ``output_speed_rad_s`` are needed where the output's sensor is used,
+        ``bus_V`` where the supply is modelled.
         """
         if output_angle_rad is None:
             output_angle_rad = angle_rad / self.design.total_ratio

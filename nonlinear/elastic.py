@@ -1,4 +1,4 @@
-"""Parameters of the event-driven plant: a coupling, load-side friction, a friction map (model.md section 6)."""
+"""Parameters of the event-driven plant (model.md section 6): coupling, load-side friction, friction map."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def is_elastic(design: Design) -> bool:
 def put_drive_train(design: Design, row: Floats, *, friction_on: bool = True) -> None:
     """Write coupling, load side and friction map into a row that holds motor and friction already.
 
-    ``friction_on = False`` leaves out the dry friction and the offset of the load, and the whole friction map;
-    the viscous friction stays, so that the plant in contact is linear.
+    ``friction_on = False`` leaves out dry friction and offset of the load, and the whole friction map; the
+    viscous friction stays, so that the plant in contact is linear.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import inf, pi
 from typing import Any
 
 import numpy as np
@@ -76,7 +76,7 @@ def command_section(command: Command, period_s: Any, where: str = "") -> Section
 
 def _given(item: Filter, name: str, where: str) -> Any:
     value = getattr(item, f"{name}_rad_s")
-    if value is None or not (np.isfinite(value) & (np.asarray(value) > 0.0)).all():
+    if value is None or not np.all((np.asarray(value) > 0.0) & (np.asarray(value) < inf)):
         message = f"control.velocity.filter: {name} = {value}: a {item.kind} needs one above zero"
         raise InputError(message, where=where)
     return value

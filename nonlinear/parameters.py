@@ -37,12 +37,16 @@ def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     return whole[()], np.where(np.abs(rest) < 1e-9 * period_s, 0.0, rest)[()]
 
 
-def design_row(design: Design, *, friction_on: bool = True, limits_on: bool = True) -> Floats:
+def design_row(
+    design: Design, *, friction_on: bool = True, limits_on: bool = True, kind: type = float
+) -> Floats:
     """The one row of a design, see `design_rows`."""
-    return design_rows(design, 1, friction_on=friction_on, limits_on=limits_on)[0]
+    return design_rows(design, 1, friction_on=friction_on, limits_on=limits_on, kind=kind)[0]
 
 
-def design_rows(design: Design, count: int, *, friction_on: bool = True, limits_on: bool = True) -> Floats:
+def design_rows(
+    design: Design, count: int, *, friction_on: bool = True, limits_on: bool = True, kind: type = float
+) -> Floats:
     """Parameters of the plant, the controllers and the limits of a design, at rest, without command or load.
 
     Parameters
@@ -55,6 +59,8 @@ def design_rows(design: Design, count: int, *, friction_on: bool = True, limits_
         the drive without limits is a linear loop.
     limits_on : bool
         ``False`` takes speed, acceleration, peak current and voltage as unlimited.
+    kind : type
+        ``object`` keeps values that are no floats as they are; `nonlinear.export` follows a design's keys so.
 
     Returns
     -------
@@ -66,7 +72,7 @@ def design_rows(design: Design, count: int, *, friction_on: bool = True, limits_
     InputError
         If the stages of the design do not fit together.
     """
-    rows = np.zeros((count, at.SIZE))
+    rows: Floats = np.zeros((count, at.SIZE), dtype=kind)
     row = rows.T  # a place of it is a column
     _plant(design, row)
     _friction(design, row, friction_on)

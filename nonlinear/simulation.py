@@ -30,6 +30,7 @@ from nonlinear.setup import (
     ticks_of,
 )
 from nonlinear.trajectory import STATUS, State, Trajectory
+from nonlinear.watch import watch
 from nonlinear.wrap import wrap
 
 Floats = npt.NDArray[np.float64]
@@ -82,7 +83,7 @@ def simulate(
     friction_on, limits_on : bool
         ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
     energy : bool
-        Integrate the energies (some ten times slower).
+        Integrate the energies (at most some twice as slow).
     record_every : int
         Keep every so many rows.
     tanh_tolerance : float
@@ -168,10 +169,11 @@ def _call(
     row: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None
 ) -> int:
     """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
-    from nonlinear._kernels.call import call
+    from nonlinear.native import call
 
     shared = np.zeros(2)
-    if progress is None:
+    look = watch()
+    if progress is None and look is None:
         return call(row, tables, history, flags, out, shared)
     result: list[int] = []
     thread = Thread(target=lambda: result.append(call(row, tables, history, flags, out, shared)))
@@ -180,11 +182,14 @@ def _call(
     try:
         while thread.is_alive():
             thread.join(0.1)
-            if thread.is_alive():
+            if look is not None:
+                look()
+            if progress is not None and thread.is_alive():
                 progress(int(shared[0]), total)
     except BaseException:
         shared[1] = 1.0
         thread.join()
         raise
-    progress(int(shared[0]), total)  # a run may end before it was looked at once
+    if progress is not None:
+        progress(int(shared[0]), total)  # a run may end before it was looked at once
     return result[0]

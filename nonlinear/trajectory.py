@@ -72,8 +72,9 @@ class Energy:
     """Where the electrical energy of a run went, all in J.
 
     ``input = copper + magnetic + kinetic + friction (dry, viscous, offset) + output work + conversion``;
-    An elastic drive adds ``spring + coupling damping + parting + load friction (dry, viscous, offset)``: parting
-    is the spring energy left when contact ends; a self-locking stage's own loss counts as dry friction.
+    An elastic drive adds ``spring + coupling damping + parting + load friction (dry, viscous, offset)``:
+    parting is the spring energy left when contact ends; a self-locking stage's own loss counts as dry
+    friction.
     ``conversion`` is ``(kE - kM) i w`` integrated, zero for a motor whose constants agree.
 
     The last four are the supply's own account, where one is modelled, of the bus power ``u i`` sampled at the
@@ -223,7 +224,7 @@ class Trajectory:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
-        names = (
+        names: tuple[str, ...] = (
             "time_s",
             "reference_rad",
             "output_angle_rad",
@@ -258,13 +259,13 @@ class Trajectory:
 
     def to_csv(self, path: str | PathLike[str]) -> None:
         """Write a CSV file (comma, point, 17 digits); the header carries the units."""
-        from nonlinear.export import write_csv
+        from nonlinear.trajectory_files import write_csv
 
         write_csv(self, path)
 
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write a Parquet file, the design's name and the parameters' hash in its metadata."""
-        from nonlinear.export import write_parquet
+        from nonlinear.trajectory_files import write_parquet
 
         write_parquet(self, path)
 

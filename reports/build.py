@@ -135,6 +135,7 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         margins,
         operating_points,
         requirements,
+        stiffness,
     )
     from reports.sections.names import load_unit
 
@@ -151,6 +152,8 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)
     if survey.budgets:
         makers["Delays"] = lambda: delays.section(survey.budgets)
+    if design.coupling is not None or design.load.path == "back-drivable":
+        makers["Stiffness"] = lambda: stiffness.of_design(design)
     if onset is not None:
         makers["Limits"] = lambda: limits.section(design, onset)
     made = [attempt(f"section {name}", make, None) for name, make in makers.items()]

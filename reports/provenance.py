@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
+from nonlinear.native import kernel_name
 
 LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "pint", "jinja2")
 
@@ -42,6 +43,7 @@ def provenance(design_hash: str | None = None) -> dict[str, Any]:
         "time": build_time(),
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
+        "kernel": kernel_name(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
 

@@ -51,6 +51,8 @@ class Builder:
         if self.travel_m_rad is None or power == 0 or not isinstance(text, str):
             return parse_quantity(text, unit)
         rotary = field.unit(replace(self.structure, axis="rotary"))
+        if rotary == unit:  # the gain of a position loop before a velocity loop, 1/s on either axis
+            return parse_quantity(text, unit)
         try:
             return parse_quantity(text, rotary) * self.travel_m_rad**power
         except InputError:

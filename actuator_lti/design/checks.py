@@ -26,7 +26,7 @@ def check_design(design: Design, where: str) -> None:
     InputError
         One line: key, value and what is allowed.
     """
-    for check in (
+    checks = (
         _motor,
         _cascade,
         _sampling,
@@ -35,7 +35,8 @@ def check_design(design: Design, where: str) -> None:
         _limits,
         _requirements,
         _correlations,
-    ):
+    )
+    for check in checks:
         check(design, where)
 
 

@@ -54,8 +54,8 @@ def _self_locking(design: Design, where: str) -> None:
     least = 1.0 / design.ratio_to_coupling
     if design.friction.load_coefficient < least * (1 - 1e-12):
         raise InputError(
-            f"friction.load_coefficient = {design.friction.load_coefficient:g}: a self-locking stage with less "
-            f"than 1/N_c gives energy; allowed: at least {least:g}",
+            f"friction.load_coefficient = {design.friction.load_coefficient:g}: a self-locking stage "
+            f"with less than 1/N_c gives energy; allowed: at least {least:g}",
             where=where,
         )
 
@@ -64,9 +64,10 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     """A rigid self-locking drive whose load friction is too small to lock it."""
     least = 1.0 / design.total_ratio
     loaded = design.load.moment_max_Nm > 0.0
-    if design.coupling is None and design.load.path == "self-locking" and loaded:
-        if design.friction.load_coefficient < least * (1 - 1e-12):
-            yield (
-                f"friction.load_coefficient: {design.friction.load_coefficient:g} is less than 1/N = {least:g}: "
-                "a self-locking drive whose friction cannot hold its load"
-            )
+    rigid = design.coupling is None and design.load.path == "self-locking"
+    coefficient = design.friction.load_coefficient
+    if rigid and loaded and coefficient < least * (1 - 1e-12):
+        yield (
+            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
+            "self-locking drive cannot hold its load"
+        )

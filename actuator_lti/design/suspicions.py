@@ -21,7 +21,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     ()
     """
     found: list[str] = []
-    for check in (
+    checks = (
         _sampling,
         _crossovers,
         _limits,
@@ -31,7 +31,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
         _encoder,
         _ac_motor,
         elastic_warnings,
-    ):
+    )
+    for check in checks:
         found.extend(check(design))
     return tuple(found)
 

@@ -61,7 +61,7 @@ class Limiter:
     kind : {"value", "rate", "rms"}
         A clamp of the signal, of its change per update, or of its mean square in the long run.
     bit : int
-        Of the limit flags that a run writes.
+        Of the limit flags that a run writes (bit 4 says that the rotor is at rest).
     """
 
     name: str
@@ -80,8 +80,8 @@ _LIMITERS = (
     Limiter("acceleration", "acceleration limit", "acceleration_rad_s2", "rate", 1),
     Limiter("current", "current limit", "peak_current_A", "value", 2),
     Limiter("voltage", "voltage limit", "voltage_V", "value", 3),
-    Limiter("torque-command", "limit in front of the torque filters", "", "value", 4),
-    Limiter("overload", "overload protection", "continuous_current_A", "rms", 5),
+    Limiter("torque-command", "limit in front of the torque filters", "", "value", 5),
+    Limiter("overload", "overload protection", "continuous_current_A", "rms", 6),
 )
 LIMITERS = {limiter.name: limiter for limiter in _LIMITERS}
 """Every limiter, in the order of its flag bit."""

@@ -70,6 +70,8 @@ class BorderCheck:
         """Within `TOLERANCE` with the same limiter at every frequency; ``None`` where not judged."""
         if self.reason:
             return None
+        if (np.isfinite(self.predicted_rad) & ~np.isfinite(self.simulated_rad)).any():
+            return False  # predicted, but not found even in the wide range
         error = self.largest_error
         return error is None or (error <= TOLERANCE and all(self.same_limiter))
 
@@ -116,6 +118,10 @@ def check_border(
             return limiter_fractions(result)
 
         found, first = _bisect(acting, foreseen, tries, rounds)
+        if tries != WIDE and np.isnan(found).any():  # it is not about where it was foreseen: look for it
+            further, names_further = _bisect(acting, foreseen, WIDE, rounds)
+            first = [b if np.isnan(x) else a for a, b, x in zip(first, names_further, found, strict=True)]
+            found = np.where(np.isnan(found), further, found)
         simulated[limited] = found
         for place, name in zip(limited, first, strict=True):
             names[place] = name

@@ -16,7 +16,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from analyses.validation.coherent import coherent
+from analyses.validation.budget import OutOfTime
+from analyses.validation.coherent import Coherent, coherent
 from analyses.validation.rig import Rig
 from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
@@ -25,6 +26,7 @@ Floats = npt.NDArray[np.float64]
 Kind = Literal["gain up", "gain down", "delay"]
 Progress = Callable[[int, int], None]
 
+GROUP_TICKS = 2_000_000  # in one batch: time is looked at in between
 VALUES = 12  # of each search in one round
 ROUNDS = 6
 CLOSE = 3e-3  # relative width at which the bracket is interpolated
@@ -45,7 +47,8 @@ class Search:
     Attributes
     ----------
     setup : Rig
-        The loop; it rides, and limits may be on (a limit that acts after the faint kick counts as growth).
+        The loop; it rides. For the border of the linear loop limits are off: at many times the gain a signal
+        that dies out may still reach a limit on its way (where they are on, that counts as growth).
     kind : {"gain up", "gain down", "delay"}
         What is varied at the rig's point: the loop gain as a factor from 1 up or down, or a delay in samples
         of the point from 0 up.
@@ -75,13 +78,21 @@ class Search:
 
     def rows(self, values: Floats) -> Rows:
         """One run a value."""
-        window = coherent(
-            self.frequency_hz, self.setup.design.controller.period_s, self.setup.base_ticks, self.cycles
-        )
+        window = self._window()
         rows = Rows.join([self.row(float(value)) for value in values])
         rows["ticks"] = self.settle_ticks + 2 * window.ticks[0]
         rows.window(window.ticks[0], window.cycles[0])
         return rows
+
+    def _window(self) -> Coherent:
+        """One window of whole periods."""
+        tick_s = self.setup.design.controller.period_s
+        return coherent(self.frequency_hz, tick_s, self.setup.base_ticks, self.cycles)
+
+    @property
+    def ticks(self) -> int:
+        """Length of one run."""
+        return self.settle_ticks + 2 * int(self._window().ticks[0])
 
     def row(self, value: float) -> Rows:
         """The rig at one value, with a faint impulse at the point in its first sample."""
@@ -94,7 +105,7 @@ class Search:
     def kick(self) -> float:
         """Size of the impulse, in the unit of the point."""
         signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
-        room = self.setup.room[signal[self.setup.point]]
+        room = replace(self.setup, limits_on=True).room[signal[self.setup.point]]
         if room == inf:
             room = max(abs(self.setup.ride.speed_rad_s), 1.0)
         return FAINT * room
@@ -147,12 +158,15 @@ class Border:
     frequency_hz : float or None
         Of the oscillation at the border.
     runs : int
+    cut : bool
+        Whether the search was stopped for lack of time: no border is then no finding.
     """
 
     value: float | None
     bracket: tuple[float, float]
     frequency_hz: float | None
     runs: int
+    cut: bool = False
 
 
 @dataclass
@@ -200,9 +214,11 @@ class _Hunt:
         narrow = abs(log(self.high / self.low)) < self.search.close
         return not self.found or (narrow and (not self.search.smooth or all(np.isfinite(self.growths))))
 
-    def border(self) -> Border:
+    def border(self, *, stopped: bool = False) -> Border:
         """Interpolate the growth between the ends."""
         bracket = (self.low, self.high)
+        if stopped and not self.done:
+            return Border(None, bracket, None, self.runs, cut=True)
         if not self.found:
             return Border(None, bracket, None, self.runs)
         a, b = self.growths
@@ -236,11 +252,35 @@ def find_borders(
         waiting = [hunt for hunt in hunts if not hunt.done]
         if not waiting:
             break
-        parts = [hunt.search.rows(hunt.values) for hunt in waiting]
-        result = Rows.join(parts).run(threads=threads)
-        ends = np.cumsum([len(part) for part in parts])
-        for hunt, part, end in zip(waiting, parts, ends, strict=True):
-            hunt.take(result.part(slice(end - len(part), end)))
+        try:
+            for group in _groups(waiting):
+                _advance(group, threads)
+        except OutOfTime:
+            return [hunt.border(stopped=True) for hunt in hunts]
         if progress is not None:
             progress(k + 1, ROUNDS)
     return [hunt.border() for hunt in hunts]
+
+
+def _groups(hunts: list[_Hunt]) -> list[list[_Hunt]]:
+    """Searches that run together, the short ones first: what has no time left is then the longest."""
+    ordered = sorted(hunts, key=lambda hunt: hunt.search.ticks)
+    groups: list[list[_Hunt]] = [[]]
+    ticks = 0
+    for hunt in ordered:
+        own = hunt.search.ticks * hunt.values.size
+        if groups[-1] and ticks + own > GROUP_TICKS:
+            groups.append([])
+            ticks = 0
+        groups[-1].append(hunt)
+        ticks += own
+    return groups
+
+
+def _advance(hunts: list[_Hunt], threads: int | None) -> None:
+    """One round of some searches in one batch."""
+    parts = [hunt.search.rows(hunt.values) for hunt in hunts]
+    result = Rows.join(parts).run(threads=threads)
+    ends = np.cumsum([len(part) for part in parts])
+    for hunt, part, end in zip(hunts, parts, ends, strict=True):
+        hunt.take(result.part(slice(end - len(part), end)))

@@ -6,7 +6,7 @@ bracket, then interpolated by a polynomial through the nearest points; no linear
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi, sqrt
 
@@ -14,13 +14,19 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig
+from analyses.validation.rig import Rig, small_rig
 from analyses.validation.sweep import stepped_sine
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
+PEAK_DB = 1e-3  # a maximum is measured again until it no longer changes by so much
+PEAK_ROUNDS = 5
+DIP = 1.0  # of the value at zero frequency: lower minima are looked at closely
+WIDE = 1.15  # ratio of two frequencies: a crossing between them is measured again
+UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
 NEAREST = 6  # points of the interpolating polynomial
 SAME = 1e-9  # of log f: points nearer to each other count as one
+HIGHEST_OF_NYQUIST = 0.4995
 STEP_PART = 0.02  # of the room of the signal
 
 
@@ -56,6 +62,8 @@ class Measured:
     step : StepMeasured
     sweep : Sweep
         With the points measured again.
+    peak_error_db : float
+        Change of the maxima of T and S when they were last measured again more closely.
     """
 
     bandwidth_hz: float | None
@@ -68,6 +76,7 @@ class Measured:
     crossover_hz: float | None
     step: StepMeasured
     sweep: Sweep
+    peak_error_db: float = 0.0
 
 
 def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int) -> Measured:
@@ -82,8 +91,15 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
         Waited for before a point of the sweep; length of the step response.
     """
     step = step_response(setup, step_ticks)
+    if step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0:
+        raise NotMeasured(f"the step that gives the value at zero frequency: {step.reason or 'no motion'}")
+    if not sweep.valid.any():
+        raise NotMeasured(f"no frequency could be measured: {most_frequent(sweep.reason)}")
     dc = step.final_value
-    fine = refined(setup, sweep, _brackets(sweep, dc), settle_ticks)
+    fine = refined(setup, sweep, [*_brackets(sweep, dc), *_dips(sweep, dc)], settle_ticks)
+    wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
+    fine = refined(setup, fine, wide, settle_ticks)
+    fine, error = _peaks_refined(setup, fine, settle_ticks)
     f = fine.frequency_hz
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
@@ -101,7 +117,44 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
         crossover_hz=crossover,
         step=step,
         sweep=fine,
+        peak_error_db=error,
     )
+
+
+class NotMeasured(Exception):  # noqa: N818 - nothing is wrong, there is only nothing to judge
+    """A loop of which nothing could be measured; the message says why."""
+
+
+def most_frequent(reasons: Sequence[str]) -> str:
+    """The reason that most points have, with their number."""
+    given = [text for text in reasons if text]
+    if not given:
+        return ""
+    word = max(sorted(set(given)), key=given.count)
+    return f"{word} at {given.count(word)} of {len(reasons)} frequencies"
+
+
+def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, float]:
+    """Measure around the maxima of T and S until they no longer change; the sweep, and the last change (dB)."""
+    before, change = _peaks_db(sweep), 0.0
+    for _ in range(PEAK_ROUNDS):
+        pairs = []
+        for values in (np.abs(sweep.closed_loop), np.abs(sweep.sensitivity)):
+            f, v = _distinct(sweep.frequency_hz, values)
+            k = int(np.argmax(np.where(np.isfinite(v), v, -np.inf)))
+            pairs += [(float(f[j]), float(f[j + 1])) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
+        sweep = refined(setup, sweep, list(dict.fromkeys(pairs)), settle_ticks)
+        after = _peaks_db(sweep)
+        change, before = float(np.abs(after - before).max()), after
+        if change < PEAK_DB:
+            break
+    return sweep, change
+
+
+def _peaks_db(sweep: Sweep) -> Floats:
+    """Maxima of T and S in dB."""
+    both = (maximum(sweep.frequency_hz, np.abs(x))[0] for x in (sweep.closed_loop, sweep.sensitivity))
+    return 20.0 * np.log10(np.array(list(both)))
 
 
 def refined(setup: Rig, sweep: Sweep, brackets: list[tuple[float, float]], settle_ticks: int) -> Sweep:
@@ -110,6 +163,9 @@ def refined(setup: Rig, sweep: Sweep, brackets: list[tuple[float, float]], settl
         return sweep
     inside = [np.geomspace(a, b, INSIDE + 2)[1:-1] for a, b in brackets]
     asked = np.unique(np.concatenate(inside))
+    asked = asked[asked < HIGHEST_OF_NYQUIST / setup.period_s]
+    if not asked.size:
+        return sweep
     amplitude = np.interp(np.log(asked), np.log(sweep.frequency_hz), sweep.amplitude)
     return sweep.joined(stepped_sine(setup, asked, settle_ticks, amplitude=amplitude))
 
@@ -118,23 +174,41 @@ def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     """Where to look closer: crossings of T and L, maxima of T and S."""
     f = sweep.frequency_hz
     closed = np.abs(sweep.closed_loop) / abs(dc)
-    phase = np.degrees(_phase(sweep.closed_loop * np.sign(dc)))
     pairs = []
-    for below in (closed < sqrt(0.5), phase < -90.0):
-        k = int(np.argmax(below))
-        if below[k] and k > 0:
-            pairs.append((k - 1, k))
-    outside = np.abs(sweep.open_loop) > 1.0
-    pairs += [(int(k), int(k) + 1) for k in np.flatnonzero(outside[1:] != outside[:-1])]
+    gain = np.abs(sweep.open_loop)
+    outside, known = gain > 1.0, np.isfinite(gain)
+    crossed = (outside[1:] != outside[:-1]) & known[1:] & known[:-1]
+    pairs += [(int(k), int(k) + 1) for k in np.flatnonzero(crossed)]
     for values in (closed, np.abs(sweep.sensitivity)):
         k = int(np.argmax(np.where(np.isfinite(values), values, -1.0)))
         pairs += [(j, j + 1) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
-    return [(float(f[a]), float(f[b])) for a, b in dict.fromkeys(pairs)]
+    return _falls(sweep, dc) + [(float(f[a]), float(f[b])) for a, b in dict.fromkeys(pairs)]
+
+
+def _falls(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
+    """Where T falls through -3 dB and -90 deg first."""
+    f = sweep.frequency_hz
+    phase = np.degrees(_phase(sweep.closed_loop * np.sign(dc)))
+    pairs = []
+    for below in (np.abs(sweep.closed_loop) / abs(dc) < sqrt(0.5), phase < -90.0):
+        k = int(np.argmax(below))
+        if below[k] and k > 0:
+            pairs.append((float(f[k - 1]), float(f[k])))
+    return pairs
+
+
+def _dips(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
+    """Around minima of T that may dip below -3 dB between two points."""
+    f, v = _distinct(sweep.frequency_hz, np.abs(sweep.closed_loop) / abs(dc))
+    with np.errstate(invalid="ignore"):
+        low = (v[1:-1] <= v[:-2]) & (v[1:-1] <= v[2:]) & (v[1:-1] >= sqrt(0.5)) & (v[1:-1] < DIP)
+    return [(float(f[k + j]), float(f[k + j + 1])) for k in np.flatnonzero(low) for j in (0, 1)]
 
 
 def _phase_margin(sweep: Sweep) -> tuple[float | None, float | None]:
     """Crossover (Hz) and phase margin (deg) nearest to zero."""
-    f, gain = _distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
+    with np.errstate(divide="ignore"):
+        f, gain = _distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
     _, phase = _distinct(sweep.frequency_hz, _phase(sweep.open_loop))
     found = []
     for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
@@ -177,7 +251,8 @@ def maximum(frequency_hz: Floats, values: Floats) -> tuple[float, float]:
     from scipy.optimize import minimize_scalar
 
     k = int(np.argmax(np.where(np.isfinite(values), values, -np.inf)))
-    if k in (0, values.size - 1):
+    inside = 0 < k < values.size - 1 and np.isfinite(values[k - 1 : k + 2]).all()
+    if not inside:
         return float(values[k]), float(frequency_hz[k])
     curve = _local(frequency_hz, values, k)
     ends = (np.log(frequency_hz[k - 1]), np.log(frequency_hz[k + 1]))
@@ -218,7 +293,11 @@ def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
         if not reason:
             break
         size *= 0.2
-    return step_figures_of(time_s, response, reason)
+    found = step_figures_of(time_s, response, reason)
+    if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
+        time_s, response, reason = _step(small_rig(setup.design, setup.loop), size, settle_ticks)
+        found = step_figures_of(time_s, response, reason)
+    return found
 
 
 def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str]:
@@ -241,7 +320,13 @@ def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, s
 def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
     """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response."""
     final = float(response[-1])
+    nothing = float("nan")
+    if not np.isfinite(response).all() or final == 0.0:
+        return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
     y = response / final
+    moved = float(np.ptp(y[-max(y.size // 10, 2) :]))
+    if not reason and moved > UNSETTLED:
+        reason = f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
     rise = float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
     outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
     settled = float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0

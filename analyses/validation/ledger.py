@@ -8,17 +8,22 @@ hold.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, log10
+
+import numpy as np
 
 from analyses.loop_figures import LoopFigures
 from analyses.validation.confirm import Confirmation
-from analyses.validation.figures import Measured, hertz
+from analyses.validation.figures import Measured, hertz, most_frequent
 
 SMALL = "small signal, on a constant speed"
+LOCKED = "small signal, rotor held at a constant speed"
 RELATIVE = 1e-3
 GAIN_DB = 0.01
 PHASE_DEG = 0.1
+NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
+NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
 MARGIN_DB = 20.0 * log10(1.0 + RELATIVE)
 OVERSHOOT_PERCENT = 0.05
 
@@ -91,10 +96,48 @@ def loop_entries(
         *(_confirmed(name, item) for item in confirmed),
     ]
     if figures.peaks is not None:
-        S, T = figures.peaks.sensitivity_db, figures.peaks.complementary_db
-        rows.append(entry(name, "sensitivity_peak", "dB", S, found.sensitivity_peak_db, GAIN_DB))
-        rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak_db, GAIN_DB))
-    return [*rows, *_step_entries(name, figures, found)]
+        peaks = figures.peaks
+        rows.append(
+            entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak_db, _peak(found))
+        )
+        T = peaks.complementary_db
+        rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak_db, _peak(found)))
+    rows = [_unless_hidden(row, figures, found) for row in rows]
+    rows += _step_entries(name, figures, found)
+    if name == "current":
+        rows = [replace(row, condition=LOCKED) for row in rows]
+    return rows
+
+
+def _peak(found: Measured) -> float:
+    """Tolerance of a maximum: that of a gain, and what its own last refinement still changed."""
+    return GAIN_DB + 2.0 * found.peak_error_db
+
+
+def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
+    """An entry, not judged where the frequencies that decide it could not be measured."""
+    sweep = found.sweep
+    if row.passed is not False or "margin_" in row.quantity or row.quantity == "delay_margin":
+        return row
+    band, peaks, margins = figures.bandwidth, figures.peaks, figures.margins
+    at = {
+        "bandwidth": hertz(band.minus3db_rad_s) if band else None,
+        "bandwidth_90deg": hertz(band.minus90deg_rad_s) if band else None,
+        "resonance_peak": band.resonance_hz if band else None,
+        "resonance": band.resonance_hz if band else None,
+        "phase_margin": None if margins.phase_margin is None else margins.phase_margin.frequency_hz,
+        "sensitivity_peak": hertz(peaks.sensitivity_rad_s) if peaks else None,
+        "complementary_peak": hertz(peaks.complementary_rad_s) if peaks else None,
+    }[row.quantity]
+    f, bad = sweep.frequency_hz, ~sweep.valid
+    if at is not None and at < f[0]:
+        return replace(row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz")
+    k = int(np.searchsorted(f, at or f[-1]))
+    near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
+    if row.measured is not None and not near.any():
+        return row
+    why = most_frequent(sweep.reason)
+    return replace(row, passed=None, tolerance=inf, reason=f"could not be measured there: {why}")
 
 
 def point_entries(name: str, confirmed: Sequence[Confirmation]) -> list[Entry]:
@@ -107,6 +150,9 @@ def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     band = figures.bandwidth
     if band is None:
         return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth_hz, _why(figures))]
+    if band.resonance_peak_db > NO_DC_DB:
+        why = "the loop has no gain at zero frequency that bandwidth and resonance could be related to"
+        return [not_judged(name, "bandwidth", "Hz", None, None, why)]
     fall, turn = hertz(band.minus3db_rad_s), hertz(band.minus90deg_rad_s)
     top = found.sweep.frequency_hz[-1]
     rows = [
@@ -114,7 +160,7 @@ def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
         entry(
             name, "bandwidth_90deg", "Hz", _within(turn, top), found.minus90deg_hz, RELATIVE * (turn or 0.0)
         ),
-        entry(name, "resonance_peak", "dB", band.resonance_peak_db, found.resonance_db, GAIN_DB),
+        entry(name, "resonance_peak", "dB", band.resonance_peak_db, found.resonance_db, _peak(found)),
     ]
     if band.resonance_peak_db > 0.05:
         at = band.resonance_hz
@@ -155,6 +201,9 @@ QUANTITY = {
 def _confirmed(name: str, item: Confirmation) -> Entry:
     """A margin confirmed in time, in dB or s."""
     quantity, unit = QUANTITY[item.kind]
+    if item.border.cut:
+        value = _in_unit(item.predicted, item)
+        return not_judged(name, quantity, unit, value, None, "the search was cut for lack of time")
     values = [_in_unit(value, item) for value in (item.predicted, item.border.value)]
     tolerance = MARGIN_DB
     if unit == "s":

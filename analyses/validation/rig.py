@@ -2,7 +2,9 @@
 
 The loop definition of model.md section 3 (inner loops closed, outer ones open) is made as a drive does it:
 for the velocity loop the position controller is out of action and the speed command is a constant (speed
-mode); for the current loop the current command is (torque mode).  For a break point all loops run.
+mode); for the current loop the current command is (torque mode), and the rotor is held at its speed, as a
+bench does it: a free rotor runs away under a constant torque, and what is measured is the back-EMF.  For a
+break point all loops run.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from nonlinear.probe import Probe
 
 Floats = npt.NDArray[np.float64]
 STAGES = ("current", "velocity", "position")
+HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Rig:
     @cached_property
     def outer(self) -> str:
         """Outermost stage that runs."""
-        return self.loop if self.loop in STAGES else "position"
+        return self.loop if self.loop in STAGES else self.stages[-1]
 
     @cached_property
     def point(self) -> str:
@@ -116,6 +119,8 @@ class Rig:
                 row[name] = 0.0
         if self.outer == "current":
             row["velocity_gain"] = row["velocity_integral"] = 0.0
+            for name in ("inertia", "motor_inertia"):
+                row[name] *= HELD
         return row
 
     def _start(self, row: Rows) -> None:
@@ -188,6 +193,20 @@ def rig(design: Design, loop: str, *, limits_on: bool = True) -> Rig:
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     return Rig(design, loop, ride(design), limits_on)
+
+
+def small_rig(design: Design, loop: str) -> Rig:
+    """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
+
+    At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
+    growth.  With play, or friction that differs by direction, the drive has to ride on: these have a slope of
+    their own about rest.
+    """
+    found = rig(design, loop, limits_on=False)
+    friction, play = design.friction, design.coupling is not None and design.coupling.play_rad > 0.0
+    if play or friction.points or friction.viscous(1) != friction.viscous(-1):
+        return found
+    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False)
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

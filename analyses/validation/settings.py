@@ -25,6 +25,8 @@ class Settings:
         Amplitudes and frequencies of the large-signal map.
     large_signals, friction_effects, specification : bool
         Whether these parts are computed.
+    seconds : float
+        Processor time that the whole may take; what is cut is said.
     """
 
     frequencies: int = 40
@@ -36,6 +38,7 @@ class Settings:
     large_signals: bool = True
     friction_effects: bool = True
     specification: bool = True
+    seconds: float = 20.0
 
 
 QUICK = Settings(

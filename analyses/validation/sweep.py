@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.validation.budget import OutOfTime
 from analyses.validation.coherent import Coherent, coherent, hold_factor
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig, rig
@@ -104,7 +105,10 @@ def stepped_sine(
         amplitude[poor[limited]] *= 0.4
         settle_ticks = min(4 * settle_ticks, LONGEST_SETTLE_TICKS)
         part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
-        again = _run(setup, part, amplitude[poor], settle_ticks, threads)
+        try:
+            again = _run(setup, part, amplitude[poor], settle_ticks, threads)
+        except OutOfTime:
+            break  # what could be measured stands; the others say why not
         result = result.with_part(poor, again)
     return _sweep(setup, window, amplitude, result)
 

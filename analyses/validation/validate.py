@@ -6,16 +6,17 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
+from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.conditional import Conditional, conditional_stability
 from analyses.validation.confirm import (
     Confirmation,
@@ -24,31 +25,41 @@ from analyses.validation.confirm import (
     point_questions,
     stage_questions,
 )
-from analyses.validation.figures import measure_figures
+from analyses.validation.figures import NotMeasured, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
-from analyses.validation.ledger import Entry, loop_entries, point_entries
+from analyses.validation.ledger import Entry, loop_entries, not_judged, point_entries
 from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.rig import Rig, points_of, rig
+from analyses.validation.riding import ride
+from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tones import tone_sweep
+from nonlinear import Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loop, Loops
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+T = TypeVar("T")
+U = TypeVar("U")
 HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
+LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
+PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
 
 
 def validate(
-    design: Design, settings: Settings | None = None, progress: Progress | None = None
+    design: Design,
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    *,
+    model: Design | None = None,
 ) -> Validation:
     """Check every linear prediction of a design by the nonlinear simulator.
 
@@ -59,6 +70,9 @@ def validate(
         Extent; by default everything (`analyses.validation.settings`).
     progress : callable, optional
         Called with (steps done, steps in all).
+    model : Design, optional
+        The drive that the linear predictions are made of, by default the same: a wrong one shows what a
+        validation sees.
 
     Returns
     -------
@@ -80,7 +94,7 @@ def validate(
     >>> found.passed
     True
     """
-    return _Work(design, settings or Settings(), progress).run()
+    return _Work(design, settings or Settings(), progress, model or design).run()
 
 
 @dataclass
@@ -90,12 +104,30 @@ class _Work:
     design: Design
     settings: Settings
     progress: Progress | None
+    model: Design
     seconds: dict[str, float] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    budget: Budget = field(init=False)
+    linear: Design = field(init=False)
     figures: dict[str, LoopFigures] = field(default_factory=dict)
     settle: dict[str, int] = field(default_factory=dict)
+    held: Loop | None = None
     done: int = 0
     STEPS = 9
+
+    def __post_init__(self) -> None:
+        """Take the instruments' errors out of the small signals, and start the clock."""
+        self.linear = without_instruments(self.design)
+        self._warm_up()
+        self.budget = Budget(self.settings.seconds)
+        if self.linear != self.design:
+            self.notes.append("small signals are measured with ideal instruments: without counts and noise")
+
+    def _warm_up(self) -> None:
+        """Have the simulator compiled before the clock starts."""
+        rows = Rows.of(self.design)
+        rows["ticks"] = 2 * max(every(self.design, stage) for stage in (*stages_of(self.design), "current"))
+        rows.run()
 
     def run(self) -> Validation:
         with self.timed("linear loops"):
@@ -103,21 +135,33 @@ class _Work:
         stable = all(found.stable for found in self.figures.values())
         if not stable:
             self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
+        whole = stable and self.design.controller.position is not None
+        if stable and not whole:
+            self.notes.append(
+                "no position loop: motion from rest, large commands and friction effects are not judged"
+            )
         with self.timed("frequency response"):
-            loops = {name: self._loop(name, loop) for name, loop in self.loops.present.items()}
+            share = 0.6 / max(len(self.loops.present), 1)
+            loops = {name: self._loop(name, loop, share) for name, loop in self._stage_loops().items()}
         with self.timed("margins in time"):
-            confirmed = self._confirm()
+            confirmed = self._within(0.5, "margins in time", self._confirm, ())
         with self.timed("break points"):
-            points = self._points(confirmed) if stable else {}
-        with self.timed("margins by amplitude"):
-            wanted = stable and self.settings.amplitude_margins
-            released = attempt("margins by amplitude", lambda: self._release(confirmed), ()) if wanted else ()
+            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
         with self.timed("from rest"):
             nothing = (None, None)
-            rest_sweep, rest_steps = attempt("motion from rest", self._rest, nothing) if stable else nothing
+            rest_sweep, rest_steps = (
+                self._within(0.3, "motion from rest", self._rest, nothing) if whole else nothing
+            )
         with self.timed("conditional stability"):
-            conditional = attempt("conditional stability", self._conditional, None) if stable else None
-        large, friction, specification = self._others(stable)
+            conditional = (
+                self._within(0.4, "conditional stability", self._conditional, None) if whole else None
+            )
+        with self.timed("margins by amplitude"):
+            wanted = stable and self.settings.amplitude_margins
+            released = (
+                self._within(0.4, "margins by amplitude", lambda: self._release(confirmed), ()) if wanted else ()
+            )
+        large, friction, specification = self._others(whole)
         for name, loop in loops.items():
             own = tuple(item for item in confirmed if item.loop == name)
             loops[name] = _with_confirmations(loop, own)
@@ -134,7 +178,7 @@ class _Work:
             friction=friction,
             specification=specification,
             seconds=self.seconds,
-            notes=tuple(dict.fromkeys(self.notes)),
+            notes=tuple(dict.fromkeys([*self.notes, *self.budget.cut])),
         )
 
     @contextmanager
@@ -147,27 +191,65 @@ class _Work:
         if self.progress is not None:
             self.progress(self.done, self.STEPS)
 
+    def _within(self, share: float, name: str, work: Callable[[], T], otherwise: U) -> T | U:
+        """A part within its share of the time, alone in its failure; what refuses the drive is noted."""
+
+        def refused() -> T | U:
+            try:
+                return work()
+            except (InputError, NotMeasured) as error:
+                self.notes.append(f"{name}: not judged: {error}")
+                return otherwise
+
+        return attempt(name, lambda: self.budget.within(share, name, refused, otherwise), otherwise)
+
+    def _stage_loops(self) -> dict[str, Loop]:
+        """The loops by name; that of the current with the rotor held."""
+        loops = dict(self.loops.present)
+        if self.held is not None:
+            loops["current"] = self.held
+        return loops
+
     def _assemble(self) -> Loops:
         """The linear loops, their figures, and the rigs to test them on."""
         from actuator_lti.loops import assemble_loops
 
-        loops = assemble_loops(self.design)
-        for name, loop in loops.present.items():
+        ride(self.linear)  # a drive that has no steady motion cannot be tested
+        model = without_instruments(self.model)
+        loops = assemble_loops(model)
+        self.held = None
+        if "current" in loops.present:
+            self.held = assemble_loops(model, rotor="locked").current
+        self.loops = loops
+        for name, loop in self._stage_loops().items():
             self.figures[name] = loop_figures(loop)
             if self.figures[name].stable:
-                every = rig(self.design, name).hold_ticks
-                self.settle[name] = settling_ticks_of(loop.closed_loop, every, self.design.name)
-        if self.design.controller.position_loop.feedforward != 0.0:
+                held = rig(self.linear, name).hold_ticks
+                self.settle[name] = settling_ticks_of(loop.closed_loop, held, self.design.name)
+        position = self.design.controller.position
+        if position is not None and position.feedforward != 0.0:
             self.notes.append("the loops are tested without the feed-forward, which is no part of them")
         return loops
 
-    def _loop(self, name: str, loop: Loop) -> LoopValidation:
-        """Sweep one loop and read its figures."""
+    def _loop(self, name: str, loop: Loop, share: float) -> LoopValidation:
+        """Sweep one loop and read its figures; where that cannot be done, say why."""
         figures, nothing = self.figures[name], np.empty(0, complex)
-        if name not in self.settle:
-            reason = "the linear loop is not stable: there is nothing to measure"
-            return LoopValidation(name, figures, None, nothing, nothing, None, None, None, None, (), reason)
-        setup, settle = rig(self.design, name), self.settle[name]
+        reason = "the linear loop is not stable: there is nothing to measure"
+        if name in self.settle:
+            try:
+                with self.budget.part(share):
+                    return self._measured(name, loop)
+            except OutOfTime:
+                reason = f"cut: its share of {self.budget.seconds:g} s of processor time was used up"
+                self.budget.cut.append(f"{name} loop: {reason}")
+            except (NotMeasured, InputError) as error:
+                reason = str(error)
+        return LoopValidation(name, figures, None, nothing, nothing, None, None, None, None, (), reason)
+
+    def _measured(self, name: str, loop: Loop) -> LoopValidation:
+        """Sweep one stable loop and read its figures."""
+        figures = self.figures[name]
+        setup, settle = rig(self.linear, name), self.settle[name]
         sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
         whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
         measured = measure_figures(setup, sweep, settle, whole)
@@ -193,7 +275,9 @@ class _Work:
         """From well below the lowest figure of the loop to near Nyquist, evenly on a logarithmic scale."""
         assert loop.period_s is not None
         top = HIGHEST / loop.period_s
-        return np.geomspace(max(self._lowest(name), 1e-3 * top), top, self.settings.frequencies)
+        low = max(self._lowest(name), LOWEST * top)
+        count = max(self.settings.frequencies, int(PER_DECADE * np.log10(top / low)))
+        return np.geomspace(low, top, count)
 
     def _lowest(self, name: str) -> float:
         """Where the sweep of a loop begins, Hz."""
@@ -210,17 +294,17 @@ class _Work:
         """All margins of loops and break points, searched for together."""
         questions: list[Question] = []
         for name, settle in self.settle.items():
-            loop, margins = self.loops.present[name], self.figures[name].margins
-            questions += stage_questions(rig(self.design, name), loop, margins, settle)
+            loop, margins = self._stage_loops()[name], self.figures[name].margins
+            questions += stage_questions(small_rig(self.linear, name), loop, margins, settle)
         if len(self.settle) == len(self.figures):
-            setups = {point: rig(self.design, point) for point in self._inner_points()}
+            setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
         return confirm_margins(questions)
 
     def _inner_points(self) -> list[str]:
         """Break points whose loop differs from that of a stage: all but the outermost, and the output."""
-        outermost = "position"
-        own = rig(self.design, outermost).point
+        outermost = stages_of(self.design)[-1]
+        own = rig(self.linear, outermost).point
         return [point for point in points_of(self.design) if point not in ("output", own)] or [own]
 
     def _points(self, confirmed: tuple[Confirmation, ...]) -> dict[str, PointValidation]:
@@ -232,14 +316,15 @@ class _Work:
             if self.settings.point_frequencies:
                 loop = self.loops.break_points[point]
                 top = THIRD_OF_NYQUIST / (loop.period_s or 1.0)
-                asked = np.geomspace(self._lowest("position"), top, self.settings.point_frequencies)
-                sweep = stepped_sine(rig(self.design, point), asked, self.settle["position"])
+                outermost = stages_of(self.design)[-1]
+                asked = np.geomspace(self._lowest(outermost), top, self.settings.point_frequencies)
+                sweep = stepped_sine(rig(self.linear, point), asked, self.settle[outermost])
                 errors = sweep_errors(sweep, loop)
             found[point] = PointValidation(point, sweep, errors, own)
         return found
 
     def _release(self, confirmed: tuple[Confirmation, ...]) -> tuple[AmplitudeMargin, ...]:
-        setups: dict[str, Rig] = {name: rig(self.design, name) for name in self.settle}
+        setups: dict[str, Rig] = {name: rig(self.linear, name) for name in self.settle}
         return release_margins(setups, confirmed, self.settle)
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
@@ -283,10 +368,7 @@ class _Work:
             result = None
             if asked and stable:
                 with self.timed(name):
-                    try:
-                        result = attempt(name, work, None)
-                    except InputError as error:
-                        self.notes.append(f"{name}: {error}")
+                    result = self._within(0.5, name, work, None)
             found.append(result)
         return found[0], found[1], found[2]
 
@@ -300,8 +382,11 @@ class _Work:
         """All entries: loops, break points, from rest."""
         rows: list[Entry] = []
         for name, loop in loops.items():
-            if loop.measured is None:
+            if not loop.figures.stable:
                 rows.append(Entry(name, "stability", "", "linear", None, None, 0.0, False, loop.reason))
+            elif loop.measured is None:
+                rows.append(not_judged(name, "bandwidth", "Hz", None, None, loop.reason))
+                rows += point_entries(name, loop.confirmed)
             else:
                 rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed)
         for name, point in points.items():
@@ -309,6 +394,16 @@ class _Work:
         if steps is not None:
             rows += rest_entries(self.design, self.figures["position"], steps, sweep)
         return rows
+
+
+def without_instruments(design: Design) -> Design:
+    """A drive with ideal instruments: no counts, no noise, no resolution."""
+    return replace(
+        design,
+        encoder=replace(design.encoder, counts_per_rev=None),
+        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+        instruments=Instruments(),
+    )
 
 
 def _with_confirmations(loop: LoopValidation, confirmed: tuple[Confirmation, ...]) -> LoopValidation:

@@ -18,10 +18,7 @@ Floats = npt.NDArray[np.float64]
 
 def parameters(row: Floats) -> tuple[Floats, Floats]:
     """All parameters of a row with what is derived from them, and the state at t_0."""
-    size = layout.P_SIZE
-    if row[layout.LAW] > 0.0:
-        size += layout.TANH_SIZE + (layout.TANH_FORMS_SIZE if row[layout.WITH_ENERGY] > 0.0 else 0)
-    p = np.zeros(size)
+    p = np.zeros(layout.length_of(row))
     p[: layout.SIZE] = row
     prepare_sizes(p)
     s = np.zeros(int(p[layout.STATE_SIZE]))

@@ -1,7 +1,8 @@
 """Where each number of the event-driven plant lives: its block of parameters and its part of the state.
 
-What is derived for it lies from ``layout.ELASTIC`` in the row p (its length depends on the design, so it is the
-last part of the row), its state from ``layout.ELASTIC_STATE`` in the row s.  Symbols are those of model.md section 6; SI.
+What is derived for it lies from ``layout.ELASTIC`` in the row p (its length depends on the design, so it is
+the last part of the row), its state from ``layout.ELASTIC_STATE`` in the row s.  Symbols are those of
+model.md section 6; SI.
 """
 
 from __future__ import annotations

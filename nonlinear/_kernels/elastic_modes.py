@@ -1,7 +1,7 @@
 """The mode of the event-driven plant: what holds in it, what ends it, and what comes next.
 
-Every guard is an affine function of the state and the held inputs.  Two guards of one event are one expression
-and its negation, so that rounding cannot let both be false.
+Every guard is an affine function of the state and the held inputs.  Two guards of one event are one
+expression and its negation, so that rounding cannot let both be false.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.elastic_series import rounding_of
 
 
 @scalar
@@ -225,13 +226,15 @@ def guard_state(s, g):  # type: ignore[no-untyped-def]
 
 
 @scalar
-def guard_of(s, event):  # type: ignore[no-untyped-def]
-    """Present value of the guard of an event; 1 where this mode has none."""
+def fails(p, s, event):  # type: ignore[no-untyped-def]
+    """Whether the guard of an event is broken by more than the rounding of a short interval."""
+    h = math.ldexp(p[layout.PERIOD], -int(p[at.EL_LEVELS]))
     for j in range(int(s[at.ES_GUARDS])):
         g = at.ES_GUARD + j * at.GUARD_SIZE
         if s[g + at.G_EVENT] == float(event):
-            return guard_state(s, g) + guard_offset(s, g)
-    return 1.0
+            offset = guard_offset(s, g)
+            return guard_state(s, g) + offset < -rounding_of(p, s, g, offset, h)
+    return False
 
 
 @scalar
@@ -319,7 +322,7 @@ def land_motor(p, s):  # type: ignore[no-untyped-def]
     direction = s[layout.S_DIRECTION]
     s[layout.S_SPEED], s[layout.S_DIRECTION], s[at.ES_SEGMENT] = 0.0, 0.0, 0.0
     enter_mode(p, s)
-    if guard_of(s, at.MOTOR_DOWN if direction > 0.0 else at.MOTOR_UP) < 0.0:
+    if fails(p, s, at.MOTOR_DOWN if direction > 0.0 else at.MOTOR_UP):
         s[layout.S_DIRECTION] = -direction
 
 
@@ -329,7 +332,7 @@ def land_load(p, s):  # type: ignore[no-untyped-def]
     direction = s[at.ES_LOAD]
     s[at.ES_LOAD_SPEED], s[at.ES_LOAD] = 0.0, 0.0
     enter_mode(p, s)
-    if guard_of(s, at.LOAD_DOWN if direction > 0.0 else at.LOAD_UP) < 0.0:
+    if fails(p, s, at.LOAD_DOWN if direction > 0.0 else at.LOAD_UP):
         s[at.ES_LOAD] = -direction
 
 

@@ -1,9 +1,9 @@
 """Everything of the event-driven plant that does not change with time: its modes and their transitions.
 
-A mode is (motor at rest or slipping on a segment of its friction map) x (gap, contact on either side) x (load
-at rest or slipping).  Each holds its matrix, a norm that its energy cannot outgrow, and exact transitions over
-both held segments and over Ts/2^j: Taylor series of the matrix exponential at the shortest, then squaring, for
-all modes at once.  Not part of the tick.
+A mode is (motor at rest or slipping on a segment of its friction map) x (gap, contact on either side) x
+(load at rest or slipping).  Each holds its matrix, a norm that its energy cannot outgrow, and exact
+transitions over both held segments and over Ts/2^j: Taylor series of the matrix exponential at the shortest,
+then squaring, for all modes at once.  Not part of the tick.
 """
 
 from __future__ import annotations

@@ -121,41 +121,51 @@ def curvature_bound(s, n, h):  # type: ignore[no-untyped-def]
 
 
 @scalar
+def shift(s, n, x):  # type: ignore[no-untyped-def]
+    """Move the origin of the polynomial to x."""
+    for i in range(n):
+        for j in range(n - i):
+            k = at.ES_POLYNOMIAL + n - 1 - j
+            s[k] += x * s[k + 1]
+
+
+@scalar
 def first_fall(s, n, h, tolerance):  # type: ignore[no-untyped-def]
-    """First time in [0, h] at which the polynomial comes down to zero.
+    """First time in [0, h] at which the polynomial comes down to zero; it is used up.
 
     A start at or below zero counts only if it does not become positive first: `AT_ONCE` if it goes further
-    down than its rounding, `NEVER` if it stays there.
+    down than its rounding, `NEVER` if it stays there.  The origin moves along, so that the bound of the
+    second derivative is a local one: beside a multiple zero the steps grow with the distance from it.
     """
-    bend = curvature_bound(s, n, h)
-    a, value = 0.0, value_at(s, n, 0.0)
-    slope, step = slope_at(s, n, 0.0), h
-    armed = value > 0.0
+    a, step = 0.0, h
+    armed = s[at.ES_POLYNOMIAL] > 0.0
     while a < h:
-        b = min(a + step, h)
-        length = b - a
-        value_b = value_at(s, n, b)
-        clear = armed and min(value, value_b) > 0.125 * bend * length * length
-        steep = abs(slope) >= bend * length
-        tiny = length <= 1e-16 * h or b <= a
-        if not (clear or steep or tiny):
+        length = min(step, h - a)
+        bend = curvature_bound(s, n, length) * length
+        value, end = s[at.ES_POLYNOMIAL], value_at(s, n, length)
+        clear = armed and min(value, end) > 0.125 * bend * length
+        steep = abs(s[at.ES_POLYNOMIAL + 1]) >= bend
+        if not (clear or steep or length <= 1e-16 * h):
             step = 0.5 * length
             continue
-        if armed and value_b <= 0.0:
-            return refine_fall(s, n, a, b)
-        if not armed and value_b < -tolerance:
+        if armed and end <= 0.0:
+            return a + refine_fall(s, n, length)
+        if not armed and end < -tolerance:
             return AT_ONCE
-        armed = armed or value_b > 0.0
-        a, value, slope = b, value_b, slope_at(s, n, b)
-        step = max(2.0 * length, 1e-15 * h)
+        armed = armed or end > 0.0
+        if step >= h - a:
+            return NEVER
+        shift(s, n, length)
+        a += length
+        step = 2.0 * length
     return NEVER
 
 
 @scalar
-def refine_fall(s, n, low, high):  # type: ignore[no-untyped-def]
-    """Root in a bracket where the polynomial falls through zero once: Newton inside bisection."""
-    end = high
-    t = 0.5 * (low + high)
+def refine_fall(s, n, end):  # type: ignore[no-untyped-def]
+    """Root in [0, end], where the polynomial falls through zero once: Newton inside bisection."""
+    low, high = 0.0, end
+    t = 0.5 * end
     for _ in range(200):
         value = value_at(s, n, t)
         if value > 0.0:

@@ -11,6 +11,8 @@ units are SI, motor side.
 
 from __future__ import annotations
 
+from typing import Any
+
 # --- parameters of one run -------------------------------------------------------------------------
 (
     TICKS,  # number of ticks n; rows k = 0 .. n-1 are sampled at t_k = k Ts
@@ -189,7 +191,7 @@ LENGTH = DECAY + 2  # of the two segments, s
     RELAX,  # R/L
     LOCKED_GAIN,  # 1/R; 0 for a torque source
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
-    LOOK,  # 1: no short way over a segment: energies, tanh law, elastic, or w' may turn twice within
+    LOOK,  # 1: no short way over a segment: tanh law, elastic, or w' may turn twice within
     SPLIT,  # 1: the computing delay has a fraction of a tick
     RARE_LOAD,  # 1: the load changes from tick to tick
     RARE_SENSE,  # 1: instruments or the supply are modelled
@@ -427,3 +429,10 @@ OUT_SIZE = OUT_STEP_BEFORE + 1
 
 # --- status ----------------------------------------------------------------------------------------
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)
+
+
+def length_of(row: Any) -> int:
+    """Length of the row of parameters of a run with what is derived from it."""
+    if row[LAW] <= 0.0:
+        return P_SIZE
+    return P_SIZE + TANH_SIZE + (TANH_FORMS_SIZE if row[WITH_ENERGY] > 0.0 else 0)

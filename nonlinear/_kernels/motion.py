@@ -7,6 +7,7 @@ import math
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.compiled import inlined, scalar, woven
 from nonlinear._kernels.elastic import elastic_motion
+from nonlinear._kernels.energy import energy_stick, energy_whole
 from nonlinear._kernels.segment import segment, slip_step
 from nonlinear._kernels.sense import output_angle
 from nonlinear._kernels.smooth import tanh_segment
@@ -48,6 +49,8 @@ def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
         a0, a1 = d * (kM * i + drive - Cv * w), d * (kM * i1 + drive - Cv * w1)
         if not (d * w > 0.0 and d * w1 > 0.0) or (a0 < 0.0 and a1 > 0.0):
             return 0
+    if p[layout.WITH_ENERGY] > 0.0:
+        energy_whole(p, s, 2 * side + part, i, w, u, T, s[layout.S_TORQUE])
     s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i1, w1, th1
     return 1
 
@@ -62,6 +65,8 @@ def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
     d0, d1 = kM * i + Kg * u + Tb, kM * i1 + Kg * u + Tb
     up, down = s[layout.S_DRY] * p[layout.BREAKAWAY], -s[layout.S_DRY_REVERSE] * p[layout.BREAKAWAY]
     if down <= d0 <= up and down <= d1 <= up:
+        if p[layout.WITH_ENERGY] > 0.0:
+            energy_stick(p, s, p[layout.LENGTH + part], i, u)
         s[layout.S_CURRENT] = i1
         return 1
     return 0

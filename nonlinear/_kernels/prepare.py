@@ -56,28 +56,19 @@ def any_of(p, first, behind):  # type: ignore[no-untyped-def]
 @scalar
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
-    more = max(
-        any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT),
-        any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED),
-    )
+    more = max(any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED), p[layout.PROFILED])
+    more = max(more, any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT))
     if p[layout.HAS_POSITION] <= 0.0 or p[layout.FEEDFORWARD] != 0.0:
         more = 1.0
-    p[layout.RARE_COMMAND] = max(
-        more, max(p[layout.PROFILED], any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
-    )
+    p[layout.RARE_COMMAND] = max(more, any_of(p, layout.COMMAND_FILTERS, layout.SPEED_FILTERS))
     plain = p[layout.SPEED_SOURCE] <= 0.0 and p[layout.FILTER_COEFFICIENT] >= 1.0
     p[layout.RARE_SPEED] = 0.0 if plain and p[layout.SPEED_FILTERS] <= 0.0 else 1.0
     p[layout.RARE_SPEED] = max(p[layout.RARE_SPEED], p[layout.SPEED_SENSOR])
-    forward = max(
-        any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED),
-        any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE),
-    )
-    p[layout.RARE_VELOCITY] = max(forward, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
-    extra = max(
-        any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY),
-        any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING),
-    )
-    p[layout.RARE_CURRENT] = max(extra, p[layout.OVERLOAD])
+    more = any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED)
+    more = max(more, any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE))
+    p[layout.RARE_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
+    more = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY), p[layout.OVERLOAD])
+    p[layout.RARE_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
     p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
     tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
@@ -108,7 +99,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     dry = p[layout.DRY] + p[layout.DRY_REVERSE] + p[layout.LOAD_COEFFICIENT]
     same = p[layout.VISCOUS] == p[layout.VISCOUS_REVERSE]
     p[layout.SMOOTH] = 1.0 if dry == 0.0 and same else 0.0
-    p[layout.LOOK] = max(max(ringing, p[layout.WITH_ENERGY]), max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
+    p[layout.LOOK] = max(ringing, max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
 @entry

@@ -100,7 +100,7 @@ def init(p, s):  # type: ignore[no-untyped-def]
 
 @entry
 def init_elastic(p, s):  # type: ignore[no-untyped-def]
-    """What `init` leaves to do where the drive train is elastic: load side, contact, the output's own angle."""
+    """What `init` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
     elastic_start(p, s)
     fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
@@ -129,7 +129,7 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
 
 @scalar
 def note_more(p, s, io):  # type: ignore[no-untyped-def]
-    """Note both sides of each probe, the current command under overload, the load side of an elastic drive."""
+    """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         io[layout.IO_OUTPUT_SPEED], io[layout.IO_TWIST] = s[layout.S_OUTPUT_SPEED], s[elastic_layout.ES_TWIST]
         io[layout.IO_COUPLING_TORQUE] = coupling_torque(p, s)

@@ -10,9 +10,10 @@ import typer
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
-    "Linear loops": ("margins", "report", "pdf"),
+    "Linear loops": ("margins", "stiffness", "report", "pdf"),
     "Nonlinear checks": ("simulate", "validate"),
     "Bench records": ("identify", "correlate"),
+    "Out of Python": ("export",),
     "Variants and history": ("compare", "montecarlo", "tune", "nightly"),
 }
 

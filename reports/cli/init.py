@@ -12,11 +12,20 @@ FromOption = Annotated[
     str | None,
     typer.Option("--from", metavar="NAME", help="Start from this design (shipped name or file) instead."),
 ]
+# Kind of drive, and the shipped design that it starts from; None is the starter with all keys explained.
+KINDS: dict[str, str | None] = {"servo-axis": None, "joint": "joint", "ballscrew": "ballscrew", "fin": "fin"}
+KindOption = Annotated[
+    str | None,
+    typer.Option("--kind", metavar="KIND", help=f"Start from a typical drive: {', '.join(KINDS)}."),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite FILE if it exists.")]
 
 
 def init(
-    file: FileArgument = Path("my-drive.toml"), source: FromOption = None, force: ForceOption = False
+    file: FileArgument = Path("my-drive.toml"),
+    source: FromOption = None,
+    kind: KindOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Write a commented design file to start one's own drive from."""
     from actuator_lti.atomic import write_text
@@ -25,10 +34,21 @@ def init(
     from reports.cli.targets import refuse_existing
 
     refuse_existing(file, force)
-    text = _renamed(_source_text(source), file.stem)
+    text = _renamed(_source_text(source if kind is None else _of_kind(kind, source)), file.stem)
     read_design_text(text, str(file))
     write_text(file, text)
     print_line(f"wrote {file}; next: actuator-lti report {file}")
+
+
+def _of_kind(kind: str, source: str | None) -> str | None:
+    """The shipped design of a kind, None for the starter."""
+    from actuator_lti.errors import InputError
+
+    if source is not None:
+        raise InputError(f'--kind = "{kind}": not allowed beside --from')
+    if kind not in KINDS:
+        raise InputError(f'--kind = "{kind}": allowed: {", ".join(KINDS)}')
+    return KINDS[kind]
 
 
 def _source_text(source: str | None) -> str:

@@ -249,7 +249,8 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
     if as_json:
         print_json(facts)
         return
-    print_line(f"{run.design_name}: {run.time_s.size} rows, status {run.status}")
+    detail = f" ({facts['status_detail']})" if facts["status_detail"] else ""
+    print_line(f"{run.design_name}: {run.time_s.size} rows, status {facts['status']}{detail}")
     for name, value in facts.items():
         if isinstance(value, float):
             print_line(f"  {_in_words(name, value)}")

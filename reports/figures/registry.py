@@ -17,6 +17,7 @@ MODULES: dict[str, str] = {
     "nyquist": "reports.figures.nyquist",
     "sensitivity": "reports.figures.sensitivity",
     "step": "reports.figures.step",
+    "stiffness": "reports.figures.stiffness",
     "forms": "reports.figures.forms",
     "onset": "reports.figures.onset",
     "delay_budget": "reports.figures.delay_budget",

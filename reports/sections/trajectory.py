@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from analyses.conduct import conduct
 from nonlinear import Trajectory
 from reports.document import rounded
 from reports.sections.thinning import kept_rows
@@ -78,9 +79,11 @@ def summary(run: Trajectory) -> dict[str, Any]:
         for name, u in run.limits.items()
     }
     angle = "m" if run.axis == "linear" else "rad"
+    ended = conduct(run)
     out = {
         "design": run.design_name,
-        "status": run.status,
+        "status": ended.status,
+        "status_detail": ended.detail,
         "rows": run.time_s.size,
         "period_s": run.period_s,
         f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),

@@ -149,11 +149,16 @@ def _beside(shown: int) -> str:
 
 def _response_items(validation: Validation) -> list[dict[str, Any]]:
     """Agreement of measured and assembled responses up to a third of Nyquist."""
-    from reports.sections.sweep import GAIN_DB, PHASE_DEG, worst_below_third
+    from reports.sections.sweep import GAIN_DB, PHASE_DEG, has_points, worst_below_third
 
     items = []
     for name, loop in validation.loops.items():
-        if loop.measured is None:
+        if not loop.figures.stable:
+            continue
+        if not has_points(loop):
+            label = f"{loop_name(name)}: difference between model and simulation"
+            reason = f"not judged: {loop.reason or 'no frequency could be measured'}"
+            items.append(_verdict(f"injection-{name}", label, None, GAIN_DB, "<=", "dB", None, reason))
             continue
         gain, phase = worst_below_third(loop)
         for kind, value, limit, unit in (("gain", gain, GAIN_DB, "dB"), ("phase", phase, PHASE_DEG, "deg")):

@@ -140,6 +140,11 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     for name, fixed in given.items():
         if draw(st.booleans()):
             tree[name] = draw(_section(name, structure, fixed))
+    if "coupling" in tree:  # wants an inertia behind it, and a train that it can drive back
+        inertia = "3 kg*m^2" if axis == "rotary" else "3 kg"
+        tree["load"] = {**tree.get("load", {}), "path": "back-drivable", "inertia": inertia}
+        if "friction" in tree:
+            tree["friction"]["law"] = "coulomb"
     if "load" in tree and axis == "rotary" and draw(st.booleans()):
         tree["load"]["gravity"] = draw(_section("load.gravity", structure, {}))
     if "load" in tree and "coupling" in tree and draw(st.booleans()):

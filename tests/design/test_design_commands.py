@@ -39,6 +39,25 @@ def test_init_starts_from_a_shipped_design_with_its_comments(tmp_path: Path, nam
     assert path.read_text().startswith("# ")
 
 
+@pytest.mark.parametrize("kind", ["joint", "ballscrew", "fin", "servo-axis"])
+def test_init_writes_a_typical_drive_of_a_kind(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "mine.toml"
+    assert main(["init", str(path), "--kind", kind]) == 0
+    design = load_design(path)
+    assert design.name == "mine"
+    assert (design.coupling is None) == (kind == "servo-axis")
+    assert (design.axis == "linear") == (kind == "ballscrew")
+
+
+@pytest.mark.parametrize("more", [["--kind", "crane"], ["--kind", "fin", "--from", "joint"]])
+def test_init_refuses_a_kind_that_there_is_not_and_two_sources(
+    tmp_path: Path, more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["init", str(tmp_path / "mine.toml"), *more]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_init_does_not_overwrite_without_being_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -56,6 +56,7 @@ def test_energy_is_the_same_in_both_units() -> None:
     assert design.friction.viscous_Nms_rad == 2.0  # written in the axis's own unit
     assert design.limits.speed_rad_s == pytest.approx(2000 * 2 * pi / 60 * p, rel=1e-14)
     assert design.controller.velocity.gain * v == pytest.approx(0.4 * w, rel=1e-14)  # type: ignore[union-attr]
+    assert design.controller.position.gain == 50.0  # 1/s, the same on either axis
     # 40 kg behind a 2:1 belt, and the pulley at its own shaft
     assert design.inertia_kgm2 == pytest.approx((3e-4 + 1e-4 / 4) / p**2 + 40 / 4, rel=1e-14)
     # a revolution of the motor is a lead on its side, half of it at the output

@@ -1,6 +1,6 @@
 """The shipped designs hold the published figures, each with its grade and source."""
 
-from math import pi
+from math import pi, sqrt
 
 import pytest
 
@@ -130,6 +130,60 @@ def test_emps_holds_the_published_figures() -> None:
 def test_every_shipped_design_is_named_like_its_file_and_the_baseline_comes_first() -> None:
     assert shipped_designs()[0] == "ilr33-amber"
     assert [load_design(name).name for name in shipped_designs()] == list(shipped_designs())
+
+
+def test_the_shipped_designs_are_these() -> None:
+    assert set(shipped_designs()) == {
+        "ilr33-amber", "ilr33-amber-compliant", "ilr33-amber-multirate", "ilr33-amber-tanh",
+        "ballscrew", "ctms-motor-position", "emps", "fin", "joint",
+    }  # fmt: skip
+
+
+def test_the_variants_of_the_baseline_differ_from_it_only_in_what_they_are_for() -> None:
+    base = dict(load_design("ilr33-amber").parameters)
+
+    def changed(name: str) -> set[str]:
+        found = load_design(name).parameters
+        paths = base.keys() | found.keys()
+        return {p for p in paths if p not in base or p not in found or base[p].value != found[p].value}
+
+    assert changed("ilr33-amber-tanh") == {"friction.smoothing_speed"}
+    assert load_design("ilr33-amber-tanh").friction.law == "tanh"
+    assert {path.rpartition(".")[0] for path in changed("ilr33-amber-compliant")} == {
+        "coupling", "load.friction",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant"])
+def test_an_elastic_design_has_its_derived_values_from_its_own_others(name: str) -> None:
+    """Damping ratio of the load on its spring, c / (2 sqrt(k J)): between 2 % and 6 %, as the sources say."""
+    design = load_design(name)
+    assert design.coupling is not None
+    k, c, J = design.coupling.stiffness_Nm_rad, design.coupling.damping_Nms_rad, design.load_side_inertia_kgm2
+    assert 0.02 < c / (2 * sqrt(k * J)) < 0.06
+    for parameter in design.parameters.values():
+        assert parameter.source
+        assert parameter.grade
+
+
+def test_the_sources_of_the_real_drives_state_their_own_sums() -> None:
+    joint, screw = load_design("joint"), load_design("ballscrew")
+    assert joint.coupling is not None
+    gravity = joint.load.gravity
+    assert gravity is not None
+    assert joint.load.inertia_kgm2 == pytest.approx(gravity.mass_kg * gravity.arm_m**2 + 0.06)
+    J_m, J_l = joint.motor_side_inertia_kgm2 * 100**2, joint.load_side_inertia_kgm2
+    resonance = sqrt(joint.coupling.stiffness_Nm_rad * (1 / J_l + 1 / J_m))
+    assert joint.controller.velocity is not None
+    notch = joint.controller.velocity.filters[0].frequency_rad_s
+    assert notch == pytest.approx(resonance, rel=0.03)
+    assert screw.coupling is not None
+    assert screw.controller.velocity is not None
+    resonance = sqrt(screw.coupling.stiffness_Nm_rad * (1 / 100 + 1 / screw.motor_side_inertia_kgm2))
+    assert screw.controller.velocity.filters[0].frequency_rad_s == pytest.approx(resonance, rel=0.01)
+    # N m/A rms and V rms line-line of one motor differ by sqrt(3): one constant in the model
+    same = screw.effective_motor
+    assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-3)
 
 
 def test_the_baseline_gives_no_cause_for_suspicion() -> None:

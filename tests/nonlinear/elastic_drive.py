@@ -101,7 +101,7 @@ class Run:
     ledgers: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
-PLACES = (layout.S_CURRENT, layout.S_SPEED, at.ES_LOAD_SPEED, layout.S_ANGLE, at.ES_LOAD_ANGLE)
+PLACES = (layout.S_CURRENT, layout.S_SPEED, at.ES_LOAD_SPEED, layout.S_ANGLE)
 
 
 def open_drive(design: Design, start: tuple[float, ...], fraction_s: float, **options: float) -> np.ndarray:
@@ -135,7 +135,7 @@ def run_plant(
     states, torque = np.empty((count + 1, 5)), np.empty(count + 1)
     ledgers, events, status = np.empty((count + 1, layout.ENERGY_SIZE)), [], layout.OK
     for k in range(count + 1):
-        states[k] = s[list(PLACES)]
+        states[k, :4], states[k, 4] = s[list(PLACES)], s[layout.S_OUTPUT] * design.ratio_behind_coupling
         ledgers[k] = s[layout.S_ENERGY : layout.S_ENERGY + layout.ENERGY_SIZE]
         io[layout.IN_COMMAND], io[layout.IN_LOAD] = (voltages[k], moment[k]) if k < count else (0.0, 0.0)
         before = s[layout.S_EVENTS]
@@ -184,8 +184,8 @@ def random_drive(seed: int) -> tuple[Design, np.ndarray, np.ndarray, float]:
     }
     Ts = power_of_ten(rng, -4.3, -2.3)
     design = two_mass(
-        Ts, source=bool(source), path="self-locking" if locking else "back-drivable", friction=friction, ratio=N,
-        behind=gears, J_l=J_l * N_r**2, load_friction=load_friction,
+        Ts, source=bool(source), path="self-locking" if locking else "back-drivable", friction=friction,
+        ratio=N, behind=gears, J_l=J_l * N_r**2, load_friction=load_friction,
         coupling={"stiffness_Nm_rad": k, "damping_Nms_rad": damping, "play_rad": play},
     )  # fmt: skip
     voltages = np.repeat(rng.normal(size=8) * (torque if source else 4.0), 3)

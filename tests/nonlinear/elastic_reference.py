@@ -197,7 +197,7 @@ def advance(ref: Reference, x: np.ndarray, mode: Mode, span: float) -> np.ndarra
     settle(ref, x, mode)
     while t < span:
         # a side that leaves rest is not asked for its landing over the first instant
-        leaving = (mode.motor and x[1] == 0.0) or (mode.load and x[2] == 0.0)
+        leaving = (mode.motor and x[1] == 0.0) or (mode.load and ref.C0l > 0.0 and x[2] == 0.0)
         named = [event for event in ref.events(mode) if not (leaving and "land" in event[0])]
         end = min(span, t + 1e-6 * span) if leaving else span
         functions = []

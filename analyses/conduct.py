@@ -1,0 +1,78 @@
+"""How a simulated motion ended: at rest, still swinging, on a limit, or still under way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nonlinear.trajectory import Trajectory
+
+STILL = 0.9  # of the span of the quarter before: a motion that has so much left does not die out
+SEEN = 2e-3  # of the size of the motion: smaller swings are not spoken of
+BAND = 0.02  # of the size of the motion: what moves less in the last quarter has settled
+HELD = 0.95  # of the last quarter: a limit that acts so long is sat on
+CROSSINGS = 4  # through the mean: two whole periods
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """What a run ended in.
+
+    Attributes
+    ----------
+    status : str
+        ``"ok"``, ``"keeps oscillating"``, ``"sits on a limit"``, ``"has not settled"``, or why the run stopped.
+    detail : str
+        With figures; empty where there is nothing to say.
+    """
+
+    status: str
+    detail: str = ""
+
+
+def conduct(run: Trajectory) -> Conduct:
+    """Judge the last quarter of a run.
+
+    A command that still moves in the last half of the run is followed, not settled on: then only a limit that
+    acts all the time is spoken of.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> from nonlinear import commands, simulate
+    >>> conduct(simulate(load_design("ilr33-amber"), commands.step(0.01), duration_s=0.2)).status
+    'ok'
+    """
+    if run.status != "ok":
+        return Conduct(run.status, run.advice)
+    n = run.time_s.size
+    if n < 8:
+        return Conduct("ok")
+    last, before = slice(n - n // 4, n), slice(n - 2 * (n // 4), n - n // 4)
+    reference, output = run.reference_rad, run.output_angle_rad
+    size = max(float(np.abs(reference - output).max()), float(np.ptp(output)), 1e-300)
+    swing = float(np.ptp(output[last]))
+    constant = np.ptp(reference[n - n // 2 :]) <= 1e-9 * max(float(np.abs(reference).max()), 1e-300)
+    if constant and swing > SEEN * size and swing >= STILL * float(np.ptp(output[before])):
+        hertz = _frequency_hz(run, last)
+        if hertz is not None:
+            unit, factor = ("mm", 1e3) if run.axis == "linear" else ("deg", 180.0 / np.pi)
+            return Conduct("keeps oscillating", f"{0.5 * swing * factor:.3g} {unit} at {hertz:.3g} Hz")
+    held = [name for name, use in run.limits.items() if use.active and run.limit_active(name)[last].mean() >= HELD]
+    limit = ", ".join(f"{name} limit of {run.limits[name].limit:.4g} {run.limits[name].unit}" for name in held)
+    if constant and swing > BAND * size:
+        moves = f"the output still moves by {100.0 * swing / size:.2g} % of its way"
+        return Conduct("has not settled", f"{moves}, at the {limit}" if limit else moves)
+    return Conduct("sits on a limit", limit) if limit else Conduct("ok")
+
+
+def _frequency_hz(run: Trajectory, part: slice) -> float | None:
+    """Frequency of a swing about its mean, by its crossings; ``None`` where it does not swing."""
+    values = run.output_angle_rad[part]
+    middle = 0.5 * (values.max() + values.min())
+    crossings = np.flatnonzero(np.diff(np.signbit(values - middle)))
+    if crossings.size < CROSSINGS:
+        return None
+    time = run.time_s[part]
+    return float(0.5 * (crossings.size - 1) / (time[crossings[-1]] - time[crossings[0]]))

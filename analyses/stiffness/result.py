@@ -1,0 +1,93 @@
+"""What the stiffness analysis returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+
+State = Literal["powered", "shorted", "open"]
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive.
+
+    Attributes
+    ----------
+    state : {"powered", "shorted", "open"}
+        All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
+        unpowered without a current.
+    frequency_hz : ndarray
+    stiffness_Nm_rad : ndarray of complex
+        N m/rad (linear axis: N/m); inf where the output does not move.
+    static_Nm_rad : float
+        Limit at zero frequency: 0 of an output that runs away, inf of one that comes back.
+    """
+
+    state: State
+    frequency_hz: npt.NDArray[np.float64]
+    stiffness_Nm_rad: npt.NDArray[np.complex128]
+    static_Nm_rad: float
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Smallest |K| and its frequency in Hz."""
+        size = np.abs(self.stiffness_Nm_rad)
+        k = int(np.argmin(size))
+        return float(size[k]), float(self.frequency_hz[k])
+
+
+@dataclass(frozen=True)
+class LostMotion:
+    """How far the output stays apart after a moment to either side has gone, the motor held.
+
+    Attributes
+    ----------
+    play_rad : float
+        The play of the coupling at the output.
+    foreseen_rad : float
+        2 (b + C0_l/k) / N_r: play, and the twist that the load's dry friction holds.
+    seen_rad : float or None
+        The same in the simulator; None where it was not asked.
+    """
+
+    play_rad: float
+    foreseen_rad: float
+    seen_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class Check:
+    """One frequency, a small moment injected in the simulator, without dry friction, play or quantisation."""
+
+    frequency_hz: float
+    foreseen_Nm_rad: complex
+    seen_Nm_rad: complex
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of the two compliances."""
+        return abs(self.foreseen_Nm_rad / self.seen_Nm_rad - 1.0)
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """All of it for one design."""
+
+    design: Design
+    curves: tuple[StiffnessCurve, ...]
+    lost_motion: LostMotion | None
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every check agrees to `AGREED`."""
+        return all(check.difference <= AGREED for check in self.checks)
+
+
+AGREED = 1e-6

@@ -1,0 +1,33 @@
+"""The whole stiffness analysis of a design."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from analyses.stiffness.curves import stiffness_curves
+from analyses.stiffness.injected import check_stiffness, lost_motion
+from analyses.stiffness.result import Stiffness
+
+CHECKED_HZ = (2.0, 10.0, 50.0)
+
+
+def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
+    """Dynamic and static stiffness and lost motion of a design.
+
+    Parameters
+    ----------
+    design : Design
+    simulated : bool
+        Put them to the simulator: a moment injected at three frequencies, and a slow one to either side.
+
+    Raises
+    ------
+    InputError
+        For a loop that is not stable.
+    """
+    curves = stiffness_curves(design)
+    moves = bool(np.isfinite(curves[0].stiffness_Nm_rad).all())
+    held = design.controller.position is not None
+    checks = check_stiffness(design, CHECKED_HZ) if simulated and moves and held else ()
+    return Stiffness(design, curves, lost_motion(design, seen=simulated and held), checks)

@@ -1,0 +1,292 @@
+"""Expressions: their kind, and their text in C."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+from nonlinear.emit.kinds import FUNCTIONS, Function, Kind, c_float, c_name
+
+Text = tuple[str, Kind]
+Constant = int | float | tuple[float, ...] | tuple[int, ...]
+Calls = Callable[[Any, list[Kind], ast.AST, Function], Function]
+
+_TESTS = ("isfinite", "isnan", "isinf")
+_MATH = set(FUNCTIONS.split()) - {*_TESTS, "abs", "floor"}
+_ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_BITS = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
+_COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+
+
+class Expressions:
+    """Translates the expressions of one function.
+
+    Parameters
+    ----------
+    function : Function
+        Whose variables and arguments are known so far.
+    call : callable
+        Analyses a called function for the kinds of its arguments.
+    constants : dict of str to int or float
+        Filled with every named constant that is used.
+    prefix : str
+        In front of every function name.
+    """
+
+    def __init__(self, function: Function, call: Calls, constants: dict[str, Constant], prefix: str) -> None:
+        self.function, self.call, self.constants, self.prefix = function, call, constants, prefix
+
+    def emit(self, node: ast.expr) -> Text:
+        """Text and kind of an expression."""
+        method = getattr(self, f"_{type(node).__name__}", None)
+        if method is None:
+            raise self.function.error(node, f"{type(node).__name__} is not in the subset")
+        text: Text = method(node)
+        return text
+
+    def condition(self, node: ast.expr) -> str:
+        """A test; whole numbers are compared with 0, floats must be compared in the source."""
+        text, kind = self.emit(node)
+        if kind == "bool":
+            return bare(text)
+        if kind == "int":
+            return f"{text} != 0"
+        raise self.function.error(node, f"a {kind} as a condition; compare it")
+
+    def as_float(self, node: ast.expr) -> str:
+        """A number as a double."""
+        text, kind = self.emit(node)
+        if kind not in ("float", "int"):
+            raise self.function.error(node, f"a {kind} where a number is wanted")
+        return widened(text, kind)
+
+    def _Constant(self, node: ast.Constant) -> Text:
+        value = node.value
+        if isinstance(value, bool):
+            return ("true" if value else "false"), "bool"
+        if isinstance(value, int):
+            return str(value), "int"
+        if isinstance(value, float):
+            return c_float(value), "float"
+        raise self.function.error(node, f"the constant {value!r} is not in the subset")
+
+    def _Name(self, node: ast.Name) -> Text:
+        function, name = self.function, node.id
+        if name in function.variables:
+            return c_name(name), function.variables[name]
+        if name in function.arguments:
+            return c_name(name), function.arguments[name]
+        if name in function.scope:
+            return self._constant(name, function.scope[name], node)
+        raise function.error(node, f"{name} is not known here")
+
+    def _Attribute(self, node: ast.Attribute) -> Text:
+        base = node.value
+        module = self.function.scope.get(base.id) if isinstance(base, ast.Name) else None
+        if not isinstance(module, ModuleType):
+            raise self.function.error(node, "an attribute of something that is no module")
+        if module is math:
+            return c_float(getattr(math, node.attr)), "float"
+        return self._constant(node.attr, getattr(module, node.attr), node)
+
+    def _constant(self, name: str, value: Any, node: ast.AST) -> Text:
+        if type(value) not in (int, float):
+            raise self.function.error(node, f"{name} is neither a whole number nor a float")
+        if self.constants.setdefault(name, value) != value:
+            raise self.function.error(
+                node, f"the constant {name} has two values: {self.constants[name]}, {value}"
+            )
+        return name, ("int" if type(value) is int else "float")
+
+    def _Subscript(self, node: ast.Subscript) -> Text:
+        if self._is_length(node):
+            return f"{self.emit(node.value.value)[0]}.length", "int"  # type: ignore[attr-defined]
+        table = self._table(node.value)
+        whole = table is not None and type(self.constants[table][0]) is int  # type: ignore[index]
+        return self.element(node), "int" if whole else "float"
+
+    def _is_length(self, node: ast.Subscript) -> bool:
+        """``row.shape[0]`` of a row that knows its length."""
+        value, index = node.value, node.slice
+        if (
+            not isinstance(value, ast.Attribute)
+            or value.attr != "shape"
+            or not isinstance(value.value, ast.Name)
+        ):
+            return False
+        if not isinstance(index, ast.Constant) or index.value != 0:
+            return False
+        return self.emit(value.value)[1] == "bytes"
+
+    def element(self, node: ast.Subscript) -> str:
+        """``row[index]``."""
+        table = self._table(node.value)
+        row, kind = (table, "row") if table else self.emit(node.value)
+        if kind not in ("row", "bytes"):
+            raise self.function.error(node, "only a row has elements")
+        row = f"{row}.at" if kind == "bytes" else row
+        index, index_kind = self.emit(node.slice)
+        if index_kind != "int":
+            raise self.function.error(node, f"an index that is a {index_kind}; use int()")
+        return f"{row}[{bare(index)}]"
+
+    def _table(self, node: ast.expr) -> str | None:
+        """Name of a table of floats of the module; None for anything else."""
+        if not isinstance(node, ast.Name) or node.id in (*self.function.variables, *self.function.arguments):
+            return None
+        value: Any = self.function.scope.get(node.id)
+        if getattr(value, "ndim", None) == 1:  # an array of numpy
+            value = tuple(value.tolist())
+        if not isinstance(value, tuple) or not value:
+            return None
+        if any(type(item) is not type(value[0]) for item in value) or type(value[0]) not in (int, float):
+            return None
+        if self.constants.setdefault(node.id, value) != value:
+            raise self.function.error(node, f"the table {node.id} has two values")
+        return node.id
+
+    def _BinOp(self, node: ast.BinOp) -> Text:
+        (left, a), (right, b) = self.emit(node.left), self.emit(node.right)
+        kind = type(node.op)
+        if kind in _BITS:
+            if (a, b) != ("int", "int"):
+                raise self.function.error(node, "bits of what is no whole number")
+            return f"({left} {_BITS[kind]} {right})", "int"
+        if kind not in _ARITHMETIC:
+            raise self.function.error(node, f"the operator {kind.__name__} is not in the subset")
+        if "bool" in (a, b) or "row" in (a, b):
+            raise self.function.error(node, f"arithmetic of {a} and {b}")
+        # a quotient is a float in Python, of whole numbers too
+        whole = (a, b) == ("int", "int") and kind is not ast.Div
+        if not whole:
+            left, right = widened(left, a), widened(right, b)
+        return f"({left} {_ARITHMETIC[kind]} {right})", "int" if whole else "float"
+
+    def _UnaryOp(self, node: ast.UnaryOp) -> Text:
+        if isinstance(node.op, ast.Not):
+            return f"(!({self.condition(node.operand)}))", "bool"
+        text, kind = self.emit(node.operand)
+        if not isinstance(node.op, ast.USub) or kind not in ("int", "float"):
+            raise self.function.error(node, "this unary operator is not in the subset")
+        return f"(-{text})", kind
+
+    def _BoolOp(self, node: ast.BoolOp) -> Text:
+        sign = " && " if isinstance(node.op, ast.And) else " || "
+        return "(" + sign.join(f"({self.condition(value)})" for value in node.values) + ")", "bool"
+
+    def _Compare(self, node: ast.Compare) -> Text:
+        if isinstance(node.ops[0], ast.Is | ast.IsNot):
+            return self._present(node)
+        values = [node.left, *node.comparators]
+        if len(values) > 2 and any(
+            not isinstance(v, ast.Name | ast.Constant | ast.Attribute) for v in values[1:-1]
+        ):
+            raise self.function.error(node, "a chained comparison evaluates its middle once; give it a name")
+        parts = []
+        for left, op, right in zip(values, node.ops, values[1:], strict=False):
+            if type(op) not in _COMPARE:
+                raise self.function.error(node, f"the comparison {type(op).__name__} is not in the subset")
+            parts.append(self._compared(left, _COMPARE[type(op)], right))
+        return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
+
+    def _present(self, node: ast.Compare) -> Text:
+        """``x is None``: an argument that is there is a number, so this is known here."""
+        other = node.comparators[0]
+        if len(node.ops) > 1 or not (isinstance(other, ast.Constant) and other.value is None):
+            raise self.function.error(node, "an identity other than that with None")
+        self.emit(node.left)
+        return ("true" if isinstance(node.ops[0], ast.IsNot) else "false"), "bool"
+
+    def _compared(self, left: ast.expr, sign: str, right: ast.expr) -> str:
+        (a, first), (b, second) = self.emit(left), self.emit(right)
+        if (first, second) == ("int", "int"):
+            return f"{a} {sign} {b}"
+        return f"{self.as_float(left)} {sign} {self.as_float(right)}"
+
+    def _IfExp(self, node: ast.IfExp) -> Text:
+        (yes, a), (no, b) = self.emit(node.body), self.emit(node.orelse)
+        if a != b:
+            raise self.function.error(node, f"one branch is a {a}, the other a {b}")
+        return f"(({self.condition(node.test)}) ? {yes} : {no})", a
+
+    def _Call(self, node: ast.Call) -> Text:
+        callee, texts = self.called(node)
+        if callee is None:
+            return texts[0], "float" if texts[1] == "float" else ("int" if texts[1] == "int" else "bool")
+        if callee.returns is None or len(callee.returns) != 1:
+            raise self.function.error(node, f"{callee.name} returns no single value")
+        return f"{self.prefix}{callee.name}({', '.join(texts)})", callee.returns[0]
+
+    def called(self, node: ast.Call) -> tuple[Function | None, list[str]]:
+        """The function called and the texts of its arguments; None with text and kind for one built in."""
+        if node.keywords:
+            raise self.function.error(node, "arguments by name are not in the subset")
+        built_in = self._built_in(node)
+        if built_in is not None:
+            return None, list(built_in)
+        scope, target = self.function.scope, node.func
+        value = scope.get(target.id) if isinstance(target, ast.Name) else None
+        if isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
+            value = getattr(scope.get(target.value.id), target.attr, None)
+        if not hasattr(value, "py_func"):
+            raise self.function.error(node, f"{ast.unparse(target)} is no compiled function")
+        emitted = [self.emit(argument) for argument in node.args]
+        callee = self.call(value, [kind for _, kind in emitted], node, self.function)
+        return callee, [bare(text) for text, _ in emitted]
+
+    def _built_in(self, node: ast.Call) -> tuple[str, str] | None:
+        target = node.func
+        if isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
+            if self.function.scope.get(target.value.id) is not math:
+                return None
+            return self._math(node, target.attr)
+        name = target.id if isinstance(target, ast.Name) else ""
+        if name in self.function.scope or name not in ("abs", "min", "max", "int", "float"):
+            return None
+        emitted = [self.emit(argument) for argument in node.args]
+        texts, kinds = [text for text, _ in emitted], {kind for _, kind in emitted}
+        if kinds - {"int", "float"}:
+            raise self.function.error(node, f"{name} of what is no number")
+        kind = "int" if kinds == {"int"} else "float"
+        if name in ("int", "float"):
+            return f"(({'int' if name == 'int' else 'double'}){texts[0]})", name
+        if name == "abs":
+            return f"{'abs' if kind == 'int' else 'fabs'}({bare(texts[0])})", kind
+        if len(texts) != 2:
+            raise self.function.error(node, f"{name} of {len(texts)} numbers; two are in the subset")
+        suffix = "_int" if kind == "int" else ""
+        if kind == "float":
+            texts = [self.as_float(argument) for argument in node.args]
+        return f"{self.prefix}{name}{suffix}({bare(texts[0])}, {bare(texts[1])})", kind
+
+    def _math(self, node: ast.Call, name: str) -> tuple[str, str]:
+        texts = ", ".join(bare(self.as_float(argument)) for argument in node.args)
+        if (
+            name == "floor"
+        ):  # a whole number in Python; adding 0 turns -0 into 0 as the way through integers does
+            return f"(floor({texts}) + 0.0)", "float"
+        if name in _TESTS:
+            return f"({name}({texts}) != 0)", "bool"
+        if name not in _MATH:
+            raise self.function.error(node, f"math.{name} is not in the subset")
+        return f"{name}({texts})", "float"
+
+
+def widened(text: str, kind: Kind) -> str:
+    """A number in floating-point arithmetic: C would convert it by itself, here it is seen."""
+    return f"((double){text})" if kind == "int" else text
+
+
+def bare(text: str) -> str:
+    """Text without the parentheses that enclose all of it."""
+    if not (text.startswith("(") and text.endswith(")")):
+        return text
+    depth = 0
+    for place, character in enumerate(text):
+        depth += {"(": 1, ")": -1}.get(character, 0)
+        if depth == 0 and place < len(text) - 1:
+            return text
+    return text[1:-1]

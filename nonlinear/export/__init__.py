@@ -1,0 +1,10 @@
+"""The running drive outside of Python: C99, FMU and WebAssembly, all from the one emitted program.
+
+Nothing here computes: `nonlinear.emit` translates `nonlinear._kernels`, and the files of this folder put
+names, units, parameters and interfaces around it.
+"""
+
+from nonlinear.export.c_files import c_export
+from nonlinear.export.fmu import PLATFORMS, fmu_bytes
+
+__all__ = ["PLATFORMS", "c_export", "fmu_bytes"]

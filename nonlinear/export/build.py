@@ -1,0 +1,86 @@
+"""A C compiler for the exported files: gcc or clang of the machine, or the one that comes with ziglang."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from actuator_lti.errors import InputError
+from nonlinear.export.portable_executable import without_time
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
+ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
+
+
+def system_compiler() -> str | None:
+    """Path of the machine's C compiler: ``CC``, else gcc, clang, cc; None where there is none."""
+    wanted = os.environ.get("CC")
+    names = (wanted,) if wanted else ("gcc", "clang", "cc")
+    return next((found for name in names if name and (found := shutil.which(name))), None)
+
+
+def zig_command() -> list[str] | None:
+    """How to call the C compiler of ziglang; None where it is not installed."""
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    return [sys.executable, "-m", "ziglang", "cc"]
+
+
+def compiler_for(target: str) -> list[str]:
+    """Command and target flags of a compiler for ``linux64``, ``win64`` or ``wasm``.
+
+    Raises
+    ------
+    InputError
+        Where this machine has none; says which package brings one.
+    """
+    native = sys.platform == "linux" and os.uname().machine == "x86_64"
+    found = system_compiler()
+    if target == "linux64" and native and found:
+        return [found]
+    zig = zig_command()
+    if zig is None:
+        wanted = "gcc or clang, or " if target == "linux64" else ""
+        raise InputError(f"no C compiler for {target}; allowed: {wanted}pip install 'actuator-lti[export]'")
+    return [*zig, "-target", ZIG_TARGETS[target]]
+
+
+def compile_files(
+    texts: Mapping[str, str],
+    output: str,
+    target: str,
+    extra: Sequence[str] = (),
+    *,
+    libraries: Sequence[str] = ("-lm",),
+    command: Sequence[str] | None = None,
+) -> bytes:
+    """Compile C files given as text; returns the bytes of ``output``.
+
+    Raises
+    ------
+    InputError
+        Where there is no compiler, or it fails; with the first line that it says.
+    """
+    chosen = list(command or compiler_for(target))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in texts.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        sources = sorted(file for file in texts if file.endswith(".c"))
+        # relative names: the bytes do not depend on where the folder lies
+        call = [*chosen, *FLAGS, *extra, *sources, "-o", output, *libraries]
+        try:
+            done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False, timeout=600)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise InputError(f"the C compiler cannot be run: {error}", where=chosen[0]) from error
+        if done.returncode != 0:
+            said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+            raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
+        data = (folder / output).read_bytes()
+    return without_time(data) if output.endswith(".dll") else data

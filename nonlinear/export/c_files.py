@@ -1,0 +1,168 @@
+"""`actuator-lti export c`: header, source, the design's parameters, an example and a README."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.call import parameters
+from nonlinear.emit.kinds import c_float
+from nonlinear.export.program import header_text, single, source_hash, source_text, template
+from nonlinear.export.rows import place_words
+from nonlinear.parameters import design_row
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportedDesign:
+    """What an export knows of a design.
+
+    Attributes
+    ----------
+    row : ndarray, shape (layout.SIZE,)
+        Parameters of a run: the design at rest, its hinge moment an input.
+    p_size, s_size : int
+        Lengths of the rows of parameters and state.
+    """
+
+    design: Design
+    row: Floats
+    p_size: int
+    s_size: int
+
+
+def exported(design: Design) -> ExportedDesign:
+    """The row of a design whose hinge moment comes from outside, and the lengths that it needs."""
+    row = design_row(design)
+    row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
+    p, s = parameters(row)
+    return ExportedDesign(design=design, row=row, p_size=p.size, s_size=s.size)
+
+
+def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str]:
+    """Files of an export, by name.
+
+    Parameters
+    ----------
+    design : Design
+    single_precision : bool
+        ``float`` in place of ``double``.
+
+    Raises
+    ------
+    InputError
+        For a design with noise in single precision: its random streams need 53 bits.
+    """
+    instruments = design.instruments
+    noisy = any(
+        (instruments.current_noise_A, instruments.angle_noise_rad, instruments.output_angle_noise_rad)
+    )
+    if single_precision and (noisy or instruments.jitter_s):
+        message = "instruments: noise and jitter need double precision; allowed: none of them, or no --single"
+        raise InputError(message, where=design.origin or design.name)
+    ours = exported(design)
+    texts = {
+        "drive.h": header_text(),
+        "drive.c": source_text(),
+        "drive_design.h": _design_header(ours),
+        "drive_design.c": _design_source(ours),
+    }
+    if single_precision:
+        texts = {name: single(text) for name, text in texts.items()}
+    main = template("main.c").replace("@REAL@", "float" if single_precision else "double")
+    return {**texts, "main.c": main, "README.md": readme_text(ours, single_precision)}
+
+
+def stage_words(design: Design) -> tuple[str, str]:
+    """What the command of the outermost stage is, and its unit."""
+    linear = design.axis == "linear"
+    table = {
+        "position": ("output angle" if not linear else "output position", "m" if linear else "rad"),
+        "velocity": ("output speed", "m/s" if linear else "rad/s"),
+        "current": ("motor current", "A"),
+        "voltage": ("motor voltage", "V"),
+    }
+    return table[design.controller.outermost]
+
+
+def _design_header(ours: ExportedDesign) -> str:
+    return f"""/*
+ * Parameters of the design {_plain(ours.design.name)}.
+ */
+#ifndef DRIVE_DESIGN_H
+#define DRIVE_DESIGN_H
+
+#include "drive.h"
+
+enum {{
+    DRIVE_P_LENGTH = {ours.p_size}, /* of the row p of this design */
+    DRIVE_S_LENGTH = {ours.s_size} /* of the row s of this design */
+}};
+
+/* Copies the parameters of the design into p, DRIVE_P_LENGTH numbers; the derived ones become 0. */
+void drive_load_design(double *p);
+
+#endif
+"""
+
+
+def _design_source(ours: ExportedDesign) -> str:
+    """The initialiser: every place of the row with its name, unit and words."""
+    known = place_words()
+    lines = []
+    for place, value in enumerate(ours.row):
+        if value != 0.0 or place < at.COMMAND:  # signals, probes and chains only where they are set
+            lines.append(f"    p[{place}] = {c_float(float(value))}; /* {_plain(known[place])} */")
+    body = "\n".join(lines)
+    return f"""/*
+ * Parameters of the design {_plain(ours.design.name)}, SI, motor side.
+ * {_plain(ours.design.title)}
+ */
+#include "drive_design.h"
+
+#include <math.h>
+
+void drive_load_design(double *p)
+{{
+    for (int j = 0; j < DRIVE_P_LENGTH; j += 1) {{
+        p[j] = 0.0;
+    }}
+{body}
+}}
+"""
+
+
+def _plain(text: str) -> str:
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("\n", " ")
+
+
+def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
+    """The README of an export."""
+    design, row = ours.design, ours.row
+    what, unit = stage_words(design)
+    number = 4 if single_precision else 8
+    values = {
+        "NAME": design.name,
+        "TITLE": design.title,
+        "PRECISION": "single (float)" if single_precision else "double",
+        "COMMAND": f"{what}, {unit}",
+        "PERIOD": f"{row[at.PERIOD]:g}",
+        "EVENTS": f"{int(row[at.MAX_EVENTS])}",
+        "SEGMENTS": "2" if row[at.DELAY_FRACTION] > 0.0 else "1",
+        "P": str(ours.p_size),
+        "S": str(ours.s_size),
+        "IO": str(at.IO_SIZE),
+        "BYTES": str(number * (ours.p_size + ours.s_size + at.IO_SIZE)),
+        "HASH": source_hash(),
+        "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
+    }
+    text = template("README.md")
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", value)
+    return text

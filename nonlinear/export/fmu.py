@@ -1,0 +1,213 @@
+"""`actuator-lti export fmu`: the drive as a co-simulation unit, sources and binaries in one file."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import uuid
+import zipfile
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear.emit.kinds import c_float
+from nonlinear.export.build import compile_files
+from nonlinear.export.c_files import c_export
+from nonlinear.export.model_description import MODEL, build_description, description
+from nonlinear.export.program import template
+from nonlinear.export.trace import KeyTrace, trace_keys
+from nonlinear.export.variables import (
+    FIRST_CONSTANT,
+    FIRST_KEY,
+    FIRST_TEXT,
+    Variable,
+    flag_bits,
+    key_low,
+    supply_voltage,
+    texts_of,
+    variables_of,
+)
+
+Version = Literal[2, 3]
+PLATFORMS = ("linux64", "win64")
+_FOLDERS = {
+    2: {"linux64": "linux64", "win64": "win64"},
+    3: {"linux64": "x86_64-linux", "win64": "x86_64-windows"},
+}
+_SUFFIX = {"linux64": "so", "win64": "dll"}
+_SHARED = {
+    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden"),
+    "win64": ("-shared", "-fvisibility=hidden"),
+}
+
+
+def fmu_bytes(
+    design: Design,
+    version: Version = 2,
+    platforms: Sequence[str] = PLATFORMS,
+    *,
+    documents: Mapping[str, bytes] | None = None,
+    tool: str = "actuator-lti",
+) -> bytes:
+    """The unit as one file; the same input gives the same bytes with the same compilers.
+
+    Parameters
+    ----------
+    design : Design
+    version : {2, 3}
+        Of FMI.
+    platforms : sequence of {"linux64", "win64"}
+        Binaries to compile; ziglang's compiler is needed for those of another system.
+    documents : mapping of str to bytes
+        Files of the documentation folder, by name.
+    tool : str
+        Name and version for the model description.
+
+    Raises
+    ------
+    InputError
+        For an unknown version or platform, or without a compiler.
+    """
+    if version not in (2, 3):
+        raise InputError(f"fmi = {version}: allowed: 2 or 3")
+    for platform in platforms:
+        if platform not in PLATFORMS:
+            raise InputError(f"platform = {platform!r}: allowed: {', '.join(PLATFORMS)}")
+    trace = trace_keys(design)
+    variables = variables_of(design, trace)
+    texts = _sources(design, trace, version)
+    names = [name for name in texts if name.endswith(".c")]
+    files = {
+        "modelDescription.xml": description(design, variables, _token(texts, variables), version, names, tool)
+    }
+    texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", _token(texts, variables))
+    for platform in platforms:
+        library = f"{MODEL}.{_SUFFIX[platform]}"
+        place = f"binaries/{_FOLDERS[version][platform]}/{library}"
+        files[place] = compile_files(texts, library, platform, _SHARED[platform])
+    files |= {f"sources/{name}": text.encode() for name, text in texts.items()}
+    if version == 3:
+        files["sources/buildDescription.xml"] = build_description(names)
+    files |= {f"documentation/{name}": data for name, data in (documents or {}).items()}
+    return _zipped(files)
+
+
+def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
+    texts = c_export(design)
+    bits = ", ".join(str(bit) for bit in flag_bits())
+    return {
+        "drive.h": texts["drive.h"],
+        "drive.c": texts["drive.c"],
+        "drive_design.h": texts["drive_design.h"],
+        "drive_design.c": texts["drive_design.c"],
+        "fmu_design.h": _design_header(design, trace),
+        "fmu_design.c": _design_source(design, trace),
+        "fmu_core.h": template("fmu_core.h"),
+        "fmu_core.c": template("fmu_core.c").replace("@BITS@", bits),
+        f"fmi{version}.c": template(f"fmi{version}.c"),
+    }
+
+
+def _token(texts: Mapping[str, str], variables: Sequence[Variable]) -> str:
+    """An identifier that another program or other variables change."""
+    digest = hashlib.sha256("".join([*texts.values(), repr(variables)]).encode())
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
+
+
+def _design_header(design: Design, trace: KeyTrace) -> str:
+    return f"""/*
+ * Keys of the design as parameters of the unit.
+ */
+#ifndef FMU_DESIGN_H
+#define FMU_DESIGN_H
+
+#define FMU_TOKEN "@TOKEN@"
+#define FMU_KEYS {len(trace.keys)}U
+#define FMU_CONSTANTS {len(trace.constants)}U
+#define FMU_TEXTS {len(texts_of(design))}U
+#define FMU_FIRST_KEY {FIRST_KEY}U
+#define FMU_FIRST_CONSTANT {FIRST_CONSTANT}U
+#define FMU_FIRST_TEXT {FIRST_TEXT}U
+#define FMU_SUPPLY_VOLTAGE {c_float(supply_voltage(design))}
+
+typedef struct {{
+    double value; /* of the design, SI */
+    double low; /* allowed, both inclusive */
+    double high;
+    int fixed; /* 1: only before the run */
+}} fmu_key;
+
+extern const fmu_key fmu_keys[FMU_KEYS + 1U];
+extern const double fmu_constants[FMU_CONSTANTS + 1U];
+extern const char *const fmu_texts[FMU_TEXTS + 1U];
+
+/* Works out the parameters p from the keys; 0 where they ask for another structure than the exported one. */
+int fmu_set_keys(const double *k, double *p);
+
+#endif
+"""
+
+
+def _design_source(design: Design, trace: KeyTrace) -> str:
+    keys = "\n".join(
+        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}}},"
+        f" /* {key.path} */"
+        for key in trace.keys
+    )
+    constants = "\n".join(f"    {c_float(_finite(key.value))}, /* {key.path} */" for key in trace.constants)
+    texts = "\n".join(f"    {_literal(value)}, /* {path} */" for path, value, _ in texts_of(design))
+    lines = "\n".join(f"    {line}" for line in trace.lines)
+    return f"""/*
+ * Keys of the design as parameters of the unit, and how the drive's parameters follow from them.
+ */
+#include "fmu_design.h"
+
+#include <math.h>
+#include <stddef.h>
+
+const fmu_key fmu_keys[FMU_KEYS + 1U] = {{
+{keys}
+    {{0.0, 0.0, 0.0, 0}}
+}};
+
+const double fmu_constants[FMU_CONSTANTS + 1U] = {{
+{constants}
+    0.0
+}};
+
+const char *const fmu_texts[FMU_TEXTS + 1U] = {{
+{texts}
+    NULL
+}};
+
+int fmu_set_keys(const double *k, double *p)
+{{
+{lines}
+    return 1;
+}}
+"""
+
+
+def _finite(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+def _literal(text: str) -> str:
+    """A C string in ASCII; other characters as octal escapes of their UTF-8."""
+    plain = "".join(
+        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode()
+    )
+    return f'"{plain}"'
+
+
+def _zipped(files: Mapping[str, bytes]) -> bytes:
+    held = io.BytesIO()
+    with zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(entry, data)
+    return held.getvalue()

@@ -1,0 +1,191 @@
+"""``modelDescription.xml`` of FMI 2.0 and 3.0 from one list of variables."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+
+from actuator_lti.design.model import Design
+from actuator_lti.design.units import parse_unit
+from nonlinear.export.variables import FIRST_FLAG, INITIAL_ANGLE, Variable
+
+TIME = 0  # value reference of the independent variable (FMI 3.0)
+MODEL = "drive"  # name of the library and of its source folder
+_BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A", "[angle]": "rad",
+         "[temperature]": "K", "[celsius]": "K"}  # fmt: skip
+
+
+def description(
+    design: Design, variables: Sequence[Variable], token: str, version: int, sources: Sequence[str], tool: str
+) -> bytes:
+    """The model description.
+
+    Parameters
+    ----------
+    design : Design
+    variables : sequence of Variable
+    token : str
+        GUID, instantiation token.
+    version : {2, 3}
+    sources : sequence of str
+        C files of the sources folder (FMI 2.0; FMI 3.0 has a build description of its own).
+    tool : str
+        Name and version of the tool.
+    """
+    root = (_root_2 if version == 2 else _root_3)(design, token, sources, tool)
+    root.append(_units(variables, version))
+    log = ET.SubElement(root, "LogCategories")
+    ET.SubElement(log, "Category", name="logStatusError", description="reasons of errors")
+    period = repr(design.controller.period_s)
+    ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=period)
+    (_variables_2 if version == 2 else _variables_3)(root, variables)
+    ET.indent(root)
+    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text
+
+
+def _attributes(design: Design, tool: str) -> dict[str, str]:
+    return {
+        "modelName": design.name,
+        "description": design.title,
+        "version": design.revision or "1",
+        "generationTool": tool,
+        "variableNamingConvention": "structured",
+    }
+
+
+def _root_2(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
+    root = ET.Element(
+        "fmiModelDescription", {"fmiVersion": "2.0", "guid": token, **_attributes(design, tool)}
+    )
+    simulation = ET.SubElement(
+        root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUstate="true", canSerializeFMUstate="true", canNotUseMemoryManagementFunctions="true",
+    )  # fmt: skip
+    files = ET.SubElement(simulation, "SourceFiles")
+    for name in sources:
+        ET.SubElement(files, "File", name=name)
+    return root
+
+
+def _root_3(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
+    root = ET.Element(
+        "fmiModelDescription", {"fmiVersion": "3.0", "instantiationToken": token, **_attributes(design, tool)}
+    )
+    ET.SubElement(
+        root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUState="true", canSerializeFMUState="true",
+        fixedInternalStepSize=repr(design.controller.period_s),
+    )  # fmt: skip
+    return root
+
+
+def _units(variables: Sequence[Variable], version: int) -> ET.Element:
+    names = sorted({item.unit for item in variables if item.unit != "1"} | ({"s"} if version == 3 else set()))
+    definitions = ET.Element("UnitDefinitions")
+    for name in names:
+        unit = ET.SubElement(definitions, "Unit", name=name)
+        found = parse_unit(name)
+        powers = {_BASE[part]: str(power) for part, power in found.dimension}
+        if found.factor != 1.0:
+            powers["factor"] = repr(found.factor)
+        if "celsius" in str(found.dimension):
+            powers["offset"] = "273.15"
+        ET.SubElement(unit, "BaseUnit", powers)
+    return definitions
+
+
+def _bounds(item: Variable) -> dict[str, str]:
+    found = {}
+    if item.unit != "1":
+        found["unit"] = item.unit
+    if item.low > -math.inf:
+        found["min"] = repr(float(item.low))
+    if item.high < math.inf:
+        found["max"] = repr(float(item.high))
+    return found
+
+
+def _initial(item: Variable) -> dict[str, str]:
+    if item.causality == "input":
+        return {}
+    return {"initial": "exact" if item.start is not None else "calculated"}
+
+
+def _start(item: Variable) -> dict[str, str]:
+    if item.start is None:
+        return {}
+    return {"start": item.start if isinstance(item.start, str) else repr(float(item.start))}
+
+
+def _common(item: Variable) -> dict[str, str]:
+    return {
+        "name": item.name,
+        "valueReference": str(item.reference),
+        "description": item.description,
+        "causality": item.causality,
+        "variability": item.variability,
+        **_initial(item),
+    }
+
+
+def _variables_2(root: ET.Element, variables: Sequence[Variable]) -> None:
+    types = {"real": "Real", "boolean": "Boolean", "string": "String"}
+    listed = ET.SubElement(root, "ModelVariables")
+    for item in variables:
+        scalar = ET.SubElement(listed, "ScalarVariable", _common(item))
+        bounds = _bounds(item) if item.kind == "real" else {}
+        ET.SubElement(scalar, types[item.kind], {**bounds, **_start(item)})
+    structure = ET.SubElement(root, "ModelStructure")
+    index = {item.reference: n + 1 for n, item in enumerate(variables)}
+    outputs = [item for item in variables if item.causality == "output"]
+    for name in ("Outputs", "InitialUnknowns"):
+        part = ET.SubElement(structure, name)
+        for item in outputs:
+            known = _known(item) if name == "InitialUnknowns" else []
+            text = " ".join(str(index[reference]) for reference in known)
+            ET.SubElement(part, "Unknown", index=str(index[item.reference]), dependencies=text)
+
+
+def _known(item: Variable) -> list[int]:
+    """What an output's value at the start depends on: the angles on the start angle."""
+    return [INITIAL_ANGLE] if item.name in ("output.angle", "motor.angle") else []
+
+
+def _variables_3(root: ET.Element, variables: Sequence[Variable]) -> None:
+    types = {"real": "Float64", "boolean": "Boolean", "string": "String"}
+    listed = ET.SubElement(root, "ModelVariables")
+    ET.SubElement(
+        listed, "Float64", name="time", valueReference=str(TIME), causality="independent",
+        variability="continuous", unit="s", description="simulation time",
+    )  # fmt: skip
+    for item in variables:
+        if item.kind == "string":
+            element = ET.SubElement(listed, "String", _common(item))
+            ET.SubElement(element, "Start", value=str(item.start))
+        else:
+            bounds = _bounds(item) if item.kind == "real" else {}
+            ET.SubElement(listed, types[item.kind], {**_common(item), **bounds, **_start(item)})
+    structure = ET.SubElement(root, "ModelStructure")
+    outputs = [item for item in variables if item.causality == "output"]
+    for name in ("Output", "InitialUnknown"):
+        for item in outputs:
+            known = _known(item) if name == "InitialUnknown" else []
+            text = " ".join(str(reference) for reference in known)
+            ET.SubElement(structure, name, valueReference=str(item.reference), dependencies=text)
+
+
+def build_description(sources: Sequence[str]) -> bytes:
+    """``sources/buildDescription.xml`` of FMI 3.0."""
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    build = ET.SubElement(root, "BuildConfiguration", modelIdentifier=MODEL)
+    files = ET.SubElement(build, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off")
+    for name in sources:
+        ET.SubElement(files, "SourceFile", name=name)
+    ET.indent(root)
+    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text
+
+
+__all__ = ["FIRST_FLAG", "MODEL", "build_description", "description"]

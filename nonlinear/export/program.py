@@ -1,0 +1,147 @@
+"""The emitted program as two files, ``drive.h`` and ``drive.c``: the same for every design."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from functools import cache
+from importlib.resources import files
+
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.control import control_tick
+from nonlinear._kernels.motion import put_load
+from nonlinear._kernels.prepare import prepare_sizes
+from nonlinear._kernels.tick import get, init, set_state, tick
+from nonlinear.emit import Program, emit_c
+from nonlinear.emit.kinds import FUNCTIONS, Kind
+from nonlinear.export.entries import derive
+from nonlinear.export.rows import names_of, parameter_names, words
+
+_ROW: Kind = "row"
+ENTRIES: dict[object, tuple[Kind, ...]] = {
+    prepare_sizes: (_ROW,),
+    derive: (_ROW, _ROW),
+    init: (_ROW, _ROW),
+    tick: (_ROW, _ROW, _ROW),
+    control_tick: (_ROW, _ROW, _ROW),
+    put_load: (_ROW, _ROW, "float", "float"),
+    get: (_ROW, _ROW, _ROW),
+    set_state: (_ROW, _ROW, _ROW),
+}
+_MINMAX = {
+    "min": "static inline double drive_min(double a, double b) { return (b < a) ? b : a; }",
+    "max": "static inline double drive_max(double a, double b) { return (b > a) ? b : a; }",
+    "min_int": "static inline int drive_min_int(int a, int b) { return (b < a) ? b : a; }",
+    "max_int": "static inline int drive_max_int(int a, int b) { return (b > a) ? b : a; }",
+}
+STATUS = {
+    "OK": "went well",
+    "TOO_MANY_EVENTS": "more than MAX_EVENTS landings and breakaways in one segment of a tick",
+    "NOT_FINITE": "the speed is not finite any more",
+    "NO_ROOT": "no time was found for a zero crossing of the speed",
+}
+_ABOUT = {
+    "prepare_sizes": "Works out the lengths: call it first, after every change of a count or a delay.",
+    "derive": "Derives all that does not change with time; call it after every change of p.",
+    "init": "State at the first tick, from the start values in p.",
+    "tick": "Sense, control and move by one period; returns a status.  Inputs io[DRIVE_IN_...] are held.",
+    "control_tick": "The controller alone, on measured current, speed and angle in io; returns the voltage.",
+    "put_load": "Notes hinge moment and motor torque; needed only after a change of friction between ticks.",
+    "get": "Copies the state out, p[DRIVE_STATE_SIZE] numbers.",
+    "set_state": "Copies a state in.",
+}
+
+
+@cache
+def program() -> Program:
+    """The emitted program."""
+    return emit_c(ENTRIES)
+
+
+def template(name: str) -> str:
+    """Text of a file of the templates folder."""
+    return files("nonlinear.export").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@cache
+def header_text() -> str:
+    """``drive.h``: lengths, places in the rows with units and words, prototypes."""
+    groups = (
+        ("Parameters p: of a run, then what drive_derive derives from them", parameter_names()),
+        ("Derived parameters that a program may want", [(n, getattr(at, n)) for n in _DERIVED]),
+        ("State s", names_of(0, at.S_NOISE, "S_")),
+        ("Inputs of a tick, in io", names_of(0, at.IN_PROBE, "IN_")),
+        ("Outputs of a tick, in io: what was at its beginning", _outputs()),
+        ("Status", [(name, getattr(at, name)) for name in STATUS]),
+    )
+    blocks = "\n".join(_enum(title, items) for title, items in groups)
+    flags = ", ".join(f"{bit} {name}" for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True))
+    heads = "\n".join(f"/* {_ABOUT[name]} */\n{text}" for name, text in program().declarations.items())
+    sizes = f"enum {{\n    DRIVE_RUN_SIZE = {at.SIZE}, /* parameters of a run */\n"
+    sizes += f"    DRIVE_IO_LENGTH = {at.IO_SIZE}\n}};"
+    return template("drive.h").replace("@BLOCKS@", blocks).replace("@FUNCTIONS@", heads).replace(
+        "@SIZES@", sizes).replace("@FLAGS@", f"{flags}, {at.FLAG_STICK} at rest")  # fmt: skip
+
+
+_DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE")
+
+
+def _outputs() -> list[tuple[str, int]]:
+    return [(n, v) for n, v in names_of(at.IO_REFERENCE, at.IO_SIZE, "IO_") if n != "IO_SIZE"]
+
+
+def _enum(title: str, items: list[tuple[str, int]]) -> str:
+    lines = [f"/* {title} */", "enum {"]
+    for name, value in items:
+        said = STATUS.get(name, words().get(name, ""))
+        end = "," if (name, value) != items[-1] else ""
+        lines.append(f"    DRIVE_{name} = {value}{end}" + (f" /* {_plain(said)} */" if said else ""))
+    return "\n".join([*lines, "};", ""])
+
+
+def _plain(text: str) -> str:
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
+@cache
+def source_text() -> str:
+    """``drive.c``: constants, helpers, types, functions."""
+    emitted = program()
+    body = emitted.functions
+    parts = [
+        '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n',
+        emitted.constants_text(words()),
+        "",
+        *helpers_of(body),
+        "",
+        emitted.types,
+        "",
+        body,
+    ]
+    return template("drive_head.c") + "\n".join(parts)
+
+
+def helpers_of(body: str) -> list[str]:
+    """Minimum and maximum as Python has them, those that a program calls."""
+    return [text for name, text in _MINMAX.items() if f"drive_{name}(" in body]
+
+
+def source_hash() -> str:
+    """SHA-256 of header and source."""
+    return hashlib.sha256((header_text() + source_text()).encode()).hexdigest()
+
+
+_NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)(?![\w.])")
+_SAME = {"abs", "isfinite", "isnan", "isinf"}  # type-generic, or of whole numbers
+_CALLS = re.compile(rf"\b({'|'.join(sorted({*FUNCTIONS.split()} - _SAME, key=len, reverse=True))})\(")
+_COMMENT = re.compile(r"(/\*.*?\*/)", re.DOTALL)
+
+
+def single(text: str) -> str:
+    """The same source in single precision: types, literals and functions of the C library."""
+    parts = _COMMENT.split(text)
+    for k in range(0, len(parts), 2):  # comments stay
+        code = parts[k].replace("(double)", "(float)")
+        code = re.sub(r"\bdouble\b", "float", code)
+        parts[k] = _CALLS.sub(r"\1f(", _NUMBER.sub(r"\1f", code))
+    return "".join(parts)

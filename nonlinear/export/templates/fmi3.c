@@ -1,0 +1,354 @@
+/*
+ * The functions of FMI 3.0 for co-simulation, over the drive of fmu_core.c.
+ */
+#include "fmu_core.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifdef _WIN32
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+typedef void *fmi3Instance;
+typedef void *fmi3InstanceEnvironment;
+typedef void *fmi3FMUState;
+typedef uint32_t fmi3ValueReference;
+typedef double fmi3Float64;
+typedef bool fmi3Boolean;
+typedef const char *fmi3String;
+typedef uint8_t fmi3Byte;
+typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
+typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
+
+typedef struct {
+    unit_state state;
+    fmi3LogMessageCallback logger;
+    fmi3InstanceEnvironment environment;
+} unit;
+
+static fmi3Status say(const unit *m, fmi3Status status, const char *text)
+{
+    if (m->logger != NULL) {
+        m->logger(m->environment, status, "logStatusError", text);
+    }
+    return status;
+}
+
+EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+
+EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[])
+{
+    (void)c;
+    (void)on;
+    (void)n;
+    (void)names;
+    return fmi3OK;
+}
+
+EXPORT fmi3Instance fmi3InstantiateCoSimulation(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
+    fmi3Boolean events, fmi3Boolean early, const fmi3ValueReference required[], size_t count,
+    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger, void *intermediate)
+{
+    unit *m;
+
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    (void)events;
+    (void)early;
+    (void)required;
+    (void)count;
+    (void)intermediate;
+    if ((name == NULL) || (name[0] == '\0') || (token == NULL) || (strcmp(token, FMU_TOKEN) != 0)) {
+        if (logger != NULL) {
+            logger(environment, fmi3Error, "logStatusError", "wrong name or instantiation token");
+        }
+        return NULL;
+    }
+    m = (unit *)calloc(1U, sizeof(unit));
+    if (m != NULL) {
+        m->logger = logger;
+        m->environment = environment;
+        unit_reset(&m->state);
+    }
+    return m;
+}
+
+EXPORT fmi3Instance fmi3InstantiateModelExchange(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
+    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger)
+{
+    (void)name;
+    (void)token;
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    (void)environment;
+    (void)logger;
+    return NULL;
+}
+
+EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
+    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
+    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger, void *clock, void *lock, void *unlock)
+{
+    (void)name;
+    (void)token;
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    (void)environment;
+    (void)logger;
+    (void)clock;
+    (void)lock;
+    (void)unlock;
+    return NULL;
+}
+
+EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
+
+EXPORT fmi3Status fmi3EnterInitializationMode(
+    fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean ends, fmi3Float64 stop)
+{
+    unit *m = (unit *)c;
+    (void)tolerant;
+    (void)tolerance;
+    (void)ends;
+    (void)stop;
+    if (!isfinite(start)) {
+        return say(m, fmi3Error, "the start time is not finite");
+    }
+    m->state.start = start;
+    return fmi3OK;
+}
+
+/* Outputs may be asked for before the initialisation ends: the start is worked out then. */
+static fmi3Status ready(unit *m)
+{
+    const int result = ((m->state.phase == 0) ? unit_begin(&m->state) : UNIT_OK);
+    return (result == UNIT_OK) ? fmi3OK : say(m, fmi3Error, unit_message(result));
+}
+
+EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
+{
+    unit *m = (unit *)c;
+    const fmi3Status status = ready(m);
+    m->state.phase = 1;
+    return status;
+}
+
+EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
+{
+    (void)c;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3Reset(fmi3Instance c)
+{
+    unit_reset(&((unit *)c)->state);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetFloat64(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t count)
+{
+    unit *m = (unit *)c;
+    if ((count < n) || (ready(m) != fmi3OK)) {
+        return fmi3Error;
+    }
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (unit_get_real(&m->state, vr[j], &value[j]) == 0) {
+            return say(m, fmi3Error, "there is no such variable");
+        }
+    }
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetFloat64(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[], size_t count)
+{
+    unit *m = (unit *)c;
+    if (count < n) {
+        return fmi3Error;
+    }
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (unit_set_real(&m->state, vr[j], value[j]) == 0) {
+            return say(m, fmi3Error, "no such input or parameter, not now, or a value that is not allowed");
+        }
+    }
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetBoolean(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Boolean value[], size_t count)
+{
+    unit *m = (unit *)c;
+    for (size_t j = 0U; (j < n) && (j < count); j += 1U) {
+        int found = 0;
+        if (unit_get_boolean(&m->state, vr[j], &found) == 0) {
+            return say(m, fmi3Error, "there is no such Boolean variable");
+        }
+        value[j] = (found != 0);
+    }
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetString(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String value[], size_t count)
+{
+    for (size_t j = 0U; (j < n) && (j < count); j += 1U) {
+        value[j] = unit_get_string(vr[j]);
+        if (value[j] == NULL) {
+            return say((unit *)c, fmi3Error, "there is no such string variable");
+        }
+    }
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
+{
+    if (*state == NULL) {
+        *state = calloc(1U, sizeof(unit_state));
+    }
+    if (*state == NULL) {
+        return say((unit *)c, fmi3Error, "no memory");
+    }
+    *(unit_state *)*state = ((unit *)c)->state;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
+{
+    ((unit *)c)->state = *(unit_state *)state;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
+{
+    (void)c;
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
+{
+    (void)c;
+    (void)state;
+    *size = sizeof(unit_state);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
+{
+    if (size < sizeof(unit_state)) {
+        return say((unit *)c, fmi3Error, "too few bytes for the state");
+    }
+    (void)memcpy(bytes, state, sizeof(unit_state));
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
+{
+    if (size != sizeof(unit_state)) {
+        return say((unit *)c, fmi3Error, "this is no state of this unit");
+    }
+    if (*state == NULL) {
+        *state = calloc(1U, sizeof(unit_state));
+    }
+    if (*state == NULL) {
+        return say((unit *)c, fmi3Error, "no memory");
+    }
+    (void)memcpy(*state, bytes, size);
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c)
+{
+    (void)c;
+    return fmi3OK;
+}
+
+EXPORT fmi3Status fmi3DoStep(
+    fmi3Instance c, fmi3Float64 now, fmi3Float64 step, fmi3Boolean final, fmi3Boolean *event,
+    fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last)
+{
+    unit *m = (unit *)c;
+    int result = UNIT_TIME;
+    (void)final;
+    *event = false;
+    *terminate = false;
+    *early = false;
+    if (step >= 0.0) {
+        result = unit_advance(&m->state, now + step);
+    }
+    *last = (result == UNIT_OK) ? (now + step) : now;
+    return (result == UNIT_OK) ? fmi3OK : say(m, fmi3Error, unit_message(result));
+}
+
+/* What this unit does not have: the caller is told so by fmi3Error. */
+#define ABSENT(name) \
+    EXPORT fmi3Status name(fmi3Instance c); \
+    EXPORT fmi3Status name(fmi3Instance c) { return say((unit *)c, fmi3Error, #name " is not supported"); }
+
+ABSENT(fmi3GetFloat32)
+ABSENT(fmi3GetInt8)
+ABSENT(fmi3GetUInt8)
+ABSENT(fmi3GetInt16)
+ABSENT(fmi3GetUInt16)
+ABSENT(fmi3GetInt32)
+ABSENT(fmi3GetUInt32)
+ABSENT(fmi3GetInt64)
+ABSENT(fmi3GetUInt64)
+ABSENT(fmi3GetBinary)
+ABSENT(fmi3GetClock)
+ABSENT(fmi3SetFloat32)
+ABSENT(fmi3SetInt8)
+ABSENT(fmi3SetUInt8)
+ABSENT(fmi3SetInt16)
+ABSENT(fmi3SetUInt16)
+ABSENT(fmi3SetInt32)
+ABSENT(fmi3SetUInt32)
+ABSENT(fmi3SetInt64)
+ABSENT(fmi3SetUInt64)
+ABSENT(fmi3SetBoolean)
+ABSENT(fmi3SetString)
+ABSENT(fmi3SetBinary)
+ABSENT(fmi3SetClock)
+ABSENT(fmi3GetNumberOfVariableDependencies)
+ABSENT(fmi3GetVariableDependencies)
+ABSENT(fmi3GetDirectionalDerivative)
+ABSENT(fmi3GetAdjointDerivative)
+ABSENT(fmi3EnterConfigurationMode)
+ABSENT(fmi3ExitConfigurationMode)
+ABSENT(fmi3EnterEventMode)
+ABSENT(fmi3GetIntervalDecimal)
+ABSENT(fmi3GetIntervalFraction)
+ABSENT(fmi3GetShiftDecimal)
+ABSENT(fmi3GetShiftFraction)
+ABSENT(fmi3SetIntervalDecimal)
+ABSENT(fmi3SetIntervalFraction)
+ABSENT(fmi3SetShiftDecimal)
+ABSENT(fmi3SetShiftFraction)
+ABSENT(fmi3EvaluateDiscreteStates)
+ABSENT(fmi3UpdateDiscreteStates)
+ABSENT(fmi3EnterContinuousTimeMode)
+ABSENT(fmi3CompletedIntegratorStep)
+ABSENT(fmi3SetTime)
+ABSENT(fmi3SetContinuousStates)
+ABSENT(fmi3GetContinuousStateDerivatives)
+ABSENT(fmi3GetEventIndicators)
+ABSENT(fmi3GetContinuousStates)
+ABSENT(fmi3GetNominalsOfContinuousStates)
+ABSENT(fmi3GetNumberOfEventIndicators)
+ABSENT(fmi3GetNumberOfContinuousStates)
+ABSENT(fmi3GetOutputDerivatives)
+ABSENT(fmi3ActivateModelPartition)

@@ -1,0 +1,232 @@
+"""How the row of a run follows from the keys of its design, found by running `design_row` on traced values.
+
+Arithmetic on a traced value is written down as C.  Where the program looks at one (a comparison, a floor),
+the outcome is written down as a condition: other values that meet all conditions give the same program.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.access import located, parameter_value, paths_of, stacked
+from actuator_lti.design.field import Structure
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout as at
+from nonlinear.emit.kinds import c_float as c_number
+from nonlinear.parameters import design_row
+
+
+class NotTraceable(TypeError):
+    """A value went into a function that the trace does not know."""
+
+
+@dataclass
+class Tape:
+    """Statements in the order in which they were made."""
+
+    lines: list[str] = field(default_factory=list)
+    count: int = 0
+
+    def value(self, text: str, number: float) -> Traced:
+        """A new intermediate value."""
+        self.count += 1
+        name = f"v{self.count}"
+        self.lines.append(f"const double {name} = {text};")
+        return Traced(self, name, number)
+
+    def condition(self, text: str, outcome: bool) -> bool:
+        """Note what was found of a value."""
+        self.lines.append(f"if ({'!' if outcome else ''}({text})) {{ return 0; }}")
+        return outcome
+
+
+def _text(value: Any) -> str:
+    return value.name if isinstance(value, Traced) else c_number(float(value))
+
+
+def _number(value: Any) -> float:
+    return value.number if isinstance(value, Traced) else float(value)
+
+
+def _binary(sign: str, function: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
+    def forward(self: Traced, other: Any) -> Traced:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # numpy goes over its elements
+        return self.tape.value(f"{self.name} {sign} {_text(other)}", function(self.number, _number(other)))
+
+    def backward(self: Traced, other: Any) -> Traced:
+        return self.tape.value(f"{_text(other)} {sign} {self.name}", function(_number(other), self.number))
+
+    return forward, backward
+
+
+def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
+    def compare(self: Traced, other: Any) -> bool:
+        if not isinstance(other, int | float | Traced):
+            return False
+        return self.tape.condition(
+            f"{self.name} {sign} {_text(other)}", function(self.number, _number(other))
+        )
+
+    return compare
+
+
+def _function(name: str) -> Any:
+    def function(self: Traced) -> Traced:
+        return self.tape.value(f"{name}({self.name})", getattr(math, name)(self.number))
+
+    return function
+
+
+def _rounded(name: str) -> Any:
+    def rounded(self: Traced) -> Any:
+        found = np.float64(getattr(math, name)(self.number))
+        self.tape.condition(f"{name}({self.name}) == {c_number(float(found))}", True)
+        return found
+
+    return rounded
+
+
+class Traced:
+    """A number that remembers how it was made."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, tape: Tape, name: str, number: float) -> None:
+        self.tape, self.name, self.number = tape, name, number
+
+    __add__, __radd__ = _binary("+", operator.add)
+    __sub__, __rsub__ = _binary("-", operator.sub)
+    __mul__, __rmul__ = _binary("*", operator.mul)
+    __truediv__, __rtruediv__ = _binary("/", operator.truediv)
+    __lt__, __le__ = _compared("<", operator.lt), _compared("<=", operator.le)
+    __gt__, __ge__ = _compared(">", operator.gt), _compared(">=", operator.ge)
+    __eq__, __ne__ = _compared("==", operator.eq), _compared("!=", operator.ne)
+    floor, ceil = _rounded("floor"), _rounded("ceil")  # numpy asks by these names
+    __floor__, __ceil__ = floor, ceil
+    tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
+
+    def __pow__(self, power: Any) -> Traced:
+        return self.tape.value(f"pow({self.name}, {_text(power)})", self.number ** _number(power))
+
+    def __mod__(self, other: Any) -> Traced:
+        raise NotTraceable("a remainder")
+
+    def __neg__(self) -> Traced:
+        return self.tape.value(f"-{self.name}", -self.number)
+
+    def __abs__(self) -> Traced:
+        return self.tape.value(f"fabs({self.name})", abs(self.number))
+
+    def __bool__(self) -> bool:
+        return self.tape.condition(f"{self.name} != 0.0", self.number != 0.0)
+
+    def __float__(self) -> float:
+        raise NotTraceable("a function of a floating-point number")
+
+    __int__ = __float__
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One numeric key of a design as a parameter.
+
+    Attributes
+    ----------
+    path : str
+        Dotted path.
+    value, low, high : float
+        SI; ``low_open`` makes the lower bound exclusive.
+    unit : str
+        SI unit; ``"1"``: none.
+    fixed : bool
+        Only before the run begins, because the state's shape or clock depends on it.
+    """
+
+    path: str
+    value: float
+    unit: str
+    description: str
+    low: float
+    high: float
+    low_open: bool
+    fixed: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyTrace:
+    """Keys that can be changed after the export, the rest, and the C statements from keys to the row."""
+
+    keys: tuple[Key, ...]
+    constants: tuple[Key, ...]
+    lines: tuple[str, ...]
+
+
+# what decides the clock, the shape of the state or its start: not to be changed during a run
+_FIXED = {
+    at.PERIOD, at.EVERY_VELOCITY, at.EVERY_POSITION, at.DELAY_TICKS, at.DELAY_FRACTION, at.RATIO,
+    at.DIFFERENCE_SAMPLES, at.PROFILE_SAMPLES, at.COUNTS_PER_RAD, at.POSITION_COUNTS, at.SEED,
+}  # fmt: skip
+_INPUTS = ("limits.voltage",)  # an input of the drive
+
+
+def trace_keys(design: Design) -> KeyTrace:
+    """Follow every numeric key of a design into its row."""
+    free: list[Key] = []
+    constants: list[Key] = []
+    for path in paths_of(design):
+        key = _key(design, path)
+        reached = None if path in _INPUTS else _reached(design, path)
+        if reached:
+            free.append(Key(**{**vars(key), "fixed": bool(reached & _FIXED)}))
+        else:
+            constants.append(key)
+    tape = Tape()
+    values = {key.path: Traced(tape, f"k[{n}]", key.value) for n, key in enumerate(free)}
+    row = design_row(stacked(design, values), kind=object)
+    lines = [*tape.lines]
+    lines += [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
+    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=_used(lines))
+
+
+def _used(lines: list[str]) -> tuple[str, ...]:
+    """Statements without the values that nothing asks for."""
+    kept: list[str] = []
+    wanted: set[str] = set()
+    for line in reversed(lines):
+        made = re.match(r"const double (v\d+) = ", line)
+        if made and made[1] not in wanted:
+            continue
+        wanted |= set(re.findall(r"\bv\d+\b", line))
+        kept.append(line)
+    return tuple(reversed(kept))
+
+
+def _reached(design: Design, path: str) -> set[int] | None:
+    """Places of the row that a key has an influence on; None where it cannot be followed."""
+    traced = Traced(Tape(), "k", parameter_value(design, path))
+    try:
+        row: Any = design_row(stacked(design, {path: traced}), kind=object)
+    except TypeError:
+        return None
+    return {int(place) for place in np.arange(row.size) if isinstance(row[place], Traced)}
+
+
+def _key(design: Design, path: str) -> Key:
+    known, _ = located(design, path)
+    return Key(
+        path=path,
+        value=parameter_value(design, path),
+        unit=known.unit(Structure.of(design)),
+        description=known.description,
+        low=known.low,
+        high=known.high,
+        low_open=known.low_open,
+    )

@@ -1,0 +1,178 @@
+"""The variables of a co-simulation unit: inputs, outputs, parameters, constants, with all that FMI asks."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from actuator_lti.design.field import BIG
+from actuator_lti.design.fields import fields_in
+from actuator_lti.design.model import Design
+from actuator_lti.design.sections import parts_of
+from nonlinear._kernels import layout as at
+from nonlinear.export.c_files import stage_words
+from nonlinear.export.trace import Key, KeyTrace
+
+COMMAND, MOMENT, SUPPLY = 1, 2, 3
+FIRST_OUTPUT, FIRST_FLAG, INITIAL_ANGLE = 10, 30, 90
+FIRST_KEY, FIRST_CONSTANT, FIRST_TEXT = 100, 1000, 2000
+
+Causality = Literal["input", "output", "parameter", "local", "independent"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """One variable; ``start`` is None where it is calculated, ``unit`` ``"1"`` where there is none."""
+
+    name: str
+    reference: int
+    causality: Causality
+    variability: str
+    description: str
+    kind: Literal["real", "boolean", "string"] = "real"
+    unit: str = "1"
+    start: float | str | None = None
+    low: float = -math.inf
+    high: float = math.inf
+
+
+def variables_of(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
+    """All variables of a design's unit, in the order of the model description."""
+    return (*_inputs(design), *_outputs(design), *_flags(), *_parameters(design, trace), *_texts(design))
+
+
+def supply_voltage(design: Design) -> float:
+    """Start value of the supply: the design's limit, or more than any drive has where there is none."""
+    return min(design.limits.voltage_V, BIG)
+
+
+def _units(design: Design) -> tuple[str, str]:
+    return ("m", "N") if design.axis == "linear" else ("rad", "N*m")
+
+
+def _inputs(design: Design) -> tuple[Variable, ...]:
+    words, unit = stage_words(design)
+    _, torque = _units(design)
+    texts = (
+        ("command", words, unit, 0.0, -math.inf),
+        (
+            "hinge_moment",
+            "moment of the load on the output shaft, beside that of the design",
+            torque,
+            0.0,
+            -math.inf,
+        ),
+        ("supply_voltage", "limits.voltage of the design, from outside", "V", supply_voltage(design), 0.0),
+    )
+    return tuple(
+        Variable(name=name, reference=COMMAND + n, causality="input", variability="continuous",
+                 description=f"{text}; held over a tick", unit=unit, start=start, low=low)
+        for n, (name, text, unit, start, low) in enumerate(texts)
+    )  # fmt: skip
+
+
+def _outputs(design: Design) -> tuple[Variable, ...]:
+    angle, torque = _units(design)
+    texts = (
+        ("output.angle", "output position" if angle == "m" else "output angle", angle),
+        ("output.rate", "rate of the output", f"{angle}/s"),
+        ("motor.current", "motor current", "A"),
+        ("motor.voltage", "voltage commanded at the last tick", "V"),
+        ("motor.torque", "torque of the motor", torque),
+        ("motor.angle", "angle of the motor", angle),
+        ("motor.speed", "speed of the motor", f"{angle}/s"),
+        ("control.current_command", "current command of the last tick", "A"),
+        ("control.speed_command", "speed command of the last tick", f"{angle}/s"),
+    )
+    return tuple(
+        Variable(name=name, reference=FIRST_OUTPUT + n, causality="output", variability="continuous",
+                 description=text, unit=unit)
+        for n, (name, text, unit) in enumerate(texts)
+    )  # fmt: skip
+
+
+def _flags() -> tuple[Variable, ...]:
+    names = [
+        (f"limiter.{name.replace('-', '_')}", f"the {name} limit acted at the last tick")
+        for name in at.LIMITERS
+    ]
+    names.append(("at_rest", "the rotor was held by friction at the last tick"))
+    return tuple(
+        Variable(name=name, reference=FIRST_FLAG + n, causality="output", variability="discrete",
+                 description=text, kind="boolean")
+        for n, (name, text) in enumerate(names)
+    )  # fmt: skip
+
+
+def flag_bits() -> tuple[int, ...]:
+    """Bit of each Boolean output, in order."""
+    return (*at.LIMITER_BITS, at.FLAG_STICK)
+
+
+def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
+    angle, _ = _units(design)
+    start = Variable(
+        name="initial.angle", reference=INITIAL_ANGLE, causality="parameter", variability="fixed",
+        description="output angle at the start, everything at rest", unit=angle, start=0.0,
+    )  # fmt: skip
+    ours = [
+        _of_key(key, FIRST_KEY + n, "parameter", "fixed" if key.fixed else "tunable")
+        for n, key in enumerate(trace.keys)
+    ]
+    rest = [_of_key(key, FIRST_CONSTANT + n, "local", "constant") for n, key in enumerate(trace.constants)]
+    return (start, *ours, *rest)
+
+
+def _of_key(key: Key, reference: int, causality: Causality, variability: str) -> Variable:
+    return Variable(
+        name=structured(key.path), reference=reference, causality=causality, variability=variability,
+        description=key.description, unit=key.unit, start=key.value, low=key_low(key), high=key.high,
+    )  # fmt: skip
+
+
+def key_low(key: Key) -> float:
+    """The lowest value that is allowed."""
+    return math.nextafter(key.low, math.inf) if key.low_open else key.low
+
+
+def structured(path: str) -> str:
+    """A dotted path in FMI's structured naming: numbers as indices, other names quoted.
+
+    Examples
+    --------
+    >>> structured("control.velocity.filter.1.depth")
+    'control.velocity.filter[1].depth'
+    """
+    indexed = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path)
+    parts = [
+        part if re.fullmatch(r"[A-Za-z_]\w*(\[\d+\])?", part) else _quoted(part)
+        for part in indexed.split(".")
+    ]
+    return ".".join(parts)
+
+
+def _quoted(name: str) -> str:
+    return "'" + re.sub(r"[^A-Za-z0-9_ !#$%&()*+,\-/:;<>=?@\[\]^{}|~]", "_", name) + "'"
+
+
+def texts_of(design: Design) -> tuple[tuple[str, str, str], ...]:
+    """Keys that are no numbers: path, value, description."""
+    about = (("design.name", design.name, "short name"), ("design.title", design.title, "title"),
+             ("design.axis", design.axis, "rotary or linear"))  # fmt: skip
+    found = [
+        (f"{path}.{field.key}", str(getattr(part, field.attribute)), field.description)
+        for section, path, part in parts_of(design)
+        for field in fields_in(section.template)
+        if field.kind in ("choice", "flag")
+    ]
+    return (*about, *found)
+
+
+def _texts(design: Design) -> tuple[Variable, ...]:
+    return tuple(
+        Variable(name=structured(path), reference=FIRST_TEXT + n, causality="local", variability="constant",
+                 description=f"{text} (decided at the export)", kind="string", start=value)
+        for n, (path, value, text) in enumerate(texts_of(design))
+    )  # fmt: skip

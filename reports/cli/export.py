@@ -1,0 +1,77 @@
+"""`actuator-lti export`: the running drive as C99 or as an FMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument
+from reports.cli.targets import folder_for_results
+
+app = typer.Typer(help="The running drive outside of Python: C99 or FMU.", no_args_is_help=True)
+
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
+
+
+@app.command("c")
+def c(
+    design: DesignArgument = DEFAULT_DESIGN,
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="DIR", help="Folder for the files.", callback=folder_for_results),
+    ] = Path("drive-c"),
+    single: Annotated[bool, typer.Option("--single", help="float in place of double.")] = False,
+    force: ForceOption = False,
+) -> None:
+    """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
+    from actuator_lti.atomic import write_together
+    from actuator_lti.design import load_design
+    from nonlinear.export import c_export
+    from reports.cli.output import print_line
+    from reports.cli.targets import refuse_existing
+
+    texts = c_export(load_design(design), single_precision=single)
+    for name in texts:
+        refuse_existing(out / name, force)
+    write_together({out / name: text.encode() for name, text in texts.items()})
+    print_line(f"{out}: {', '.join(texts)}")
+
+
+@app.command("fmu")
+def fmu(
+    design: DesignArgument = DEFAULT_DESIGN,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write; default NAME.fmu.")
+    ] = None,
+    version: Annotated[int, typer.Option("--fmi", metavar="2|3", help="Version of FMI.")] = 2,
+    platform: Annotated[
+        list[str] | None,
+        typer.Option("--platform", metavar="NAME", help="linux64 or win64, may be repeated; default both."),
+    ] = None,
+    plain: Annotated[bool, typer.Option("--plain", help="Without the margin report inside.")] = False,
+    force: ForceOption = False,
+) -> None:
+    """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
+    from actuator_lti.atomic import write_bytes
+    from actuator_lti.design import load_design
+    from nonlinear.export import PLATFORMS, fmu_bytes
+    from reports.cli.output import print_line
+    from reports.cli.targets import refuse_existing
+    from reports.export_documents import export_documents
+    from reports.provenance import package_version
+
+    drive = load_design(design)
+    target = out or Path(f"{drive.name}.fmu")
+    refuse_existing(target, force)
+    platforms = tuple(dict.fromkeys(platform or PLATFORMS))
+    data = fmu_bytes(
+        drive,
+        version,  # type: ignore[arg-type]
+        platforms,
+        documents={} if plain else export_documents(drive),
+        tool=f"actuator-lti {package_version()}",
+    )
+    write_bytes(target, data)
+    print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")

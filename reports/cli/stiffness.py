@@ -1,0 +1,99 @@
+"""`actuator-lti stiffness`: how far a moment pushes the output, powered and unpowered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports.cli.drive import SetOption, load_drive
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
+
+if TYPE_CHECKING:
+    from analyses.stiffness import Stiffness
+
+
+def stiffness(
+    design: DesignArgument = DEFAULT_DESIGN, changes: SetOption = None, as_json: JsonOption = False
+) -> None:
+    """Print dynamic and static stiffness and lost motion, checked by an injected moment.
+
+    The exit status is 1 where the simulator does not confirm the linear stiffness.
+    """
+    from analyses.stiffness import stiffness as analyse
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
+
+    found = analyse(load_drive(design, changes))
+    if as_json:
+        print_json(_json(found))
+    else:
+        for line in _lines(found):
+            print_line(line)
+    leave_with(found.agrees)
+
+
+def _known(value: float | None) -> float | None:
+    from math import isfinite
+
+    return None if value is None or not isfinite(value) else float(value)
+
+
+def _json(found: Stiffness) -> dict[str, Any]:
+    """Everything for a machine; null where a stiffness is infinite."""
+    import numpy as np
+
+    lost = found.lost_motion
+    return {
+        "design": found.design.name,
+        "unit": "N/m" if found.design.axis == "linear" else "N*m/rad",
+        "agrees": found.agrees,
+        "curves": [
+            {
+                "state": curve.state,
+                "static": _known(curve.static_Nm_rad),
+                "frequency_hz": curve.frequency_hz.tolist(),
+                "size": [_known(x) for x in np.abs(curve.stiffness_Nm_rad)],
+                "phase_deg": [_known(x) for x in np.angle(curve.stiffness_Nm_rad, deg=True)],
+            }
+            for curve in found.curves
+        ],
+        "lost_motion": None
+        if lost is None
+        else {
+            "play": lost.play_rad,
+            "foreseen": lost.foreseen_rad,
+            "simulated": lost.seen_rad,
+        },
+        "checks": [
+            {
+                "frequency_hz": check.frequency_hz,
+                "foreseen": abs(check.foreseen_Nm_rad),
+                "simulated": abs(check.seen_Nm_rad),
+                "relative_difference": check.difference,
+            }
+            for check in found.checks
+        ],
+    }
+
+
+def _lines(found: Stiffness) -> list[str]:
+    """The same for people."""
+    from reports.sections.stiffness import STATES
+
+    unit = "N/m" if found.design.axis == "linear" else "N m/rad"
+    angle = "m" if found.design.axis == "linear" else "rad"
+    lines = [f"{found.design.name}: stiffness at the output, {unit}"]
+    for curve in found.curves:
+        least, at = curve.least
+        lines.append(
+            f"  {STATES[curve.state]:<28} static {curve.static_Nm_rad:.6g}, least {least:.6g} at {at:.4g} Hz"
+        )
+    lost = found.lost_motion
+    if lost is not None:
+        seen = "" if lost.seen_rad is None else f", simulated {lost.seen_rad:.4g} {angle}"
+        lines.append(f"  play {lost.play_rad:.4g} {angle}; lost motion {lost.foreseen_rad:.4g} {angle}{seen}")
+    for check in found.checks:
+        lines.append(
+            f"  at {check.frequency_hz:.4g} Hz: {abs(check.foreseen_Nm_rad):.6g}, simulated "
+            f"{abs(check.seen_Nm_rad):.6g} (relative difference {check.difference:.1e})"
+        )
+    return lines

@@ -1,0 +1,27 @@
+"""Dynamic stiffness over frequency: magnitude and phase in every state of the drive.
+
+Data: ``frequency_hz``; ``series`` of ``label``, ``size``, ``phase_deg``; ``unit``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reports.figures import style
+from reports.figures.style import Chart
+
+
+def draw(data: dict[str, Any]) -> Chart:
+    """Draw the two panels."""
+    chart = Chart(width=style.WIDE, height=420.0)
+    top, bottom = chart.column(1.2, 1.0)
+    f = data["frequency_hz"]
+    for k, series in enumerate(data["series"]):
+        top.curve(f, series["size"], series["label"], **style.series(k))
+        bottom.curve(f, series["phase_deg"], series["label"], **style.series(k))
+    top.y.log, top.y.label = True, f"stiffness, {data['unit']}"
+    bottom.y.label = "phase, deg"
+    top.x.log = True
+    style.frequency(bottom, f)
+    style.phase_axis(bottom, [y for s in data["series"] for y in s["phase_deg"]])
+    return chart

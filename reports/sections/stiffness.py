@@ -1,0 +1,151 @@
+"""Stiffness at the output: how far a moment pushes it, powered and unpowered, and what play takes away."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.large_signal import load_unit, output_unit
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.stiffness import Check, Stiffness, StiffnessCurve
+
+STATES = {
+    "powered": "powered, command held",
+    "shorted": "unpowered, winding shorted",
+    "open": "unpowered, winding open",
+}
+
+
+def of_design(design: Design) -> dict[str, Any]:
+    """Make the section of a report from the linear loops alone."""
+    from analyses.stiffness import stiffness
+
+    return section(stiffness(design, simulated=False))
+
+
+def section(result: Stiffness) -> dict[str, Any]:
+    """Make the section from `analyses.stiffness.stiffness`."""
+    unit = f"{load_unit(result.design)}/{'m' if result.design.axis == 'linear' else 'rad'}"
+    blocks = [*_figure(result, unit), _table(result, unit)]
+    if result.lost_motion is not None:
+        blocks.append(_lost_motion(result))
+    if result.checks:
+        blocks.append(_checks(result, unit))
+    intro = (
+        "Moment on the output over its deflection, the command held: the inverse of the linear response "
+        "from the moment to the output. Friction slides; dry friction and play are not in the curves."
+    )
+    status = "pass" if result.agrees else "fail"
+    return doc.section(
+        "stiffness",
+        "Stiffness",
+        blocks,
+        result=_result(result, unit),
+        intro=intro,
+        **({"status": status} if result.checks else {}),
+    )
+
+
+def _result(result: Stiffness, unit: str) -> str:
+    """Say the static stiffness and where the drive is weakest."""
+    powered = result.curves[0]
+    if not np.isfinite(powered.stiffness_Nm_rad).any():
+        return "A moment does not move the output of this drive."
+    least, at = powered.least
+    static = powered.static_Nm_rad
+    words = f"{static:.4g} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
+    return f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz."
+
+
+def _figure(result: Stiffness, unit: str) -> list[dict[str, Any]]:
+    shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
+    if not shown:
+        return []
+    data = {
+        "frequency_hz": rounded(shown[0].frequency_hz),
+        "series": [
+            {
+                "label": STATES[curve.state],
+                "size": rounded(np.abs(curve.stiffness_Nm_rad)),
+                "phase_deg": rounded(np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad)))),
+            }
+            for curve in shown
+        ],
+        "unit": unit,
+    }
+    caption = "Dynamic stiffness of the output, powered and unpowered."
+    return [doc.figure("stiffness", data, caption=caption, alt=f"Two panels. {caption}")]
+
+
+def _table(result: Stiffness, unit: str) -> dict[str, Any]:
+    columns = [
+        doc.column("state", "State"),
+        doc.column("static", "Static", unit, format="sig:4"),
+        doc.column("least", "Least", unit, format="sig:4"),
+        doc.column("at", "at", "Hz", format="sig:4"),
+    ]
+    rows = [_row(curve) for curve in result.curves]
+    note = "No static value: the output comes back to its place, or does not move at all."
+    return doc.table("Stiffness by state", columns, rows, note)
+
+
+def _row(curve: StiffnessCurve) -> dict[str, Any]:
+    least, at = curve.least
+    moves = math.isfinite(least)
+    return {
+        "state": STATES[curve.state],
+        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else None,
+        "least": least if moves else None,
+        "at": at if moves else None,
+    }
+
+
+def _lost_motion(result: Stiffness) -> dict[str, Any]:
+    scale, unit = output_unit(result.design)
+    lost = result.lost_motion
+    assert lost is not None
+    columns = [
+        doc.column("what", "What"),
+        doc.column("foreseen", "Foreseen", unit, format="sig:4"),
+        doc.column("seen", "Simulated", unit, format="sig:4"),
+    ]
+    seen = None if lost.seen_rad is None else scale * lost.seen_rad
+    rows = [
+        {"what": "play", "foreseen": scale * lost.play_rad, "seen": None},
+        {"what": "lost motion", "foreseen": scale * lost.foreseen_rad, "seen": seen},
+    ]
+    note = (
+        "Lost motion: how far the output stays apart after a slow moment to either side has gone, the motor "
+        "held: the play and the twist that the load's dry friction holds."
+    )
+    return doc.table("Lost motion at the output", columns, rows, note)
+
+
+def _checks(result: Stiffness, unit: str) -> dict[str, Any]:
+    columns = [
+        doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"),
+        doc.column("foreseen", "Foreseen", unit, format="sig:6"),
+        doc.column("seen", "Simulated", unit, format="sig:6"),
+        doc.column("difference", "Relative difference", format="sig:2"),
+    ]
+    note = (
+        "A small moment injected in the simulator, without play, quantisation, dry friction or friction by "
+        "load: foreseen here is the linear stiffness of that drive, without the friction by load "
+        "that the curves have."
+    )
+    return doc.table("Injected moment", columns, [_check_row(check) for check in result.checks], note)
+
+
+def _check_row(check: Check) -> dict[str, Any]:
+    return {
+        "frequency_hz": check.frequency_hz,
+        "foreseen": abs(check.foreseen_Nm_rad),
+        "seen": abs(check.seen_Nm_rad),
+        "difference": check.difference,
+    }

@@ -1,0 +1,111 @@
+"""Small compiled functions that use every construct of the subset, and some outside it."""
+
+import math
+from typing import Any
+
+import numba
+
+scalar: Any = numba.njit(error_model="numpy")  # not cached
+
+FIRST, SECOND, THIRD = range(3)
+GAIN = 1.0 / 3.0
+TABLE = (0.1, -2.5, 1e-300)
+
+
+@scalar
+def small(x, limit):  # type: ignore[no-untyped-def]
+    """Clamp."""
+    return min(max(x, -limit), limit)
+
+
+@scalar
+def pair(x, y):  # type: ignore[no-untyped-def]
+    """Two results, one a test."""
+    return x * y + GAIN, x > y
+
+
+@scalar
+def passed_on(x):  # type: ignore[no-untyped-def]
+    """Results of another function."""
+    return pair(x, x)
+
+
+@scalar
+def push(s, at, x):  # type: ignore[no-untyped-def]
+    """Write a row and return what was there."""
+    old = s[at]
+    s[at] = x
+    return old
+
+
+@scalar
+def everything(p, s, n):  # type: ignore[no-untyped-def]
+    """Each construct once."""
+    total, last = 0.0, -1
+    a, b = p[FIRST], p[SECOND]
+    a, b = b, a  # swapped at once
+    s[0] = s[1] = a
+    s[2], s[3] = b, s[0] + 1.0
+    for j in range(n):
+        if j == 2:
+            continue
+        total += p[j] * TABLE[j & 1]
+        if total > 1e6 and not (last > 2 and last < 4):
+            break
+        last = j
+    k = 0
+    while k < n:
+        k += 1
+        x, larger = pair(a, float(k))
+        if larger or 0.0 < x < 1.0:
+            total = total - x
+        elif x != x:
+            total = -total
+        else:
+            total = total / (1.0 + abs(x))
+    y, _flag = passed_on(total)
+    old = push(s, THIRD, small(y, 10.0))
+    floor = math.floor(p[0] * 10.0) / 10.0
+    bits = ((n << 2) | 1) + int((n + 2) / 3)
+    wave = math.sin(a) + math.exp(-abs(b)) + math.atan2(a, 1.0 + b * b) + math.sqrt(abs(a)) + math.pi
+    return total + old + floor + float(bits) + wave if n > 1 else -total - old + min(n, 2) * wave
+
+
+@scalar
+def power(x):  # type: ignore[no-untyped-def]
+    """Outside the subset."""
+    return x**2
+
+
+@scalar
+def two_types(x):  # type: ignore[no-untyped-def]
+    """One variable, two types."""
+    y = 0
+    y = x + 1.0
+    return 2.0 * y
+
+
+@scalar
+def open_order(s):  # type: ignore[no-untyped-def]
+    """A look into a row beside a call that writes it."""
+    return s[0] + push(s, 0, 1.0)
+
+
+@scalar
+def twice(s):  # type: ignore[no-untyped-def]
+    """Two writers in one expression."""
+    return push(s, 0, 1.0) - push(s, 0, 2.0)
+
+
+@scalar
+def truth(x):  # type: ignore[no-untyped-def]
+    """A float as a condition."""
+    if x:
+        return 1.0
+    return 2.0
+
+
+@scalar
+def sliced(s):  # type: ignore[no-untyped-def]
+    """A slice."""
+    s[0:2] = 1.0

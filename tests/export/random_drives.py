@@ -1,0 +1,180 @@
+"""Random drives with every feature of the running model, and random inputs for them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from actuator_lti import load_design
+from actuator_lti.design.model import (
+    Command,
+    Design,
+    Encoder,
+    Filter,
+    Gravity,
+    Instruments,
+    OutputEncoder,
+    Supply,
+)
+
+Rng = np.random.Generator
+
+
+def scaled(rng: Rng, value: float) -> float:
+    """A value within a factor of three."""
+    return float(value * 3.0 ** rng.uniform(-1.0, 1.0))
+
+
+def maybe(rng: Rng, value: Any, other: Any, share: float = 0.5) -> Any:
+    """One of two values."""
+    return value if rng.random() < share else other
+
+
+def random_drive(rng: Rng) -> Design:
+    """A drive near a shipped one with any of the features."""
+    design = load_design("ilr33-amber")
+    motor = design.motor
+    assert motor.resistance_ohm is not None
+    assert motor.inductance_H is not None
+    return replace(
+        design,
+        motor=replace(
+            motor,
+            resistance_ohm=scaled(rng, motor.resistance_ohm),
+            inductance_H=scaled(rng, motor.inductance_H),
+            rotor_inertia_kgm2=scaled(rng, motor.rotor_inertia_kgm2),
+        ),
+        controller=_controller(rng, design),
+        friction=replace(
+            design.friction,
+            law=maybe(rng, "coulomb", "tanh", 0.75),
+            dry_torque_Nm=scaled(rng, design.friction.dry_torque_Nm),
+            dry_torque_reverse_Nm=maybe(rng, scaled(rng, design.friction.dry_torque_Nm), None),
+            breakaway_ratio=maybe(rng, 1.0 + rng.random(), 1.0),
+            smoothing_speed_rad_s=scaled(rng, 5.0),
+            offset_torque_Nm=maybe(rng, 2e-4, 0.0),
+        ),
+        load=replace(
+            design.load,
+            path=maybe(rng, "back-drivable", "self-locking"),
+            moment_slope_Nm_rad=maybe(rng, -4.0, 0.0),
+            gravity=maybe(rng, Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None),
+        ),
+        encoder=_encoder(rng),
+        output_encoder=OutputEncoder(counts_per_rev=maybe(rng, 4096, None)),
+        command=_command(rng),
+        instruments=maybe(rng, Instruments(), _instruments(rng)),
+        supply=maybe(rng, None, _supply(rng)),
+        limits=_limits(rng, design),
+    )
+
+
+def _controller(rng: Rng, design: Design) -> Any:
+    c = design.controller
+    assert c.velocity is not None
+    assert c.current is not None
+    assert c.position is not None
+    every = int(rng.integers(1, 4))
+    windup = ("conditional", "clamped", "back-calculation")
+    return replace(
+        c,
+        computing_delay_s=c.period_s * maybe(rng, float(rng.uniform(0.0, 3.0)), float(rng.integers(0, 4))),
+        current=replace(
+            c.current,
+            gain_V_A=scaled(rng, c.current.gain_V_A),
+            anti_windup=windup[rng.integers(3)],
+            back_emf_feedforward=maybe(rng, 0.9, 0.0),
+            resistance_feedforward=maybe(rng, 0.5, 0.0),
+        ),
+        velocity=replace(
+            c.velocity,
+            gain=scaled(rng, c.velocity.gain),
+            every=every,
+            anti_windup=windup[rng.integers(3)],
+            filters=_filters(rng),
+        ),
+        position=replace(
+            c.position,
+            every=every * int(rng.integers(1, 4)),
+            gain=scaled(rng, c.position.gain),
+            sensor=maybe(rng, "output", "motor"),
+            integral_time_s=maybe(rng, 0.3, None),
+            derivative_time_s=maybe(rng, 1e-4, 0.0),
+            derivative_filter_s=1e-3,
+            feedforward=maybe(rng, 0.8, 0.0),
+            acceleration_feedforward=maybe(rng, 0.7, 0.0),
+            friction_feedforward=maybe(rng, 0.2, 0.0),
+        ),
+    )
+
+
+def _filters(rng: Rng) -> tuple[Filter, ...]:
+    known = (
+        Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
+        Filter(kind="lowpass", frequency_rad_s=3000.0, order=2, on="speed"),
+        Filter(kind="lowpass", frequency_rad_s=4000.0),
+        Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=2000.0),
+    )
+    return tuple(item for item in known if rng.random() < 0.4)
+
+
+def _encoder(rng: Rng) -> Encoder:
+    speed = ("ideal", "difference", "tracking")[rng.integers(3)]
+    return Encoder(
+        counts_per_rev=maybe(rng, 4096, None),
+        speed=speed,  # type: ignore[arg-type]
+        difference_samples=int(rng.integers(1, 5)),
+        filter_time_s=maybe(rng, 5e-4, 0.0),
+        bandwidth_rad_s=scaled(rng, 2000.0),
+    )
+
+
+def _command(rng: Rng) -> Command:
+    if rng.random() < 0.5:
+        return Command()
+    return Command(
+        filter_time_s=maybe(rng, 2e-3, 0.0),
+        filter_order=int(rng.integers(1, 3)),
+        rate_rad_s=scaled(rng, 2.0),
+        acceleration_rad_s2=scaled(rng, 60.0),
+        jerk_rad_s3=maybe(rng, scaled(rng, 9e3), inf),
+    )
+
+
+def _instruments(rng: Rng) -> Instruments:
+    return Instruments(
+        current_resolution_A=maybe(rng, 0.01, 0.0),
+        current_noise_A=maybe(rng, 0.02, 0.0),
+        angle_noise_rad=maybe(rng, 1e-4, 0.0),
+        output_angle_noise_rad=maybe(rng, 1e-6, 0.0),
+        jitter_s=maybe(rng, 1e-6, 0.0),
+        seed=int(rng.integers(2**31)),
+    )
+
+
+def _supply(rng: Rng) -> Supply:
+    return Supply(
+        resistance_ohm=scaled(rng, 0.05),
+        regenerative=maybe(rng, True, False),
+        capacitance_F=1e-3,
+        brake_voltage_V=maybe(rng, 14.0, None),
+    )
+
+
+def _limits(rng: Rng, design: Design) -> Any:
+    limits = replace(design.limits, voltage_V=scaled(rng, 12.0), speed_rad_s=maybe(rng, 600.0, inf))
+    if rng.random() < 0.5:
+        return limits
+    return replace(limits, continuous_current_A=4.0, peak_current_A=12.0, peak_time_s=1e-2)
+
+
+def random_inputs(rng: Rng, ticks: int, period_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Commands and hinge moments, one a tick: a sine with a step, and a slow one."""
+    t = np.arange(ticks) * period_s
+    command = scaled(rng, 0.1) * np.sin(2.0 * np.pi * scaled(rng, 5.0) * t) + maybe(rng, 0.05, 0.0) * (
+        t > 0.01
+    )
+    return command, scaled(rng, 2.0) * np.sin(2.0 * np.pi * scaled(rng, 2.0) * t + 1.0)

@@ -1,0 +1,189 @@
+"""The exported C is the simulator: the same bits in every row, no warning, one source for all designs."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_drives import random_drive, random_inputs
+from typer.testing import CliRunner
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Instruments
+from actuator_lti.errors import InputError
+from nonlinear import commands, loads, simulate
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.call import parameters
+from nonlinear._kernels.prepare import prepare_sizes
+from nonlinear._kernels.tick import get, init, set_state, tick
+from nonlinear.export import c_export
+from nonlinear.export.build import compile_files, system_compiler
+from nonlinear.export.c_files import exported
+from nonlinear.export.entries import derive
+from reports.cli.app import build
+
+STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
+needs_compiler = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
+
+
+def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
+    """The exported files as a library."""
+    sources = {name: text for name, text in texts.items() if name[-2:] in (".c", ".h") and name != "main.c"}
+    path = folder / "drive.so"
+    path.write_bytes(compile_files(sources, "drive.so", "linux64", (*STRICT, "-shared", "-fPIC")))
+    return ctypes.CDLL(str(path))
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    return opened(tmp_path_factory.mktemp("c"), c_export(load_design("ilr33-amber")))
+
+
+def pointer(row: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(row.ctypes.data)
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", range(40))
+def test_every_row_has_the_same_bits_in_random_drives(library: ctypes.CDLL, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ours = exported(random_drive(rng))
+    ticks = 300
+    command, moment = random_inputs(rng, ticks, float(ours.row[at.PERIOD]))
+    rows = []
+    for _ in range(2):
+        p, s = np.zeros(ours.p_size), np.zeros(ours.s_size)
+        p[: at.SIZE] = ours.row
+        rows.append((p, s, np.zeros(at.IO_SIZE)))
+    (p, s, io), (p_c, s_c, io_c) = rows
+    prepare_sizes(p)
+    derive(p, s)
+    init(p, s)
+    library.drive_prepare_sizes(pointer(p_c))
+    library.drive_derive(pointer(p_c), pointer(s_c))
+    library.drive_init(pointer(p_c), pointer(s_c))
+    assert p.tobytes() == p_c.tobytes()
+    for k in range(ticks):
+        io[at.IN_COMMAND] = io_c[at.IN_COMMAND] = command[k]
+        io[at.IN_LOAD] = io_c[at.IN_LOAD] = moment[k]
+        status = tick(p, s, io)
+        assert library.drive_tick(pointer(p_c), pointer(s_c), pointer(io_c)) == status == at.OK, k
+        assert s.tobytes() == s_c.tobytes(), k
+        assert io.tobytes() == io_c.tobytes(), k
+    assert np.abs(s[at.S_CURRENT]) > 0.0
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", [3, 17])
+def test_a_state_goes_on_elsewhere_with_the_same_bits(library: ctypes.CDLL, seed: int) -> None:
+    ours = exported(random_drive(np.random.default_rng(seed)))
+    p, s = parameters(ours.row)
+    io = np.zeros(at.IO_SIZE)
+    io[at.IN_COMMAND] = 0.05
+    for _ in range(100):
+        tick(p, s, io)
+    kept, there, back = np.zeros_like(s), np.zeros_like(s), np.zeros_like(s)
+    get(p, s, kept)
+    library.drive_set_state(pointer(p), pointer(there), pointer(kept))
+    other = io.copy()
+    for _ in range(100):
+        tick(p, s, io)
+        library.drive_tick(pointer(p), pointer(there), pointer(other))
+    library.drive_get(pointer(p), pointer(there), pointer(kept))
+    set_state(p, back, kept)
+    assert back.tobytes() == s.tobytes()
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position"])
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_the_example_builds_without_a_warning_and_is_the_simulator(
+    name: str, compiler: str, tmp_path: Path
+) -> None:
+    if shutil.which(compiler) is None:
+        pytest.skip(f"no {compiler} on this machine")
+    design = load_design(name)
+    texts = c_export(design)
+    ours = {file: text for file, text in texts.items() if file != "README.md"}
+    program = tmp_path / "drive"
+    program.write_bytes(compile_files(ours, "drive", "linux64", STRICT, command=[compiler]))
+    program.chmod(0o755)
+    done = subprocess.run([str(program), "400", "0.01"], capture_output=True, text=True, check=True)
+    table = np.array([[float(x) for x in line.split(",")] for line in done.stdout.splitlines()[1:]])
+    run = simulate(design, commands.step(0.01), 400 * design.controller.period_s, loads.constant(0.0))
+    assert np.array_equal(table[:, 1], run.output_angle_rad)
+    assert np.array_equal(table[:, 4], run.voltage_V)
+    assert np.array_equal(table[:, 5].astype(np.uint8), run.limit_flags)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position"])
+def test_single_precision_keeps_its_stated_error(name: str, tmp_path: Path) -> None:
+    design = load_design(name)
+    lib = opened(tmp_path, c_export(design, single_precision=True))
+    ours = exported(design)
+    p, s, io = (np.zeros(n, np.float32) for n in (ours.p_size, ours.s_size, at.IO_SIZE))
+    lib.drive_load_design(pointer(p))
+    lib.drive_prepare_sizes(pointer(p))
+    lib.drive_derive(pointer(p), pointer(s))
+    lib.drive_init(pointer(p), pointer(s))
+    P, S = parameters(ours.row)
+    IO = np.zeros(at.IO_SIZE)
+    period, full = design.controller.period_s, design.validation.full_deflection_rad
+    worst = 0.0
+    for k in range(round(1.0 / period)):
+        io[at.IN_COMMAND] = IO[at.IN_COMMAND] = 0.5 * full * np.sin(2.0 * np.pi * 2.0 * k * period)
+        assert lib.drive_tick(pointer(p), pointer(s), pointer(io)) == tick(P, S, IO) == at.OK
+        worst = max(worst, abs(float(io[at.IO_OUTPUT]) - IO[at.IO_OUTPUT]))
+    assert 0.0 < worst < 1e-3 * full  # the README of the export says so
+
+
+@pytest.mark.skipif(shutil.which("cppcheck") is None, reason="no cppcheck on this machine")
+def test_every_deviation_from_misra_is_listed(tmp_path: Path) -> None:
+    texts = c_export(load_design("ilr33-amber"))
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+    call = ["cppcheck", "--addon=misra", "--std=c99", "--enable=style", "drive.c", "drive_design.c"]
+    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = set(re.findall(r"misra-c2012-([0-9.]+)", done.stderr))
+    assert found  # the addon has run
+    listed = set(re.findall(r"\b[0-9]+\.[0-9]+\b", texts["README.md"].partition("## MISRA")[2]))
+    assert found <= listed
+    assert "error:" not in done.stderr
+
+
+def test_noise_is_refused_in_single_precision() -> None:
+    design = replace(load_design("ilr33-amber"), instruments=Instruments(current_noise_A=0.1))
+    with pytest.raises(InputError, match="need double precision"):
+        c_export(design, single_precision=True)
+
+
+def test_drive_c_is_the_same_for_every_design_and_has_no_memory_of_its_own() -> None:
+    one, other = c_export(load_design("ilr33-amber")), c_export(load_design("emps"))
+    assert one["drive.c"] == other["drive.c"]
+    assert one["drive_design.c"] != other["drive_design.c"]
+    code = re.sub(r"/\*.*?\*/", "", one["drive.c"], flags=re.DOTALL)
+    for word in ("malloc", "calloc", "printf", "static double ", "static int drive_state"):
+        assert word not in code.replace("static double drive_", ""), word
+    outside = [line for line in code.splitlines() if line.startswith("static") and "(" not in line]
+    assert all(line.startswith("static const double") for line in outside)
+
+
+def test_command_writes_all_files_or_none(tmp_path: Path) -> None:
+    runner, app = CliRunner(), build()
+    out = tmp_path / "c"
+    assert runner.invoke(app, ["export", "c", "emps", "--out", str(out)]).exit_code == 0
+    names = {path.name for path in out.iterdir()}
+    assert names == {"drive.h", "drive.c", "drive_design.h", "drive_design.c", "main.c", "README.md"}
+    again = runner.invoke(app, ["export", "c", "emps", "--out", str(out)])
+    assert isinstance(again.exception, InputError)
+    assert "exists already" in str(again.exception)
+    unknown = runner.invoke(app, ["export", "c", "no-such-design", "--out", str(tmp_path / "d")])
+    assert isinstance(unknown.exception, InputError)
+    assert not (tmp_path / "d").exists()

@@ -1,0 +1,74 @@
+"""The emitter: C that gives the same bits, and a refusal for whatever it does not know."""
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from emit_samples import (
+    everything,
+    open_order,
+    power,
+    sliced,
+    truth,
+    twice,
+    two_types,
+)  # fmt: skip
+
+from nonlinear.emit import EmitError, emit_c
+
+COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
+STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+HELPERS = """
+static inline double t_min(double a, double b) { return b < a ? b : a; }
+static inline double t_max(double a, double b) { return b > a ? b : a; }
+static inline int t_min_int(int a, int b) { return b < a ? b : a; }
+"""
+
+
+def library(folder: Path, entries: dict[Any, list[str]]) -> ctypes.CDLL:
+    """The entries compiled with every warning an error."""
+    program = emit_c(entries, prefix="t_")  # type: ignore[arg-type]
+    heads = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
+    declared = "\n".join(program.declarations.values())
+    text = "\n".join([heads, program.constants_text(), HELPERS, program.types, declared, program.functions])
+    source, binary = folder / "t.c", folder / "t.so"
+    source.write_text(text)
+    assert COMPILER is not None
+    subprocess.run([COMPILER, *STRICT, "-shared", "-fPIC", str(source), "-o", str(binary), "-lm"], check=True)
+    return ctypes.CDLL(str(binary))
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
+def test_every_construct_gives_the_same_bits(tmp_path: Path) -> None:
+    lib = library(tmp_path, {everything: ["row", "row", "int"]})
+    row = np.ctypeslib.ndpointer(np.float64)
+    lib.t_everything.argtypes, lib.t_everything.restype = [row, row, ctypes.c_int], ctypes.c_double
+    rng = np.random.default_rng(7)
+    for round_ in range(300):
+        p = rng.normal(size=8) * 10.0 ** rng.integers(-8, 9)
+        ours, theirs = np.zeros(8), np.zeros(8)
+        n = int(rng.integers(0, 8))
+        a, b = everything(p, ours, n), lib.t_everything(p, theirs, n)
+        assert np.float64(a).tobytes() == np.float64(b).tobytes(), round_
+        assert ours.tobytes() == theirs.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("function", "kinds", "words"),
+    [
+        (power, ["float"], "Pow is not in the subset"),
+        (two_types, ["float"], "y is a int and becomes a float"),
+        (open_order, ["row"], "writes s beside another use of s"),
+        (twice, ["row"], "writes s beside another use of s"),
+        (truth, ["float"], "a float as a condition"),
+        (sliced, ["row"], "Slice is not in the subset"),
+        (everything, ["row", "row"], "takes"),
+    ],
+)
+def test_what_is_outside_the_subset_is_refused_with_its_place(function: Any, kinds: Any, words: str) -> None:
+    with pytest.raises(EmitError, match=rf"emit_samples\.py:[0-9]+: {function.__name__}: .*{words}"):
+        emit_c({function: kinds})

@@ -1,0 +1,310 @@
+"""The unit is the simulator: the same bits, any communication step, every key a parameter, both versions."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from random_drives import random_drive
+from typer.testing import CliRunner
+
+from actuator_lti import load_design
+from actuator_lti.design.access import paths_of, with_values
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear import commands, loads, simulate
+from nonlinear.export import fmu_bytes
+from nonlinear.export.build import compile_files, system_compiler, zig_command
+from nonlinear.export.trace import trace_keys
+from nonlinear.export.variables import structured
+from nonlinear.parameters import design_row
+from reports.cli.app import build
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+needs_compiler = pytest.mark.skipif(
+    system_compiler() is None or not sys.platform.startswith("linux") or os.uname().machine != "x86_64",
+    reason="no C compiler for this machine's FMU binaries",
+)
+LINUX = ("linux64",)
+OUTPUTS = ["output.angle", "motor.speed", "motor.current", "motor.voltage"]
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path: Path = tmp_path_factory.mktemp("fmu") / f"drive{request.param}.fmu"
+    path.write_bytes(fmu_bytes(load_design("ilr33-amber"), request.param, LINUX))
+    return path
+
+
+def run(path: Path, step_s: float, stop_s: float, start: dict[str, Any] | None = None, **more: Any) -> Any:
+    return fmpy.simulate_fmu(
+        str(path), stop_time=stop_s, output_interval=step_s, start_values=start or {}, output=OUTPUTS, **more
+    )
+
+
+def assert_same(result: Any, design: Design, command: float, load: float, every: int = 1) -> None:
+    ticks = (len(result) - 1) * every + 1
+    ours = simulate(design, commands.step(command), ticks * design.controller.period_s, loads.constant(load))
+    assert np.array_equal(result["output.angle"], ours.output_angle_rad[::every])
+    assert np.array_equal(result["motor.speed"], ours.motor_speed_rad_s[::every])
+    assert np.array_equal(result["motor.current"], ours.current_A[::every])
+    # the voltage at a communication point is that of the tick before
+    assert np.array_equal(result["motor.voltage"][1:], ours.voltage_V[every - 1 :: every][: len(result) - 1])
+
+
+@needs_compiler
+def test_unit_is_valid_and_gives_the_simulators_bits(unit: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(unit)) == []
+    design = load_design("ilr33-amber")
+    assert_same(run(unit, 1e-4, 0.05, {"command": 0.05}), design, 0.05, 0.0)
+    assert_same(run(unit, 5e-4, 0.05, {"command": 0.02, "hinge_moment": 3.0}), design, 0.02, 3.0, 5)
+
+
+@needs_compiler
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_random_drives_have_the_same_bits(seed: int, tmp_path: Path) -> None:
+    design = random_drive(np.random.default_rng(100 + seed))
+    path = tmp_path / "drive.fmu"
+    path.write_bytes(fmu_bytes(design, 2, LINUX))
+    assert_same(run(path, 1e-4, 0.03, {"command": 0.05, "hinge_moment": -2.0}), design, 0.05, -2.0)
+
+
+@needs_compiler
+def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
+    description = fmpy.read_model_description(str(unit))
+    design = load_design("ilr33-amber")
+    known = {item.name: item for item in description.modelVariables}
+    for path in paths_of(design):
+        if path != "limits.voltage":  # an input
+            assert float(known[structured(path)].start) == pytest.approx(_value(design, path), rel=0, abs=0)
+    changes = {"motor.resistance": 0.07, "control.position.gain": 60.0, "friction.dry_torque": 0.003}
+    changed = with_values(design, changes)
+    result = run(unit, 1e-4, 0.05, {"command": 0.05, **changes})
+    ours = simulate(changed, commands.step(0.05), 501e-4)
+    assert np.abs(result["output.angle"] - ours.output_angle_rad).max() < 1e-13
+
+
+def _value(design: Design, path: str) -> float:
+    from actuator_lti.design.access import parameter_value
+
+    return parameter_value(design, path)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "emps", "ctms-motor-position"])
+def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
+    """The statements, run as Python, against `design_row` of the design with these values."""
+    design = load_design(name)
+    trace = trace_keys(design)
+    rng = np.random.default_rng(5)
+    tried = 0
+    for _ in range(40):
+        factor = {key.path: float(rng.uniform(0.8, 1.25)) for key in trace.keys if not key.fixed}
+        values = {
+            key.path: min(max(key.value * factor[key.path], key.low), key.high)
+            for key in trace.keys
+            if key.path in factor and key.path != "friction.breakaway_ratio"
+        }
+        k = [values.get(key.path, key.value) for key in trace.keys]
+        p: dict[int, float] = {}
+        assert _executed(trace.lines, k, p)
+        row = design_row(with_values(design, values, check=False))
+        for place, value in p.items():
+            assert value == pytest.approx(row[place], rel=1e-14)
+            tried += 1
+    assert tried > 200
+
+
+def _executed(lines: tuple[str, ...], k: list[float], p: dict[int, float]) -> bool:
+    import math
+
+    scope: dict[str, Any] = {"k": k, "p": p, "fabs": abs, "floor": math.floor, "ceil": math.ceil, "pow": pow,
+                             "INFINITY": math.inf}  # fmt: skip
+    for line in lines:
+        if line.startswith("if"):
+            condition = line[4 : line.rindex(") { return 0; }")]
+            negated = condition.startswith("!")
+            if bool(eval(condition[1:] if negated else condition, scope)) != negated:
+                return False
+        else:
+            exec(line.removeprefix("const double ").rstrip(";"), scope)
+    return True
+
+
+@needs_compiler
+def test_values_that_are_not_allowed_are_refused(unit: Path) -> None:
+    for start in ({"motor.resistance": -1.0}, {"friction.breakaway_ratio": 0.5}):
+        with pytest.raises(Exception, match=r"failed|Error|ERROR"):
+            run(unit, 1e-3, 0.01, start, logger=lambda *_: None)
+
+
+@needs_compiler
+@pytest.mark.parametrize("step", [1.0 / 60.0, 1e-4, 3.3e-5, 0.013, 7.77e-4])
+def test_any_communication_step_neither_drifts_nor_fails(unit: Path, step: float) -> None:
+    stop = 60.0 * step
+    result = run(unit, step, stop, {"command": 0.05}, relative_tolerance=None)
+    design = load_design("ilr33-amber")
+    ours = simulate(design, commands.step(0.05), stop + 2e-3)
+    ticks = np.floor(np.arange(len(result)) * step / 1e-4 + 1e-4).astype(int)
+    assert np.array_equal(result["output.angle"], ours.output_angle_rad[ticks])
+
+
+@needs_compiler
+def test_one_hour_in_one_step(unit: Path) -> None:
+    """36 million ticks, counted: the time of the last one is exact."""
+    if "drive3" in unit.name:
+        pytest.skip("the counting is the same code; once is enough")
+    result = fmpy.simulate_fmu(str(unit), stop_time=3600.0, output_interval=3600.0, output=["output.angle"])
+    assert len(result) == 2
+    assert result["output.angle"][-1] == 0.0
+
+
+@needs_compiler
+@pytest.mark.parametrize(("step", "save_at"), [(1e-4, 50), (1.0 / 60.0, 7), (1e-3, 0)])
+def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_path: Path) -> None:
+    design = load_design("ilr33-amber-multirate")
+    (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, LINUX))
+    with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
+        archive.extractall(tmp_path)
+    compiler = system_compiler()
+    assert compiler is not None
+    source = Path(__file__).with_name("c_host.c")
+    subprocess.run([compiler, str(source), "-o", str(tmp_path / "host"), "-ldl"], check=True)
+    guid = fmpy.read_model_description(str(tmp_path / "u.fmu")).guid
+    library = tmp_path / "binaries/linux64/drive.so"
+    call = [str(tmp_path / "host"), str(library), guid, "100", repr(step), "0.05", str(save_at)]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    angles = np.array([float.fromhex(line) for line in done.stdout.split()])
+    ours = simulate(design, commands.step(0.05), 100 * step + 2e-3)
+    ticks = np.floor(np.arange(1, 101) * step / 1e-4 + 1e-4).astype(int)
+    assert np.array_equal(angles, ours.output_angle_rad[ticks])
+    assert "wrong type, name or GUID" in done.stderr
+
+
+@needs_compiler
+def test_tuning_between_steps_changes_what_follows(tmp_path: Path) -> None:
+    """A gain changed during the run: as if the simulator had been stopped and gone on with the other row."""
+    from nonlinear._kernels import layout as at
+    from nonlinear._kernels.call import parameters
+    from nonlinear._kernels.prepare import prepare_sizes
+    from nonlinear._kernels.tick import tick
+    from nonlinear.export.c_files import exported
+    from nonlinear.export.entries import derive
+
+    design = load_design("ilr33-amber")
+    path = tmp_path / "u.fmu"
+    path.write_bytes(fmu_bytes(design, 2, LINUX))
+    tunable = {key.path for key in trace_keys(design).keys if not key.fixed}
+    assert "control.position.gain" in tunable
+    p, s = parameters(exported(design).row)
+    row = np.zeros(at.IO_SIZE)
+    row[at.IN_COMMAND] = 0.05
+    description = fmpy.read_model_description(str(path))
+    references = {item.name: item.valueReference for item in description.modelVariables}
+    folder = fmpy.extract(str(path))
+    unit = fmpy.fmi2.FMU2Slave(
+        guid=description.guid, unzipDirectory=folder, modelIdentifier="drive", instanceName="a"
+    )
+    unit.instantiate(callbacks=_callbacks())
+    unit.setupExperiment()
+    unit.enterInitializationMode()
+    unit.setReal([references["command"]], [0.05])
+    unit.exitInitializationMode()
+    for k in range(400):
+        if k == 200:
+            unit.setReal([references["control.position.gain"]], [50.0])
+            p[: at.SIZE] = exported(with_values(design, {"control.position.gain": 50.0})).row
+            prepare_sizes(p)
+            derive(p, s)
+        unit.doStep(k * 1e-4, 1e-4)
+        tick(p, s, row)
+        assert unit.getReal([references["motor.angle"]]) == [s[at.S_ANGLE]], k
+    with pytest.raises(Exception, match="fmi2SetReal failed"):
+        unit.setReal([references["control.period"]], [2e-4])
+    unit.terminate()
+    unit.freeInstance()
+    shutil.rmtree(folder)
+
+
+def _callbacks() -> Any:
+    """Callbacks whose logger says nothing (FMPy's own proxy for it is not used)."""
+    from fmpy import fmi2
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *_: None)
+    return callbacks
+
+
+@pytest.mark.skipif(zig_command() is None, reason="ziglang is not installed")
+def test_both_platforms_in_one_file_with_the_same_bytes_each_time() -> None:
+    design = load_design("emps")
+    data = fmu_bytes(design)
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        names = set(archive.namelist())
+        assert {"binaries/linux64/drive.so", "binaries/win64/drive.dll", "sources/drive.c"} <= names
+        assert archive.read("binaries/win64/drive.dll")[:2] == b"MZ"
+        assert archive.read("binaries/linux64/drive.so")[:4] == b"\x7fELF"
+    assert fmu_bytes(design) == data
+
+
+@pytest.mark.skipif(
+    zig_command() is None or shutil.which("wine") is None, reason="ziglang or wine is not installed"
+)
+def test_win64_binary_runs_under_wine(tmp_path: Path) -> None:
+    """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
+    design = load_design("ilr33-amber")
+    (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, ("win64",)))
+    with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
+        archive.extractall(tmp_path)
+    source = {"host.c": Path(__file__).with_name("c_host.c").read_text(encoding="utf-8")}
+    (tmp_path / "host.exe").write_bytes(compile_files(source, "host.exe", "win64"))
+    guid = fmpy.read_model_description(str(tmp_path / "u.fmu")).guid
+    call = ["wine", "host.exe", "binaries/win64/drive.dll", guid, "300", "1e-4", "0.05", "100"]
+    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(tmp_path / "wine")}
+    try:
+        done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, env=quiet, timeout=120)
+    except subprocess.TimeoutExpired:
+        pytest.skip("wine does not start here")
+    if not done.stdout:
+        pytest.skip("wine does not start here")
+    angles = np.array([float.fromhex(line) for line in done.stdout.split()])
+    ours = simulate(design, commands.step(0.05), 301e-4)
+    assert np.abs(angles - ours.output_angle_rad[1:]).max() < 1e-11 * 0.05
+
+
+@needs_compiler
+def test_command_writes_the_report_and_the_licence_into_it(tmp_path: Path) -> None:
+    target = tmp_path / "d.fmu"
+    arguments = ["export", "fmu", "emps", "--out", str(target), "--platform", "linux64"]
+    result = CliRunner().invoke(build(), arguments)
+    assert result.exit_code == 0, result.output
+    with zipfile.ZipFile(target) as archive:
+        assert b"<html" in archive.read("documentation/index.html")
+        assert b"MIT License" in archive.read("documentation/licenses/license.txt")
+    for more in (["--fmi", "4"], ["--platform", "amiga"]):
+        bad = CliRunner().invoke(build(), [*arguments[:-2], *more, "--force"])
+        assert isinstance(bad.exception, InputError), more
+    assert isinstance(CliRunner().invoke(build(), arguments).exception, InputError)
+
+
+def test_no_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    import nonlinear.export.build as ours
+
+    monkeypatch.setattr(ours, "system_compiler", lambda: None)
+    monkeypatch.setattr(ours, "zig_command", lambda: None)
+    with pytest.raises(InputError, match="no C compiler for linux64"):
+        fmu_bytes(load_design("emps"), 2, LINUX)
+
+
+def test_a_quoted_name_is_structured() -> None:
+    assert structured("gear.my stage.ratio") == "gear.'my stage'.ratio"
+    assert structured("control.velocity.filter.2.depth") == "control.velocity.filter[2].depth"

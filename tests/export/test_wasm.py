@@ -1,0 +1,83 @@
+"""The kept WebAssembly: made of today's sources, without imports, small, equal to the simulator in node."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_drives import random_drive, random_inputs
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Design, Instruments
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.call import parameters
+from nonlinear._kernels.tick import tick
+from nonlinear.export.build import zig_command
+from nonlinear.export.c_files import exported
+from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
+
+MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
+
+
+def test_kept_module_is_made_of_these_sources() -> None:
+    known, data = record(), kept_wasm()
+    assert known["sources_sha256"] == sources_hash(), "the kernels have changed: make wasm"
+    assert known["module_sha256"] == hashlib.sha256(data).hexdigest()
+    assert len(data) == known["bytes"] <= MOST_BYTES
+    assert data[:4] == b"\0asm"
+
+
+def _same_compiler() -> bool:
+    try:
+        return zig_command() is not None and record()["compiler"] == f"ziglang {version('ziglang')}"
+    except PackageNotFoundError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not _same_compiler(), reason="the ziglang that made the module is not installed")
+def test_building_again_gives_the_same_bytes() -> None:
+    assert build_wasm() == kept_wasm()
+
+
+def in_node(design: Design, command: np.ndarray, moment: np.ndarray, folder: Path) -> np.ndarray:
+    row = exported(design).row
+    given = {
+        "row": [float(x) if np.isfinite(x) else str(x).replace("inf", "Infinity") for x in row],
+        "command": command.tolist(),
+        "moment": moment.tolist(),
+        "at": {"command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
+               "current": at.IO_CURRENT},
+    }  # fmt: skip
+    (folder / "given.json").write_text(json.dumps(given))
+    host = Path(__file__).with_name("wasm_host.mjs")
+    call = ["node", str(host), str(MODULE), str(folder / "given.json")]
+    done = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout)
+    assert done["imports"] == []
+    return np.array(done["rows"])
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+@pytest.mark.parametrize("seed", [-1, 0, 1, 2, 3])
+def test_equal_to_the_simulator_in_node(seed: int, tmp_path: Path) -> None:
+    """Another C library's exp, sin, log: 1e-9 of the largest value.  Instruments that round are left out."""
+    rng = np.random.default_rng(200 + seed)
+    design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)
+    design = replace(design, instruments=Instruments())
+    command, moment = random_inputs(rng, 400, design.controller.period_s)
+    p, s = parameters(exported(design).row)
+    io = np.zeros(at.IO_SIZE)
+    ours = np.empty((400, 3))
+    for k in range(400):
+        io[at.IN_COMMAND], io[at.IN_LOAD] = command[k], moment[k]
+        assert tick(p, s, io) == at.OK
+        ours[k] = io[at.IO_OUTPUT], io[at.IO_SPEED], io[at.IO_CURRENT]
+    theirs = in_node(design, command, moment, tmp_path)
+    assert (np.abs(theirs - ours).max(axis=0) <= 1e-9 * np.abs(ours).max(axis=0)).all()

@@ -1,0 +1,302 @@
+"""Random drives over decades, stable by their exact loops: what the validator is tried on.
+
+Run as a script it validates a number of them and prints a line for each::
+
+    python -m tests.validation.random_drives 0 40
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import inf, pi
+from typing import TypeVar
+
+import numpy as np
+
+from actuator_lti.design.model import (
+    Command,
+    Controller,
+    Coupling,
+    CurrentLoop,
+    Design,
+    Encoder,
+    Filter,
+    Friction,
+    Gear,
+    Limits,
+    Load,
+    Motor,
+    OutputEncoder,
+    PositionLoop,
+    Validation,
+    VelocityLoop,
+)
+from actuator_lti.errors import InputError, NumericalError
+
+from analyses.validation.settings import Settings
+
+TRIAL = Settings(
+    frequencies=20,
+    point_frequencies=0,
+    multisine=False,
+    amplitude_margins=False,
+    rest_frequencies=8,
+    large_signals=False,
+    friction_effects=False,
+    specification=False,
+)
+T = TypeVar("T")
+
+
+class Dice:
+    """Random choices of one drive."""
+
+    def __init__(self, seed: int) -> None:
+        self.rng = np.random.default_rng(seed)
+
+    def decades(self, low: float, high: float) -> float:
+        """Evenly on a logarithmic scale."""
+        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+
+    def chance(self, share: float) -> bool:
+        return bool(self.rng.random() < share)
+
+    def one_of(self, values: tuple[T, ...]) -> T:
+        """One of some values."""
+        return values[int(self.rng.integers(len(values)))]
+
+
+def random_drive(seed: int, *, wider: bool = False) -> Design:
+    """One drive; whether it is stable is not known yet.
+
+    Parameters
+    ----------
+    wider : bool
+        With an elastic coupling, filters, command filter, other sensors, or without a position loop.
+    """
+    dice = Dice(seed)
+    period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
+    delay = period * dice.one_of((0.0, 0.5, 1.0, 1.0, 2.0, 3.0))
+    axis = dice.one_of(("rotary", "rotary", "rotary", "linear"))
+    motor, inertia, gears, load = _plant(dice, period + delay, axis)
+    with_current, with_velocity = dice.chance(0.7), dice.chance(0.85)
+    control = _controller(dice, motor, inertia, period, delay, with_current, with_velocity)
+    limits = _limits(dice, motor, control)
+    ratio = float(np.prod([gear.ratio for gear in gears]))
+    speed = min(limits.speed_rad_s, limits.voltage_V / (motor.back_emf_constant_Vs_rad or 1.0))
+    full = dice.decades(0.03, 3.0) * speed / (ratio * control.position_loop.gain * (1.0 if with_velocity else 3.0))
+    torque = (motor.torque_constant_Nm_A or 0.0) * min(
+        limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
+    )
+    design = Design(
+        name=f"random-{seed}",
+        title=f"Random drive {seed}",
+        motor=motor,
+        gears=gears,
+        load=load,
+        axis=axis,
+        controller=control,
+        limits=limits,
+        friction=_friction(dice, torque, speed),
+        encoder=_encoder(dice, control, axis),
+        validation=Validation(full_deflection_rad=full if full > 0.0 else 0.1),
+    )
+    if dice.chance(0.2):
+        slope = -dice.decades(0.01, 1.0) * torque * ratio / design.validation.full_deflection_rad
+        design = replace(design, load=replace(load, path="back-drivable", moment_slope_Nm_rad=slope))
+    return _widened(dice, design) if wider else design
+
+
+def _plant(dice: Dice, delay: float, axis: str) -> tuple[Motor, float, tuple[Gear, ...], Load]:
+    """Motor, inertia at its shaft, gears and load."""
+    resistance, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
+    inductance = resistance * delay * dice.decades(2.0, 60.0)
+    inertia = dice.decades(1.0, 300.0) * (inductance / resistance) * k**2 / resistance
+    if axis == "linear" and dice.chance(0.3):
+        inertia = dice.decades(1.0, 150.0)
+    share = dice.rng.uniform(0.05, 0.9)
+    gears = tuple(Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3))))
+    ratio = float(np.prod([gear.ratio for gear in gears]))
+    motor = Motor(
+        rotor_inertia_kgm2=inertia * (1.0 - share),
+        resistance_ohm=resistance,
+        inductance_H=inductance,
+        torque_constant_Nm_A=k,
+        back_emf_constant_Vs_rad=k,
+    )
+    return motor, inertia, gears, Load(inertia_kgm2=inertia * share * ratio**2)
+
+
+def _controller(
+    dice: Dice, motor: Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
+) -> Controller:
+    """A cascade whose crossovers are fractions of each other."""
+    R, L, k = (motor.resistance_ohm or 1.0), (motor.inductance_H or 1.0), (motor.torque_constant_Nm_A or 1.0)
+    inner = dice.rng.uniform(0.1, 0.5) / (period + delay)
+    currents = None
+    if current:
+        integral = None if dice.chance(0.1) else (L / R) * dice.decades(0.5, 3.0)
+        currents = CurrentLoop(gain_V_A=L * inner, integral_time_s=integral)
+    else:
+        inner = min(inner, R / L)
+    per_unit = inertia / k * (1.0 if current else R)
+    n_v = dice.one_of((1, 1, 2, 5, 10))
+    wv = min(inner / dice.decades(2.0, 20.0), dice.rng.uniform(0.1, 0.5) / (n_v * period))
+    velocities = None
+    if velocity:
+        integral = None if dice.chance(0.2) else dice.decades(2.0, 30.0) / wv
+        velocities = VelocityLoop(gain=per_unit * wv, integral_time_s=integral, every=n_v)
+        n_p = n_v * dice.one_of((1, 1, 2, 5))
+        gain = min(wv / dice.decades(2.5, 20.0), 0.4 / (n_p * period))
+        position = PositionLoop(gain=gain, every=n_p, feedforward=dice.one_of((0.0, 0.0, 1.0, 0.5)))
+    elif current:
+        wp = wv / dice.decades(3.0, 10.0)
+        position = PositionLoop(gain=per_unit * wp**2 / 2.0, every=n_v, derivative_time_s=2.0 / wp)
+    else:
+        slow = min(k**2 / (R * inertia), R / L)
+        gain = k * slow / dice.decades(2.5, 20.0)
+        position = PositionLoop(gain=gain, every=n_v)
+    return Controller(
+        period_s=period, computing_delay_s=delay, position=position, velocity=velocities, current=currents
+    )
+
+
+def _limits(dice: Dice, motor: Motor, control: Controller) -> Limits:
+    """Tight, loose, or hardly any."""
+    volts = dice.decades(3.0, 600.0)
+    short = volts / (motor.resistance_ohm or 1.0)
+    fastest = volts / (motor.back_emf_constant_Vs_rad or 1.0)
+    speed = fastest * dice.rng.uniform(0.2, 1.0) if control.velocity and dice.chance(0.7) else inf
+    acceleration = inf
+    if control.velocity is not None and dice.chance(0.3):
+        acceleration = fastest * control.position_loop.gain * dice.decades(0.3, 30.0)
+    peak = short * dice.decades(0.05, 1.0) if control.current is not None and dice.chance(0.8) else inf
+    return Limits(voltage_V=volts, speed_rad_s=speed, acceleration_rad_s2=acceleration, peak_current_A=peak)
+
+
+def _friction(dice: Dice, torque: float, speed: float) -> Friction:
+    """None, viscous, dry of either law."""
+    if dice.chance(0.15):
+        return Friction()
+    dry = 0.0 if dice.chance(0.2) else torque * dice.decades(1e-3, 0.2)
+    return Friction(
+        law=dice.one_of(("coulomb", "coulomb", "coulomb", "tanh")),
+        dry_torque_Nm=dry,
+        viscous_Nms_rad=0.0 if dice.chance(0.2) else torque / speed * dice.decades(1e-4, 0.3),
+        breakaway_ratio=dice.one_of((1.0, 1.0, 1.3)),
+        smoothing_speed_rad_s=1e-2 * speed,
+    )
+
+
+def _encoder(dice: Dice, control: Controller, axis: str) -> Encoder:
+    """Ideal, or a real one."""
+    source = dice.one_of(("ideal", "ideal", "difference", "tracking"))
+    counts = None
+    if source != "ideal" and dice.chance(0.7):
+        counts = int(dice.decades(1e3, 1e6)) * (100 if axis == "linear" else 1)
+    inner = control.velocity.every if control.velocity else 1
+    band = 0.2 / (control.period_s * inner) if source == "tracking" else None
+    return Encoder(
+        counts_per_rev=counts,
+        speed=source,
+        bandwidth_rad_s=band,
+        filter_time_s=inner * control.period_s * dice.one_of((0.0, 0.0, 0.5)),
+    )
+
+
+def _widened(dice: Dice, design: Design) -> Design:
+    """Add one or two of what goes beyond a rigid cascade."""
+    control, kind = design.controller, dice.one_of(("coupling", "filter", "command", "speed", "sensor"))
+    velocity = control.velocity
+    if kind == "coupling":
+        J = design.inertia_kgm2
+        omega = dice.decades(2.0, 30.0) * control.position_loop.gain
+        stiffness = omega**2 * J * 0.2 * design.total_ratio**2
+        coupling = Coupling(
+            stiffness_Nm_rad=stiffness,
+            damping_Nms_rad=0.04 * stiffness / omega,
+            play_rad=design.validation.full_deflection_rad * dice.one_of((0.0, 0.01)),
+        )
+        return replace(design, coupling=coupling)
+    if kind == "filter" and velocity is not None:
+        at = 2.0 * pi * 0.05 / (control.period_s * velocity.every)
+        item = dice.one_of(
+            (
+                Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at),
+                Filter(kind="notch", on="torque", frequency_rad_s=at, width_rad_s=0.5 * at),
+                Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
+            )
+        )
+        return replace(design, controller=replace(control, velocity=replace(velocity, filters=(item,))))
+    if kind == "command":
+        return replace(design, command=Command(filter_time_s=0.2 / control.position_loop.gain))
+    if kind == "speed" and velocity is not None:
+        return replace(design, controller=replace(control, position=None))
+    place = replace(control.position_loop, sensor="output")
+    return replace(
+        design,
+        controller=replace(control, position=place),
+        output_encoder=OutputEncoder(counts_per_rev=None),
+    )
+
+
+def stable_drives(first: int, count: int, *, wider: bool = False) -> Iterator[Design]:
+    """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins."""
+    seed, found = first, 0
+    while found < count:
+        design = random_drive(seed, wider=wider)
+        seed += 1
+        if is_stable(design):
+            found += 1
+            yield design
+
+
+def is_stable(design: Design) -> bool:
+    """Whether every loop is stable, inner ones too."""
+    from actuator_lti.loops import assemble_loops
+    from actuator_lti.margins import stability_margins
+
+    try:
+        loops = assemble_loops(design)
+        return bool(loops.present) and all(
+            stability_margins(loop.open_loop).stable is True for loop in loops.present.values()
+        )
+    except (InputError, NumericalError):
+        return False
+
+
+def main(first: int, count: int, wider: bool) -> None:
+    """Validate and print a line for each."""
+    import time
+    import traceback
+
+    from analyses.isolation import isolated
+    from analyses.validation import validate
+
+    for design in stable_drives(first, count, wider=wider):
+        started = time.process_time()
+        try:
+            with isolated() as missing:
+                found = validate(design, TRIAL)
+        except InputError as error:
+            print(f"{design.name}  refused: {error}", flush=True)
+            continue
+        except Exception:
+            print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
+            continue
+        took = time.process_time() - started
+        judged = [row for row in found.ledger if row.passed is not None]
+        print(f"{design.name}  {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s", flush=True)
+        for item in missing:
+            print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
+        for row in found.failed:
+            print(
+                f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason}"
+            )
+
+
+if __name__ == "__main__":
+    import sys
+
+    main(int(sys.argv[1]), int(sys.argv[2]), len(sys.argv) > 3)

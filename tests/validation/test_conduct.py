@@ -1,0 +1,58 @@
+"""What a simulation ended in: said in words where it is not rest on the command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from actuator_lti import load_design
+from analyses.conduct import conduct
+from nonlinear import commands, simulate
+from reports.cli.main import main
+
+AMBER = load_design("ilr33-amber")
+CONDITIONAL = Path(__file__).with_name("conditional.toml")
+
+
+def test_a_step_that_settles_is_ok() -> None:
+    found = conduct(simulate(AMBER, commands.step(0.02), 0.4))
+    assert (found.status, found.detail) == ("ok", "")
+
+
+def test_a_step_cut_on_its_way_has_not_settled() -> None:
+    assert conduct(simulate(AMBER, commands.step(0.02), 0.02)).status == "has not settled"
+
+
+def test_a_linear_loop_beyond_its_gain_margin_keeps_oscillating() -> None:
+    """Limits hold the growing oscillation: it neither dies out nor runs away."""
+    control = AMBER.controller
+    loud = replace(AMBER, controller=replace(control, position=replace(control.position, gain=4000.0)))
+    found = conduct(simulate(loud, commands.step(0.05), 0.5))
+    assert found.status == "keeps oscillating"
+    assert "Hz" in found.detail
+
+
+def test_a_drive_that_is_held_sits_on_its_limit() -> None:
+    """Dry friction beyond the torque of the current limit: the rotor stays, the current is at its limit."""
+    limits = AMBER.limits
+    most = limits.peak_current_A * (AMBER.motor.torque_constant_Nm_A or 0.0)
+    stuck = replace(AMBER, friction=replace(AMBER.friction, dry_torque_Nm=2.0 * most))
+    found = conduct(simulate(stuck, commands.step(0.1), 0.5))
+    assert found.status == "sits on a limit"
+
+
+def test_following_a_sine_is_no_oscillation() -> None:
+    assert conduct(simulate(AMBER, commands.sine(0.01, 5.0), 0.5)).status == "ok"
+
+
+def test_the_command_line_says_it(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = "simulate --amplitude 3 --duration 0.5 --quiet --set".split() + ["control.position.gain=4000 1/s"]
+    assert main(arguments) == 0
+    assert "status keeps oscillating (" in capsys.readouterr().out
+    assert main([*arguments, "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["status"] == "keeps oscillating"
+    assert facts["status_detail"].endswith("Hz")

@@ -1,0 +1,110 @@
+"""Stiffness at the output: published digits, closed forms, and the same seen by the simulator."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design
+from actuator_lti.design.model import Load
+from actuator_lti.errors import InputError
+from analyses.stiffness import check_stiffness, lost_motion_seen, stiffness, stiffness_curves
+from analyses.stiffness.curves import compliance, stiffness_at
+from reports.cli.main import main
+from reports.figures.registry import draw_svg
+from reports.sections.stiffness import section
+from tests.loops.two_mass import drive_d, drive_e
+
+K4 = [(1, 16.9017216631, -53.84128746), (20, 67.434351877, 146.7856309), (80, 729.024662292, 99.71033514)]
+
+
+def test_k4_by_the_loops_and_by_an_injected_moment() -> None:
+    """1, 20 and 80 Hz are not whole numbers of ticks of 0.2 ms but for the first two: 250 and 62.5."""
+    for frequency, size, angle in K4:
+        K = stiffness_at(compliance(drive_e()), frequency, 2e-4)[0]
+        assert abs(K) == pytest.approx(size, rel=1e-10)
+        assert np.angle(K, deg=True) == pytest.approx(angle, abs=1e-7)
+    for (frequency, size, angle), check in zip(K4[:2], check_stiffness(drive_e(), [1, 20]), strict=True):
+        assert check.frequency_hz == pytest.approx(frequency, rel=1e-14)
+        assert abs(check.seen_Nm_rad) == pytest.approx(size, rel=1e-7)
+        assert np.angle(check.seen_Nm_rad, deg=True) == pytest.approx(angle, abs=1e-5)
+
+
+def test_a_motor_that_holds_leaves_the_spring() -> None:
+    """A velocity integral on the motor's sensor: at zero frequency only the coupling gives way."""
+    powered, shorted, open_winding = stiffness_curves(drive_e())
+    assert powered.static_Nm_rad == pytest.approx(400.0, rel=1e-6)
+    assert (shorted.static_Nm_rad, open_winding.static_Nm_rad) == (0.0, 0.0)
+
+
+def test_an_open_winding_gives_way_at_the_resonance() -> None:
+    """sqrt(k (1/J_l + 1/(J_m N_c^2))) = 632.4555 rad/s, to the spacing of the frequencies."""
+    design = replace(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"))
+    curve = stiffness_curves(design)[2]
+    size, f = np.abs(curve.stiffness_Nm_rad), curve.frequency_hz
+    inside = (f > 60) & (f < 300)
+    weakest = f[inside][np.argmin(size[inside])]
+    assert weakest == pytest.approx(632.4555 / (2 * np.pi), rel=f[1] / f[0] - 1)
+
+
+def test_the_fin_by_hand() -> None:
+    """N^2 kM Kp Kv / (R (1 + CM N)) less the load's slope: P controllers, the output's sensor, motor driving."""
+    powered, shorted, open_winding = stiffness_curves(load_design("fin"))
+    by_hand = 60**2 * 0.03 * 0.12 * 110 / (1.0 * (1 + 1.7e-3 * 60)) + 30
+    assert powered.static_Nm_rad == pytest.approx(by_hand, rel=1e-6)
+    assert shorted.static_Nm_rad == pytest.approx(30.0, rel=1e-6)
+    assert open_winding.static_Nm_rad == pytest.approx(30.0, rel=1e-6)
+
+
+def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_move() -> None:
+    assert stiffness_curves(load_design("joint"))[0].static_Nm_rad == float("inf")
+    rigid = stiffness(load_design("ilr33-amber"))
+    assert all(curve.static_Nm_rad == float("inf") for curve in rigid.curves)
+    assert rigid.lost_motion is None
+    with pytest.raises(InputError, match="does not answer"):
+        check_stiffness(load_design("ilr33-amber"), [1.0])
+    compliant = stiffness_curves(load_design("ilr33-amber-compliant"))[0]
+    assert compliant.static_Nm_rad == pytest.approx(1500.0, rel=1e-6)  # the shaft behind the worm
+
+
+@pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
+def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
+    found = stiffness(load_design(name))
+    assert len(found.checks) == 3
+    assert max(check.difference for check in found.checks) < 1e-6
+    assert found.agrees
+    wrong = replace(found.checks[0], foreseen_Nm_rad=1.00001 * found.checks[0].foreseen_Nm_rad)
+    assert not replace(found, checks=(wrong,)).agrees
+
+
+@pytest.mark.parametrize("play", [0.0, 2e-4, 3e-3])
+@pytest.mark.parametrize("dry", [0.02, 0.2])
+def test_lost_motion_is_play_and_what_dry_friction_holds(play: float, dry: float) -> None:
+    """2 b + 2 C0_l / k at the output."""
+    design = load_design("fin")
+    assert design.coupling is not None
+    assert design.load.friction is not None
+    friction = replace(design.load.friction, dry_torque_Nm=dry)
+    changed = replace(
+        design,
+        coupling=replace(design.coupling, play_rad=play),
+        load=replace(design.load, friction=friction),
+    )
+    assert lost_motion_seen(changed) == pytest.approx(play + 2 * dry / 800.0, rel=5e-3)
+
+
+def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["stiffness", "fin", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["agrees"] is True
+    assert [curve["state"] for curve in told["curves"]] == ["powered", "shorted", "open"]
+    assert told["lost_motion"]["play"] == 1.5e-3
+    assert main(["stiffness"]) == 0
+    assert "static inf" in capsys.readouterr().out
+    part = section(stiffness(load_design("fin")))
+    figure = next(block for block in part["blocks"] if block["kind"] == "figure")
+    assert "<svg" in draw_svg("stiffness", figure["data"], page=False)
+    assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
