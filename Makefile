@@ -66,7 +66,7 @@ $(RELEASE): $(STAMP)
 	touch $(RELEASE)
 
 lock: $(RELEASE)
-	$(COMPILE) --extra dev --extra docs --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra dev --extra docs --extra export --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
 
 # Wheel, sources and the bill of materials of what they need to run.
 release: $(RELEASE)
