@@ -73,7 +73,10 @@ def fly(design: Design, path: Path, gain_s: float, duration_s: float, start_rad_
     description = read_model_description(str(path))
     place = {item.name: item.valueReference for item in description.modelVariables}
     unit = FMU2Slave(
-        guid=description.guid, unzipDirectory=extract(str(path)), modelIdentifier="drive", instanceName="drive"
+        guid=description.guid,
+        unzipDirectory=extract(str(path)),
+        modelIdentifier="drive",
+        instanceName="drive",
     )
     unit.instantiate()
     unit.setupExperiment()

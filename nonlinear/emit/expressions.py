@@ -116,7 +116,11 @@ class Expressions:
     def _length(self, node: ast.Subscript) -> str | None:
         """``row.shape[0]`` of a table, or of a row that knows its length; None for anything else."""
         value, index = node.value, node.slice
-        if not isinstance(value, ast.Attribute) or value.attr != "shape" or not isinstance(value.value, ast.Name):
+        if (
+            not isinstance(value, ast.Attribute)
+            or value.attr != "shape"
+            or not isinstance(value.value, ast.Name)
+        ):
             return None
         if not isinstance(index, ast.Constant) or index.value != 0:
             return None
