@@ -1,9 +1,9 @@
-"""The exported drive in the roll-rate loop of a linear airframe: margins of the outer loop, confirmed in time.
+"""The exported drive in the roll-rate loop of a linear airframe: margins of the outer loop, in time.
 
-The drive is the FMU of ``actuator-lti export fmu``; the airframe is ``p' = -a p + b delta``, delta the fin angle.
-The autopilot commands ``delta = -K p`` every tick.  The outer loop is closed around the linear drive of
-`actuator_lti.assemble_loops`; its gain margin says at which K the roll oscillation stays.  With dry friction
-off (a parameter of the FMU) the FMU must decay just below that gain and grow just above it.
+The drive is the FMU of ``actuator-lti export fmu``; the airframe is ``p' = -a p + b delta``, delta the fin
+angle.  The autopilot commands ``delta = -K p`` every tick.  The outer loop is closed around the linear drive
+of `actuator_lti.assemble_loops`; its gain margin says at which K the roll oscillation stays.  With dry
+friction off (a parameter of the FMU) the FMU must decay just below that gain and grow just above it.
 
     python -m examples.autopilot_loop
 """

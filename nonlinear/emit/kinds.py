@@ -6,7 +6,8 @@ import ast
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["float", "int", "bool", "row", "bytes"]  # bytes: a row of small whole numbers and its length
+# bytes: a row of small whole numbers that knows its length
+Kind = Literal["float", "int", "bool", "row", "bytes"]
 
 C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
 
