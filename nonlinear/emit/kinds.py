@@ -19,8 +19,8 @@ _KEYWORDS = """
     near far
 """
 FUNCTIONS = """
-    sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign ldexp
-    fabs ceil floor abs isfinite isnan isinf
+    sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign
+    ldexp fabs ceil floor abs isfinite isnan isinf
 """
 RESERVED = frozenset((_KEYWORDS + FUNCTIONS).split())
 
