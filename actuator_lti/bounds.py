@@ -121,7 +121,7 @@ TABLE_ROWS = Bound(
 )  # fmt: skip
 MAT_BYTES = Bound(what="of a .mat file", most=1 << 28, unit="bytes", reason="read whole into memory")
 MAT_VALUES = Bound(
-    what="numbers of a .mat file, unpacked", most=50_000_000,
+    what="numbers of a .mat or Parquet file, unpacked", most=50_000_000,
     reason="400 MB as floats; a compressed file of a megabyte can hold a thousand times its size",
 )  # fmt: skip
 MAT_DIMENSIONS = Bound(what="dimensions of an array in a .mat file", most=32, reason="numpy holds no more")

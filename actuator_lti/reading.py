@@ -73,7 +73,7 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileNotFoundError:
-        raise InputError(f"no such file; allowed: a {what}", where=where) from None
+        raise InputError(f"cannot be read: no such file; allowed: a {what}", where=where) from None
     except IsADirectoryError:
         raise InputError(f"is a directory; allowed: a {what}", where=where) from None
     except (OSError, ValueError) as error:

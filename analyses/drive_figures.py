@@ -11,12 +11,12 @@ from actuator_lti.drive.facts import RATE_LIMITS, capability
 
 @dataclass(frozen=True)
 class DriveFigures:
-    """Figures of the whole drive at one hinge moment; output side in rad (linear axis: m).
+    """Figures of the whole drive at one load torque; output side in rad (linear axis: m).
 
     Attributes
     ----------
     load_Nm : float
-        Hinge moment at the output shaft.
+        Load torque at the output shaft.
     output_rate_rad_s : float
         Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it
         cannot move; ``inf`` without any limit.
@@ -40,13 +40,13 @@ class DriveFigures:
 
 
 def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
-    """Rate, current and acceleration of a drive at a hinge moment.
+    """Rate, current and acceleration of a drive at a load torque.
 
     Parameters
     ----------
     design : Design
     load_Nm : float
-        Hinge moment at the output shaft, N m (linear axis: N), either sign.
+        Load torque at the output shaft, N m (linear axis: N), either sign.
 
     Raises
     ------

@@ -198,6 +198,10 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False, refused=refused))
 
     points = [point("sliding", None, "sliding")]
+    if design.coupling is not None and design.friction.load_coefficient:
+        points += [point("load driven by the motor", None, "driving"), point("by the load", None, "driven")]
+    if design.coupling is not None and design.coupling.play_rad:
+        points.append(point("in the gap of the play", None, "gap"))
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
         for speed in _described_speeds(design):
@@ -232,12 +236,13 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
 
 
 def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
-    """Give the border of linear validity around the bandwidth of the position loop."""
+    """Give the border of linear validity around the bandwidth of the outermost loop."""
     from actuator_lti.limiters import onset
 
-    if not loops.limiters or "position" not in figures:
+    outermost = loops.design.controller.outermost
+    if not loops.limiters or outermost not in figures:
         return None
-    found = figures["position"]
+    found = figures[outermost]
     crossover = min((m.frequency_rad_s for m in found.margins.phase_margins), default=100.0)
     nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
     high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))

@@ -1,4 +1,4 @@
-"""`stability_margins` beside `control.stability_margins` on the same loops, in one run."""
+"""`stability_margins` beside `control.stability_margins`, over the order, and certified; in one run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import statistics
 import time
 import warnings
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import control
 import numpy as np
@@ -15,15 +16,17 @@ from benchmarks.row import Row
 
 ORDER = 10
 PERIOD_S = 1e-3
+LARGER = ((25, 0.030), (50, 0.100), (100, 0.400))  # order, seconds allowed
+CERTIFIED_S = 0.050
 
 
 def rows(quick: bool = False) -> Iterable[Row]:
-    """Ratio of the times on stable random loops of order 10, continuous and sampled: median of the loops."""
+    """Median of the loops: ratio of the times at order 10, then the time of larger and certified ones."""
     seeds = range(3 if quick else 8)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for kind, target in (("continuous", 1.5), ("sampled", 1.0)):
-            pairs = [_times(_loop(seed, kind == "sampled"), 20 if quick else 60) for seed in seeds]
+        for kind, target in (("continuous", 1.3), ("sampled", 1.0)):
+            pairs = [_times(_loop(seed, ORDER, kind == "sampled"), 20 if quick else 60) for seed in seeds]
             ours, theirs = (statistics.median(pair[k] for pair in pairs) for k in (0, 1))
             yield Row(
                 group="margins",
@@ -33,30 +36,56 @@ def rows(quick: bool = False) -> Iterable[Row]:
                 target=target,
                 note=f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms",
             )
+        for order, allowed_s in LARGER:
+            loops = [_loop(seed, order, False) for seed in seeds]
+            yield _row(f"order {order}, state space, continuous", loops, stability_margins, allowed_s)
+        for kind in ("continuous", "sampled"):
+            loops = [_loop(seed, ORDER, kind == "sampled") for seed in seeds]
+            certified = partial(stability_margins, certify=True)
+            yield _row(f"order {ORDER}, state space, {kind}, certified", loops, certified, CERTIFIED_S)
 
 
-def _loop(seed: int, sampled: bool) -> control.StateSpace:
+def _row(name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float) -> Row:
+    times = [_best(partial(margins, loop), 3) for loop in loops]
+    kinds = [stability_margins(loop).evidence for loop in loops]
+    return Row(
+        group="margins",
+        name=f"{name}: time",
+        measured=1e3 * statistics.median(times),
+        unit="ms",
+        target=1e3 * allowed_s,
+        note=f"slowest {1e3 * max(times):.0f} ms; checked {kinds.count('checked')} of {len(kinds)}",
+    )
+
+
+def _loop(seed: int, order: int, sampled: bool) -> control.StateSpace:
+    """Lightly damped modes over three decades in random coordinates; one real pole where the order is odd."""
     rng = np.random.default_rng(seed)
-    A = np.zeros((ORDER, ORDER))
-    for k in range(0, ORDER, 2):
+    A = np.zeros((order, order))
+    for k in range(0, order - 1, 2):
         w, zeta = 10.0 ** rng.uniform(0, 3), 10.0 ** rng.uniform(-2, -0.2)
         A[k : k + 2, k : k + 2] = [[0.0, w], [-w, -2.0 * zeta * w]]
-    T = np.linalg.qr(rng.standard_normal((ORDER, ORDER)))[0]
-    B, C = rng.standard_normal((ORDER, 1)), rng.standard_normal((1, ORDER))
+    if order % 2:
+        A[-1, -1] = -(10.0 ** rng.uniform(0, 3))
+    T = np.linalg.qr(rng.standard_normal((order, order)))[0]
+    B, C = rng.standard_normal((order, 1)), rng.standard_normal((1, order))
     loop = control.ss(T.T @ A @ T, 10.0 * B, C, [[0.0]])
     return control.c2d(loop, PERIOD_S) if sampled else loop
 
 
+def _best(call: Callable[[], object], repeats: int) -> float:
+    best = float("inf")
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
 def _times(loop: control.StateSpace, repeats: int) -> tuple[float, float]:
     """Best time of each, taken in turns."""
-    calls: tuple[Callable[[], object], ...] = (
-        lambda: stability_margins(loop),
-        lambda: control.stability_margins(loop),
-    )
     best = [float("inf"), float("inf")]
     for _ in range(repeats):
-        for k, call in enumerate(calls):
-            start = time.perf_counter()
-            call()
-            best[k] = min(best[k], time.perf_counter() - start)
+        for k, call in enumerate((stability_margins, control.stability_margins)):
+            best[k] = min(best[k], _best(partial(call, loop), 1))
     return best[0], best[1]

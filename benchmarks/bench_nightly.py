@@ -62,13 +62,13 @@ def history_rows(folder: Path, nights: int) -> Iterator[Row]:
         night = overview(history, Cache(folder / "cache"), study)
         text = index(night, "nights/x")
         yield Row(
-            group=GROUP, name="index page from it", measured=time.perf_counter() - start, unit="s", target=1.0
+            group=GROUP, name="index page from it", measured=time.perf_counter() - start, unit="s", target=0.5
         )
         start = time.perf_counter()
         text += design_page(night, night.designs[0], history, set())
         taken = time.perf_counter() - start
         yield Row(
-            group=GROUP, name="page of a design from it", measured=taken, unit="s", target=1.0,
+            group=GROUP, name="page of a design from it", measured=taken, unit="s", target=0.5,
             note=f"{len(text) / 1e3:.0f} kB",
         )  # fmt: skip
 
@@ -111,6 +111,6 @@ def study_rows(folder: Path, points: tuple[int, int]) -> Iterator[Row]:
     note = f"{broken} without result" if broken else "reports, validations and their comparison"
     name = f"{count} variants on 2 workers"
     yield Row(
-        group=GROUP, name=f"{name}, first run", measured=times[0], unit="s", target=6.0 * count, note=note
+        group=GROUP, name=f"{name}, first run", measured=times[0], unit="s", target=3.0 * count, note=note
     )
     yield Row(group=GROUP, name=f"{name}, second run, unchanged", measured=times[1], unit="s", target=5.0)

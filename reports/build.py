@@ -47,7 +47,7 @@ def design_report(
         `analyses.isolation.drain` gives it.
     """
     from actuator_lti.design import design_hash, warnings_of
-    from analyses.isolation import isolated
+    from analyses.isolation import attempt, isolated
     from reports.provenance import provenance
     from reports.sections import answer
 
@@ -56,16 +56,17 @@ def design_report(
         figures, loops = _loops(design, progress)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
-        *notices(missing, "linear"),
         *loops[:1],
         *first,
         *loops[1:],
         *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
-    if loops:
-        items = [item for block in doc.walk(loops[0]) for item in block.get("items", ())]
-        sections.insert(0, answer.section(figures, items, sections))
+    with isolated() as unanswered:
+        items = [item for block in doc.walk(loops[0]) for item in block.get("items", ())] if loops else []
+        answered = attempt("first screen", lambda: answer.section(figures, items, sections), None)
+    first_screen = [answered] if answered and figures else []
+    sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
     return doc.document(
         title=design.title or design.name,
         subtitle=design.description,

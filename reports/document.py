@@ -69,7 +69,7 @@ def column(
     ----------
     format : str
         ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
-        ``"fix:1"`` (decimals), ``"int"`` (a count) or ``"yesno"``.
+        ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
     """
     side = align or ("left" if format in ("text", "yesno") else "right")
     return {"key": key, "label": label, "unit": unit, "align": side, "format": format}

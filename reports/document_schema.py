@@ -46,7 +46,7 @@ class Column(_Part):
     label: str
     unit: str
     align: Literal["left", "right", "center"]
-    format: Annotated[str, Field(pattern=r"^(text|yesno|int|(sig|short|fix):1?[0-9])$")]
+    format: Annotated[str, Field(pattern=r"^(text|yesno|int|(sig|short|fix|ms):1?[0-9])$")]
 
 
 class TableBlock(_Part):

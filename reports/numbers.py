@@ -24,6 +24,8 @@ def show(value: Any, format: str = "text") -> str:
     if isinstance(value, str):
         return value
     kind, _, digits = format.partition(":")
+    if kind == "ms":  # a time in ms; a long one says its own unit
+        return seconds(value / 1e3) if abs(value) >= 1e4 else significant(value, int(digits))
     if kind == "int":
         return to_minus(f"{value:.0f}")
     if kind == "fix":

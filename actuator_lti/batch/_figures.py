@@ -9,6 +9,7 @@ from ._compiled import kernel
 from ._response import (
     BANDWIDTH,
     GAIN,
+    LOST,
     PHASE,
     QUARTER,
     RESONANCE,
@@ -128,6 +129,8 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
     for k in range(count - 1):
+        if ss[k + 1] == 0.0:  # lost in rounding
+            continue
         f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
         f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
         if (f1 > 0.0) != (f2 > 0.0):
@@ -155,7 +158,7 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
             size = max(size, abs(rs[k]))
     if np.isfinite(response_dc) and response_dc < 0.0:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, 0.0, -1.0 / response_dc)
-    if response_nyquist < -1e-12 * size:
+    if response_nyquist < -LOST * size:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, np.pi, -1.0 / response_nyquist)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from ._compiled import kernel
 
 GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE = range(6)
+LOST = 1e-12  # of the largest |L| above 0.3 rad: less is rounding, as of a zero at Nyquist
 HALF_LOG_2 = 0.34657359027997264
 
 
@@ -154,17 +155,23 @@ def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, ex
     """Responses on a grid of angles, refined until log L is a cubic between neighbours; return the count.
 
     An interval is halved until the change of log L over it meets the trapezoidal rule on its exact
-    derivative to ``tolerance`` (nepers and radians), so that no half turn or resonance hides inside.
+    derivative to ``tolerance`` (nepers and radians), so that no half turn or resonance hides inside. Where L
+    is lost in rounding (next to a multiple zero at Nyquist) nothing is refined, its slope is put down as 0.
     """
     capacity = xs.size
     response, derivative = evaluate(n, h, b, c, grid[0], work, state, exchanged)
     count = _keep(0, grid[0], response, derivative, xs, rs, ss)
+    largest = 0.0
     for g in range(1, points):
         stack[0] = grid[g]
         depth = 1
         while depth > 0:
             x = stack[depth - 1]
             response, derivative = evaluate(n, h, b, c, x, work, state, exchanged)
+            if x > 0.3:
+                largest = max(largest, abs(response))
+            if abs(response) < LOST * largest:
+                derivative = 0.0j
             left = count - 1
             width = x - xs[left]
             ratio = response / rs[left]
@@ -174,7 +181,7 @@ def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, ex
             turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
             smooth = abs(gain_error) + abs(turn) < tolerance and abs(predicted.imag) < 1.0
             room = depth < stack.size and count + depth + points - g < capacity - 2
-            if smooth or not room or width < 1e-12 * x:
+            if smooth or derivative == 0.0 or not room or width < 1e-12 * x:
                 count = _keep(count, x, response, derivative, xs, rs, ss)
                 depth -= 1
             else:

@@ -242,7 +242,8 @@ def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray)
     for stage in wired.stages:
         rows = np.full((len(chosen), out.shape[2]), np.nan)
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
-        _figures_of(fundamental(stage_blocks(wired, stage)), lead, time_figures, rows)
+        loop = fundamental(stage_blocks(wired, stage))
+        _figures_of(loop, lead, time_figures and response is None, rows)
         if response is not None:
             verdict = rows[:, [0, 14]].copy()
             _figures_of(response, np.nan, time_figures, rows)

@@ -43,10 +43,14 @@ class Block:
     states: tuple[str, ...]
 
     def pruned(self) -> Block:
-        """Without the states that the output does not see (the motor angle inside an inner loop, say)."""
+        """Without the states that the output does not see (the motor angle inside an inner loop, say).
+
+        Nor those that the input does not reach, such as the filter of the command.
+        """
         n = len(self.states)
         depends = np.any(self.A.reshape(-1, n, n) != 0, axis=0)
         used = seen(depends, np.any(self.C.reshape(-1, n) != 0, axis=0))
+        used &= seen(depends.T, np.any(self.B.reshape(-1, n) != 0, axis=0))
         names = tuple(name for name, there in zip(self.states, used, strict=True) if there)
         A = self.A[..., used, :][..., :, used]
         return Block(A, self.B[..., used, :], self.C[..., :, used], self.D, names)

@@ -19,13 +19,15 @@ RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")
 
 
 def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **names: Any) -> DelaySystem:
-    """SISO system from one input of a flow to one of its signals, of the states that the signal sees."""
+    """SISO system from one input of a flow to one of its signals, of the states between both."""
     n, k = len(flow.states), len(flow.delays_s)
     row = scale * flow.signals[signal]
     every = np.vstack([flow.rates, flow.delayed])
-    used = seen(every[:, : n + k] != 0, row[: n + k] != 0)
-    x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
     u = [n + k + SOURCES.index(source)]
+    family = next((names for names in RATES.values() if source in names), (source,))
+    depends, driven = every[:, : n + k] != 0, [n + k + SOURCES.index(name) for name in family]
+    used = seen(depends, row[: n + k] != 0) & seen(depends.T, np.any(every[:, driven] != 0, axis=1))
+    x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
     dx, v, y = every[x], every[z], row[None, :]
     if len(x):
         names["states"] = [flow.states[i].replace(".", "_") for i in x]

@@ -176,9 +176,9 @@ def _shifts(loop: RationalLoop, poles: Complex) -> Real:
     logs = np.log(usable) if usable.size else np.zeros(1)
     centre = float(logs.mean())
     spread = float(logs.max()) - float(logs.min())
-    position = np.linspace(-0.5 * spread - 7.0, 0.5 * spread + 7.0, 23) + 0.077
+    position = np.linspace(-0.5 * spread - 7.0, 0.5 * spread + 7.0, 15) + 0.077
     shifts = np.exp(centre + position)
-    points = np.concatenate((shifts, -shifts)).astype(complex)
+    points = np.concatenate((shifts, -shifts))
     if loop.in_z:
         points = (1.0 + points) / (1.0 - points)
     with np.errstate(all="ignore"):

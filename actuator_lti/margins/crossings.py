@@ -17,6 +17,7 @@ _POSSIBLE_TOUCH = 1e-3
 _NEWTON_STEP = 1e-9
 _NEWTON_STEPS = 8
 _SAME = 1e-8
+_NEAR_LINE = 0.1  # |log |L||, or the sine of the phase
 _FOUND = 1e-4  # relative: how far an eigenvalue may be from the crossing that it stands for
 
 
@@ -80,8 +81,8 @@ def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real) -> Cro
     start = np.concatenate((_start(gain, x, gain_hit), _start(real, x, real_hit)))
     k = gain_hit.size
     root, value = _polish(loop, start, x[both], x[both + 1], k)
-    _told_twice(gain, root[:k], loop.in_z)
-    _told_twice(real, root[k:], loop.in_z)
+    _told_twice(loop, gain, root[:k], True)
+    _told_twice(loop, real, root[k:], False)
     return Crossings(root[:k], value[:k], root[k:], value[k:], x, L)
 
 
@@ -97,7 +98,7 @@ def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
         x = found.samples
         hit = np.flatnonzero(_changes(np.abs(loop.response(x)) > 1.0))
         root, _ = _polish(loop, found.x[hit], x[hit], x[hit + 1], hit.size)
-        _told_twice(found, root, loop.in_z)
+        _told_twice(loop, found, root, True)
     except (Doubtful, np.linalg.LinAlgError):
         return _exact_gain_crossings(loop)
     return root
@@ -139,14 +140,24 @@ def _candidates(zeros: Complex, in_z: bool) -> _Candidates:
     return _Candidates(unwarped(w, in_z), off_axis, unwarped(samples, in_z))
 
 
-def _told_twice(found: _Candidates, root: Real, in_z: bool) -> None:
-    """Every crossing has its eigenvalue, and every eigenvalue on the axis its crossing."""
-    w, at = warped(root, in_z), warped(found.x, in_z)
-    for these, those in ((w, at), (at[found.off_axis <= _POSSIBLE_TOUCH], w)):
-        if not these.size:
-            continue
-        if not those.size or (np.abs(these[:, None] - those).min(axis=1) > _FOUND * these).any():
-            raise Doubtful("a crossing and its eigenvalue do not agree: a touch, or too wide a range")
+def _told_twice(loop: RationalLoop, found: _Candidates, root: Real, gain: bool) -> None:
+    """Every crossing has its eigenvalue; every eigenvalue on the axis and near the line has its crossing."""
+    w, at = warped(root, loop.in_z), warped(found.x, loop.in_z)
+    lonely = _apart(w, at).any()
+    open_x = found.x[(found.off_axis <= _POSSIBLE_TOUCH) & _apart(at, w)]
+    if open_x.size:  # an eigenvalue of rounding, as those at infinity are, lies where L is not near the line
+        L = loop.response(open_x)
+        away = np.abs(np.log(np.abs(L))) if gain else np.abs(L.imag) / np.abs(L)
+        lonely |= not (away > _NEAR_LINE).all()
+    if lonely:
+        raise Doubtful("a crossing and its eigenvalue do not agree: a touch, or too wide a range")
+
+
+def _apart(these: Real, those: Real) -> Mask:
+    if not those.size:
+        return np.ones(these.size, dtype=bool)
+    apart: Mask = np.abs(these[:, None] - those).min(axis=1) > _FOUND * these
+    return apart
 
 
 def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> tuple[Real, Complex]:
@@ -166,11 +177,16 @@ def _polish(loop: RationalLoop, x: Real, low: Real, high: Real, gains: int) -> t
         x[failed] = start[failed]
     else:
         failed |= ~small
+    value = L - slope * step
     for k in np.flatnonzero(failed):
         x[k] = _bracketed(loop, float(low[k]), float(high[k]), bool(k < gains))
     if failed.any():
-        _, slope = loop.response_and_slope(x)
-    value = loop.sharp_response(x)  # the last step, with L to the last digit
+        value, slope = loop.response_and_slope(x)
+    if not loop.in_z:
+        return x, value
+    value = loop.sharp_response(
+        x
+    )  # near z = 1 the last digits of z are all there is: one more step with them
     step = _newton_step(value, slope, gains)
     return x - step, value - slope * step
 

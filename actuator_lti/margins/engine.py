@@ -50,7 +50,8 @@ def stability_margins(
         where the gain stays below -40 dB (``.band_rad_s`` of the result). The verdict, the modulus and the
         disk margin are those of the whole axis in any case.
     certify : bool, optional
-        Exact arithmetic in any case.
+        Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
+        ones with exact delays. A fraction of a sample and measured data stay as they are.
 
     Returns
     -------

@@ -16,7 +16,7 @@ from actuator_lti.margins.given import Given, Real, given_of
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 _AT_MINUS_ONE = 1e-13
-_REFINEMENTS = 2
+_REFINEMENTS = 1
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,8 @@ class RationalLoop:
         """Point of the border of stability: j x, or exp(j x)."""
         return np.exp(1j * x) if self.in_z else 1j * x
 
-    def at(self, points: Complex) -> Complex:
-        """L at any complex points s or z, shape kept (1-D)."""
+    def at(self, points: Any) -> Any:
+        """L at any points s or z, shape kept (1-D), in real arithmetic where they are real."""
         return self._values(points - 1.0 if self._about_one else points)
 
     def response(self, x: Real) -> Complex:
@@ -94,10 +94,11 @@ class RationalLoop:
             return L, turn * (d_num / below - L * (d_den / below))
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
-        matrix = self._resolvent(p)
+        matrix: Complex = self._resolvent(p)
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
-        return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
+        response: Complex = self.d + first[..., 0] @ self.c
+        return response, -turn * (second[..., 0] @ self.c)
 
     def sharp_response(self, x: Real) -> Complex:
         """L on the border, with the residual of the solution in extended precision."""
@@ -158,17 +159,17 @@ class RationalLoop:
     def _state(self) -> Real:
         return self.A - np.eye(self.order) if self.in_z else self.A
 
-    def _values(self, p: Complex) -> Complex:
+    def _values(self, p: Any) -> Any:
         if self.numerator is not None and self.denominator is not None:
             with np.errstate(all="ignore"):
                 return np.polyval(self.numerator, p) / np.polyval(self.denominator, p)
         if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex)
+            return np.full(p.shape, self.d, dtype=p.dtype)
         return self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c
 
-    def _resolvent(self, p: Complex) -> Complex:
+    def _resolvent(self, p: Any) -> Any:
         n = self.order
-        matrix = np.empty((p.size, n, n), dtype=complex)
+        matrix = np.empty((p.size, n, n), dtype=p.dtype)
         matrix[:] = -self._state()
         index = np.arange(n)
         matrix[:, index, index] += p[:, None]

@@ -39,9 +39,6 @@ class SortedPoles:
         Those on the border as far as double precision can tell, x >= 0 (conjugates left out).
     border_count : int
         How many these are, conjugates counted.
-    cloud : float
-        How far the eigenvalues of a multiple pole at zero frequency are scattered about it by rounding:
-        nearer than some times that, the response says nothing.
     doubtful : bool
         Some pole, other than those at zero frequency, may lie on either side of the border.
     """
@@ -50,7 +47,6 @@ class SortedPoles:
     unstable: int
     border: tuple[BorderPole, ...]
     border_count: int = 0
-    cloud: float = 0.0
     doubtful: bool = False
 
     @property
@@ -87,9 +83,9 @@ def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     if not A.size:
         return SortedPoles(np.empty(0, dtype=complex), 0, ())
     values, radius = _with_error_bounds(A)
-    centre, cloud = (1.0 if in_z else 0.0), 0.0
+    centre = 1.0 if in_z else 0.0
     if gather:
-        values, radius, cloud = _gathered(values, radius, float(np.abs(A).max()), in_z)
+        values, radius = _gathered(values, radius, float(np.abs(A).max()), in_z)
     distance: Real = np.abs(values) - 1.0 if in_z else values.real
     radius[values == centre] = 0.0
     if not (np.abs(distance) <= _SAFE * radius).any():
@@ -98,12 +94,11 @@ def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     on_border = (np.abs(distance) <= radius) & _placed(values, radius, size)
     if gather:
         scattered = on_border & (size <= 2.0 * radius)
-        cloud = max(cloud, float(size[scattered].max(initial=0.0)))
         values[scattered], radius[scattered] = centre, 0.0
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     border = _clusters(values, radius, on_border, in_z)
     doubtful = bool((np.abs(distance) <= _SAFE * radius)[values != centre].any())
-    return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), cloud, doubtful)
+    return SortedPoles(values, unstable, border, int(np.count_nonzero(on_border)), doubtful)
 
 
 def _placed(values: Complex, radius: Real, size: Real) -> Mask:
@@ -114,8 +109,9 @@ def _placed(values: Complex, radius: Real, size: Real) -> Mask:
     return placed
 
 
-def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[Complex, Real, float]:
-    """Put the eigenvalues of a multiple pole at zero frequency there; and how far they were scattered.
+def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[Complex, Real]:
+    """Put the eigenvalues of a multiple pole at zero frequency there.
+
 
     A defective eigenvalue of multiplicity m is scattered by about (eps norm)^(1/m) next^((m - 1)/m), with
     the distance ``next`` to the next eigenvalue.
@@ -130,8 +126,8 @@ def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[C
         if reach <= (scatter if m > 1 else radius[order[0]]) and reach <= 1e-6 * beyond:
             values, radius = values.copy(), radius.copy()
             values[order[:m]], radius[order[:m]] = centre, 0.0
-            return values, radius, reach
-    return values, radius, 0.0
+            break
+    return values, radius
 
 
 def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
@@ -159,9 +155,9 @@ def _eigen(A: Real, vectors: bool) -> tuple[Complex, Real, Real]:
 
 def _complex_vectors(packed: Real, im: Real) -> Complex:
     out = packed.astype(complex)
-    for k in np.flatnonzero(im > 0.0):
-        out[:, k] = packed[:, k] + 1j * packed[:, k + 1]
-        out[:, k + 1] = out[:, k].conj()
+    k = np.flatnonzero(im > 0.0)
+    out[:, k] += 1j * packed[:, k + 1]
+    out[:, k + 1] = out[:, k].conj()
     return out
 
 

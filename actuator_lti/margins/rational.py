@@ -148,7 +148,8 @@ def _phase_margins(loop: RationalLoop, found: Crossings) -> tuple[PhaseMargin, .
 
 def _typical(loop: RationalLoop, poles: SortedPoles) -> Real:
     """Frequencies at which to look at the signs besides: about each pole, beyond, about the asymptote."""
-    size = np.abs(np.angle(poles.values)) if loop.in_z else np.abs(poles.values)
+    upper = poles.values[poles.values.imag >= 0.0]
+    size = np.angle(upper) if loop.in_z else np.abs(upper)
     size = size[(size > 0.0) & (size < 3.1)] if loop.in_z else size[size > 0.0]
     low, high = (float(size.min()), float(size.max())) if size.size else (1.0, 1.0)
     x = np.concatenate((size * 1.03, low * _BELOW, high * _ABOVE))

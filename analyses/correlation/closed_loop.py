@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +35,17 @@ UNITS = {
     "voltage": "V",
     "force": "N",
 }
-COMMANDS = {"rotary": ("reference",), "linear": ("position_reference",)}
+COMMANDS = {
+    ("rotary", "position"): "reference",
+    ("linear", "position"): "position_reference",
+    ("rotary", "velocity"): "speed_reference",
+    ("linear", "velocity"): "velocity_reference",
+    ("rotary", "current"): "current_reference",
+    ("linear", "current"): "current_reference",
+    ("rotary", "voltage"): "voltage_reference",
+    ("linear", "voltage"): "voltage_reference",
+}
+"""The signal that commands a drive, by its axis and its outermost stage."""
 VELOCITY_CUTOFF_HZ = 100.0
 
 
@@ -81,7 +91,8 @@ def correlate_record(
     ----------
     design : Design
     record : Record
-        Needs the command: ``reference`` (output angle, rad) or ``position_reference`` (m, linear axis). A
+        Needs the command of the design's outermost stage: ``reference`` (output angle, rad) or
+        ``position_reference`` (m, linear axis) of a position loop, else that of speed, current or voltage. A
         ``torque`` signal is the hinge moment at the output, a ``supply`` signal the bus voltage (its median
         becomes the voltage limit). Compared are, where recorded: angle, output_angle or position, speed or
         velocity, current, voltage, force. The force of a drive with an ideal source is its gain times the
@@ -133,12 +144,15 @@ def _used(design: Design, record: Record, measured: Mapping[str, FloatArray]) ->
     return {name: text for name, text in used.items() if name in record.signals}
 
 
+def command_name(design: Design) -> str:
+    """The signal that commands a design's drive: that of its outermost stage."""
+    return COMMANDS[design.axis, design.controller.outermost]
+
+
 def command_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
     """The command of a record that the design's drive takes: its signal and values; None without one."""
-    for name in COMMANDS[design.axis]:
-        if name in record.signals:
-            return name, record[name]
-    return None
+    name = command_name(design)
+    return (name, record[name]) if name in record.signals else None
 
 
 def measured_signals(
@@ -201,12 +215,12 @@ def model_signals(
 
     command = command_of(design, record)
     if command is None:
-        wanted = COMMANDS[design.axis][0]
+        wanted = command_name(design)
         raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
     notes = [] if notes is None else notes
     design = _with_supply(design, record, notes)
     time = record.time_s - record.time_s[0]
-    load = _load(design, record, time, notes)
+    design, load = _load(design, record, time, notes)
     period = design.controller.period_s
     run = simulate(
         design,
@@ -232,20 +246,21 @@ def model_signals(
     return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
 
 
-def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> LoadMoment:
-    """The recorded load; without one, the design's own slope of the load over the angle."""
+def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> tuple[Design, LoadMoment]:
+    """The recorded load, which holds all of it; without one, the design's own slope and gravity act."""
     from nonlinear import loads
 
-    name = LOADS[design.axis]
-    slope = design.load.moment_slope_Nm_rad
-    if name in record.signals:
-        if slope:
-            notes.append("the recorded load holds all of it: the design's load.moment_slope is not added")
-        return loads.series(time, record[name])
-    if slope:
-        notes.append(f"load: the design's load.moment_slope, {slope:g} per unit of output deflection")
-        return loads.proportional(slope)
-    return loads.constant(0.0)
+    name, own = LOADS[design.axis], []
+    if design.load.moment_slope_Nm_rad:
+        own.append("load.moment_slope")
+    if design.load.gravity is not None:
+        own.append("load.gravity")
+    if name not in record.signals:
+        notes.extend(f"load: the design's {key} acts" for key in own)
+        return design, loads.constant(0.0)
+    notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
+    bare = replace(design, load=replace(design.load, gravity=None, moment_slope_Nm_rad=0.0))
+    return bare, loads.series(time, record[name])
 
 
 def _initial(design: Design, measured: dict[str, FloatArray]) -> State:

@@ -27,7 +27,7 @@ class Waiting:
 
 @dataclass(frozen=True)
 class Threshold:
-    """Threshold of motion at one hinge moment.
+    """Threshold of motion at one load torque.
 
     Attributes
     ----------

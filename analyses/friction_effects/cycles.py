@@ -82,7 +82,7 @@ class Settling:
 
 @dataclass(frozen=True)
 class LimitCycles:
-    """Everything about limit cycles at one hinge moment.
+    """Everything about limit cycles at one load torque.
 
     Attributes
     ----------

@@ -68,7 +68,7 @@ def foreseen_cycles(design: Design, load_Nm: float, top_speed_rad_s: float) -> t
 
 
 def at_load(cycle: ForeseenCycle, design: Design, from_load_Nm: float, load_Nm: float) -> ForeseenCycle:
-    """The same cycle at another hinge moment: the slope at the border is the same, so W goes with Tc."""
+    """The same cycle at another load torque: the slope at the border is the same, so W goes with Tc."""
     ratio = _mean_dry(design, load_Nm) / _mean_dry(design, from_load_Nm)
     return replace(
         cycle,

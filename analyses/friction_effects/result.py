@@ -24,7 +24,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class FrictionPoint:
-    """What dry friction does at one hinge moment.
+    """What dry friction does at one load torque.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class FrictionPoint:
 
 @dataclass(frozen=True)
 class FrictionEffects:
-    """Friction at small signals, one point a hinge moment.
+    """Friction at small signals, one point a load torque.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class FrictionEffects:
 def friction_effects(
     design: Design, loops: Loops | None = None, *, progress: Progress | None = None
 ) -> FrictionEffects:
-    """Find threshold, hysteresis, standing error and limit cycles at each hinge moment of the design.
+    """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def friction_effects(
     loops : Loops, optional
         Sampled and sliding, of this design, if they are there already.
     progress : callable, optional
-        Called with (hinge moments done, in all).
+        Called with (load torques done, in all).
 
     Raises
     ------

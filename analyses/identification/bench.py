@@ -10,6 +10,7 @@ from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.electrical import ElectricalFit, electrical_estimate, fit_electrical
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import JointModel, fit_records, held_out_residual
 from analyses.identification.output_error import OutputErrorResult
@@ -50,11 +51,13 @@ class BenchSettings:
     """What was asked of an identification; ``fixed`` by key of the design, in SI.
 
     ``form`` "map": friction maps with break points are tried, and one is taken where it is clearly better.
-    ``gravity``: a pendulum at the output is looked for (it is where the design has one).
+    ``gravity``: a pendulum at the output is looked for (it is where the design has one). ``electrical``: R
+    and the motor's constant come from the voltage equation first.
     """
 
     form: FrictionForm | Literal["map"] = "symmetric"
     gravity: bool = False
+    electrical: bool = False
     cutoff_hz: float | None = None
     decimation: int | None = None
     fixed: Mapping[str, float] = field(default_factory=dict)
@@ -78,6 +81,7 @@ class BenchResult:
     items: tuple[Item, ...]
     settings: BenchSettings
     laws: tuple[LawChoice, ...] = ()
+    electrical: ElectricalFit | None = None
 
     @property
     def passed(self) -> bool:
@@ -104,7 +108,11 @@ def identify_bench(
     used = tuple(prepared(record) for record in records)
     unseen = tuple(prepared(record) for record in validation)
     findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
-    start = with_fixed(design, settings.fixed)
+    start, electrical = with_fixed(design, settings.fixed), None
+    if settings.electrical:
+        electrical = fit_electrical(start, used)
+        told = f"voltage equation of {', '.join(record.name for record in records)}"
+        start = design_with_estimate(start, electrical_estimate(start, electrical, told))
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
     items = _fit_items(design, findings, model, settings.residual_limit)
@@ -132,6 +140,7 @@ def identify_bench(
         items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
         settings=settings,
         laws=laws,
+        electrical=electrical,
     )
 
 

@@ -1,4 +1,4 @@
-"""Frequency response of a drive from a record of a periodic excitation: lines, means, noise."""
+"""Frequency response from a record of a periodic excitation: lines, their means over periods, their noise."""
 
 from __future__ import annotations
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import correlate_record
 from analyses.identification.dynamic import FrictionForm
 from analyses.identification.inverse import default_value
@@ -34,10 +35,17 @@ def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) ->
     A record without a command is held against the torque that the design's own inertia and friction need for
     its motion.
     """
-    return tuple(
-        _simulated(design, record) if has_command(design, record) else _needed(design, record, form)
-        for record in records
-    )
+    return tuple(_one(design, record, form) for record in records)
+
+
+def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
+    if not has_command(design, record):
+        return _needed(design, record, form)
+    try:
+        return _simulated(design, record)
+    except InputError as error:  # a part that the simulator does not have
+        found = _needed(design, record, form)
+        return replace(found, how=f"{found.how} ({error.message})")
 
 
 def _simulated(design: Design, record: Record) -> Resimulated:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +64,7 @@ class TwoMass:
             lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + 1 / (p["motor_inertia"] * n2))))
         )
 
-    def _derived(self, of) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+    def _derived(self, of: Callable[[dict[str, float]], float]) -> tuple[float, float]:
         own = {name: self[name] for name in NAMES}
         middle = of(own)
         slopes = []
@@ -134,8 +134,7 @@ def fit_two_mass(
 
     def residual(q: FloatArray) -> FloatArray:
         g = angle_responses(lines.omega_rad_s, unpacked(q), reduction)
-        parts = [_line_residual(lines, output, torque, g[k]) for output, k in outputs]
-        both = np.concatenate(parts)
+        both = _whitened(lines, [output for output, _ in outputs], torque, [g[k] for _, k in outputs])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
     begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
@@ -148,7 +147,7 @@ def fit_two_mass(
     freedom = max(len(found.fun) - len(names), 1)
     misfit = float(np.sqrt(2.0 * found.cost / freedom))
     inverse = np.linalg.inv((found.jac / size).T @ (found.jac / size)) / np.outer(size, size)
-    few = (lines.periods - 1) / max(lines.periods - 2, 1)
+    few = (lines.periods - 1) / max(lines.periods - 1 - len(outputs), 1)
     covariance = inverse * few * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
     own = unpacked(found.x)
     return TwoMass(
@@ -176,14 +175,26 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...], n: float) -> Flo
     return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
 
 
-def _line_residual(lines: Lines, output: str, by: str, g: ComplexArray) -> ComplexArray:
-    k, j = lines.names.index(output), lines.names.index(by)
-    n = lines.noise
-    variance = (
-        np.real(n[:, k, k]) + np.abs(g) ** 2 * np.real(n[:, j, j]) - 2.0 * np.real(n[:, k, j] * g.conj())
-    )
-    floor = 1e-24 * np.abs(lines.means[k]) ** 2
-    return np.asarray((lines.means[k] - g * lines.means[j]) / np.sqrt(np.maximum(variance, floor)))
+def _whitened(
+    lines: Lines, outputs: Sequence[str], by: str, responses: Sequence[ComplexArray]
+) -> ComplexArray:
+    """Residuals ``output - G torque`` of every line, whitened by their covariance.
+
+    The residuals of two outputs share the noise of the torque, so they are whitened together.
+    """
+    j = lines.names.index(by)
+    rows = [lines.names.index(output) for output in outputs]
+    count = len(lines.omega_rad_s)
+    mix = np.zeros((count, len(rows), len(lines.names)), dtype=complex)
+    for r, (k, g) in enumerate(zip(rows, responses, strict=True)):
+        mix[:, r, k] = 1.0
+        mix[:, r, j] -= g
+    rest = np.einsum("krs,sk->kr", mix, lines.means)
+    covariance = np.einsum("krs,kst,kqt->krq", mix, lines.noise, mix.conj())
+    floor = 1e-24 * np.array([np.abs(lines.means[k]) ** 2 for k in rows]).T
+    covariance = covariance + floor[:, :, None] * np.eye(len(rows))
+    root = np.linalg.cholesky(covariance)
+    return np.asarray(np.linalg.solve(root, rest[:, :, None])[:, :, 0].ravel())
 
 
 def start_of(

@@ -110,7 +110,7 @@ def amplitude_map(
     loops : Loops
         Sampled, sliding, of this design.
     load_Nm : float
-        Hinge moment.
+        Load torque.
     counts : (int, int)
         Amplitudes and frequencies.
     progress : callable, optional

@@ -22,7 +22,7 @@ GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
 
 @dataclass(frozen=True)
 class SawtoothRun:
-    """The last periods at one hinge moment; output side, motor speed and current at the motor.
+    """The last periods at one load torque; output side, motor speed and current at the motor.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Sawtooth:
         formulas reverse at once, so this much lag may come on top.
     has_current : bool
     runs : tuple of SawtoothRun
-        One a hinge moment.
+        One a load torque.
     reason : str
         Why there is none; then ``runs`` is empty.
     """
@@ -111,7 +111,7 @@ class Sawtooth:
 def sawtooth(
     design: Design, *, amplitude_rad: float | None = None, frequency_hz: float | None = None
 ) -> Sawtooth:
-    """Simulate a sine of which the output can only follow the flanks, at each hinge moment of the design.
+    """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 
     Parameters
     ----------

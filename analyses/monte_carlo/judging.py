@@ -41,7 +41,7 @@ def loops_of(design: Design) -> tuple[str, ...]:
 
 
 def drive_column(quantity: str, load_Nm: float | None) -> str:
-    """Name of the column of a static figure at a hinge moment."""
+    """Name of the column of a static figure at a load torque."""
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
 
 

@@ -25,7 +25,7 @@ class StepCheck:
         Linear axis: m.
     duration_s : float
     load_Nm : float
-        Hinge moment, constant.
+        Load torque, constant.
     """
 
     amplitude_rad: float

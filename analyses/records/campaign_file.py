@@ -37,10 +37,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -129,9 +131,9 @@ def load_campaign(path: str | Path) -> Campaign:
 def _check(campaign: Campaign) -> None:
     if not campaign.runs:
         raise InputError("no [[run]] is listed", where=campaign.origin)
-    ids = [run.id for run in campaign.runs]
-    for identity in ids:
-        if ids.count(identity) > 1:
+    CAMPAIGN_RUNS.check(len(campaign.runs), campaign.origin)
+    for identity, times in Counter(run.id for run in campaign.runs).items():
+        if times > 1:
             raise InputError(f'run.id = "{identity}": given twice', where=campaign.origin)
     for name in ("current", "speed"):
         if name not in {signal.name for signal in campaign.drive.signals}:

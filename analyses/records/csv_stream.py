@@ -10,7 +10,9 @@ from typing import BinaryIO
 
 import numpy as np
 
+from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import open_regular
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
@@ -21,8 +23,8 @@ from analyses.records.time_axis import TimeAxis
 from analyses.records.units import converter
 
 BLOCK_BYTES = 1 << 22
-MAX_LINE_BYTES = 1 << 20
-MAX_ROWS = 4_000_000
+MAX_LINE_BYTES = CSV_LINE_BYTES.most
+MAX_ROWS = CSV_ROWS.most
 
 
 def read_csv_record(
@@ -117,11 +119,7 @@ def _blocks(
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Block]:
     layout = spec.format
-    try:
-        stream = path.open("rb")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
-    with stream:
+    with open_regular(path, "CSV file") as stream:
         size, done = path.stat().st_size, 0
         columns: Columns | None = None
         for data in _line_blocks(stream, str(path)):

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_lti.bounds import MAT_DIMENSIONS, MAT_VALUES
 from actuator_lti.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -25,8 +26,8 @@ NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8
 CELL, STRUCTURE, TEXT = 1, 2, 4
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX_FLAG = 0x08
-MAX_BYTES = 1 << 31
-MAX_DIMENSIONS = 32
+MAX_BYTES = 8 * MAT_VALUES.most  # unpacked
+MAX_DIMENSIONS = MAT_DIMENSIONS.most
 
 
 @dataclass
@@ -194,6 +195,8 @@ def _inflated(body: bytes, place: int) -> bytes:
         inflated = unpack.decompress(body, MAX_BYTES)
     except zlib.error as error:
         raise InputError(f"damaged at byte {place}: {error}") from None
+    if not unpack.eof and len(inflated) >= MAX_BYTES:
+        raise InputError(f"at byte {place}: unpacks to more than allowed: {MAT_VALUES.allowed} numbers")
     if unpack.unconsumed_tail or not unpack.eof:
         raise InputError(f"damaged at byte {place}: compressed data do not end")
     return inflated
@@ -207,4 +210,5 @@ def _numbers(kind: int, body: bytes, order: str) -> FloatArray | None:
     dtype = np.dtype(f"{order}{code}")
     if len(body) % dtype.itemsize:
         return None
+    MAT_VALUES.check(len(body) // dtype.itemsize)
     return np.frombuffer(body, dtype=dtype).astype(np.float64)

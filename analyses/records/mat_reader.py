@@ -6,8 +6,10 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from actuator_lti.bounds import MAT_BYTES
 from actuator_lti.errors import InputError
-from analyses.records.mat5 import MAX_BYTES, MatContent, read_mat5
+from actuator_lti.reading import read_bytes
+from analyses.records.mat5 import MatContent, read_mat5
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.table_record import record_of_columns
@@ -33,15 +35,7 @@ def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = No
 
 def load_mat(path: Path) -> tuple[MatContent, str]:
     """The content of a file, without its empty arrays, and its SHA-256."""
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(
-                f"{size} bytes: a .mat file of at most {MAX_BYTES} bytes is read", where=str(path)
-            )
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+    data = read_bytes(path, ".mat file", MAT_BYTES)
     try:
         content = read_mat5(data)
     except InputError as error:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from actuator_lti.errors import InputError
+from actuator_lti.reading import open_regular
 from analyses.records.campaign_file import record_spec
 from analyses.records.campaign_import import read_record
 from analyses.records.csv_stream import MAX_ROWS
@@ -129,11 +130,8 @@ def _with_gain(record: Record) -> Record:
 
 
 def _head(path: Path) -> str:
-    try:
-        with path.open("rb") as stream:
-            return stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+    with open_regular(path, "record") as stream:
+        return stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
 
 
 def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
+from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_bytes, shown_path
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
 from analyses.records.table_record import record_of_columns
@@ -31,12 +34,15 @@ def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    where = shown_path(path)
+    data = read_bytes(path, "Parquet file", TABLE_BYTES)
     try:
-        table = pq.ParquetFile(path, memory_map=False).read()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", where=str(path)) from None
-    except pa.ArrowException as error:
-        raise InputError(f"is no Parquet file: {error}", where=str(path)) from None
+        file = pq.ParquetFile(BytesIO(data))
+        TABLE_ROWS.check(file.metadata.num_rows, where)
+        CSV_COLUMNS.check(file.metadata.num_columns, where)
+        table = file.read()
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"is no Parquet file: {error}", where=where) from None
     found = {}
     for field in table.schema:
         if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
@@ -46,4 +52,4 @@ def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return hashlib.sha256(read_bytes(path, "Parquet file", TABLE_BYTES)).hexdigest()

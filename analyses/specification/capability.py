@@ -1,4 +1,4 @@
-"""Rate, acceleration and current at each hinge moment, in closed form and simulated."""
+"""Rate, acceleration and current at each load torque, in closed form and simulated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEADY_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Capability:
-    """What the drive can do at one hinge moment; output side unless a name says motor.
+    """What the drive can do at one load torque; output side unless a name says motor.
 
     Attributes
     ----------

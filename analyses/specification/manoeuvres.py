@@ -19,7 +19,7 @@ LONGEST_TICKS = 60_000
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """One manoeuvre at one hinge moment.
+    """One manoeuvre at one load torque.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The torque-speed plane of the motor: what bounds it, and what friction asks for at each hinge moment."""
+"""The torque-speed plane of the motor: what bounds it, and what friction asks for at each load torque."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class TorqueSpeedPlane:
     bounds : tuple of Curve
         Voltage line, peak current, continuous current, speed limit; those that exist.
     demands : tuple of Curve
-        Friction (and load, where it passes) in steady motion at each hinge moment.
+        Friction (and load, where it passes) in steady motion at each load torque.
     """
 
     bounds: tuple[Curve, ...]

@@ -29,12 +29,12 @@ class Specification:
     ----------
     design : Design
     capabilities : tuple of Capability
-        One a hinge moment.
+        One a load torque.
     steps : tuple of StepTime
-        By hinge moment, then from small to full deflection.
+        By load torque, then from small to full deflection.
     plane : TorqueSpeedPlane
     manoeuvres : tuple of Manoeuvre
-        By hinge moment.
+        By load torque.
     """
 
     design: Design
@@ -47,7 +47,7 @@ class Specification:
 def specification(
     design: Design, loops: Loops | None = None, *, progress: Progress | None = None
 ) -> Specification:
-    """Work out and simulate the figures at each hinge moment of the design.
+    """Work out and simulate the figures at each load torque of the design.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Step times of the whole nonlinear drive from small to full deflection, at each hinge moment."""
+"""Step times of the whole nonlinear drive from small to full deflection, at each load torque."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class StepTime:
 def step_times(
     design: Design, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
 ) -> tuple[StepTime, ...]:
-    """Simulate steps at every fraction of full deflection and every hinge moment."""
+    """Simulate steps at every fraction of full deflection and every load torque."""
     fractions = sorted({SMALLEST, *design.validation.amplitude_fractions})
     loads = design.validation.loads_Nm
     full, Ts = design.validation.full_deflection_rad, design.controller.period_s

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from analyses.responses import response_at
+
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
 Flags = npt.NDArray[np.bool_]
@@ -116,4 +118,4 @@ def sweep_errors(sweep: Any, loop: Any, response: str = "open_loop") -> SweepErr
 def linear_response(system: Any, frequency_hz: npt.ArrayLike) -> Complexes:
     """Response of a sampled python-control system at frequencies in Hz."""
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    return np.atleast_1d(system(np.exp(1j * omega * system.dt)))
+    return response_at(system, omega)

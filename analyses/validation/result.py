@@ -124,7 +124,7 @@ class Validation:
     def __str__(self) -> str:
         judged = [row for row in self.ledger if row.passed is not None]
         held = sum(row.passed is True for row in judged)
-        words = f"{self.design.name}: {held} of {len(judged)} predictions hold"
+        words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
         if self.conditional is not None and self.conditional.found:
             words += "; a command within full deflection makes the drive diverge"

@@ -36,7 +36,7 @@ def ride(design: Design, load_Nm: float = 0.0) -> Ride:
     """Choose a constant speed that leaves room to every limit and stays far from reversal.
 
     The speed takes at most `SHARE` of the speed limit, the voltage and the peak current.  A drive whose
-    hinge moment grows with the angle cannot ride at a steady torque: it stands, without dry friction.
+    load torque grows with the angle cannot ride at a steady torque: it stands, without dry friction.
 
     Raises
     ------

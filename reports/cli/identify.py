@@ -54,6 +54,24 @@ InertiaOption = Annotated[
         help="Where the inertia goes, less the design's others: motor.rotor_inertia or load.inertia.",
     ),
 ]
+FrequencyOption = Annotated[
+    bool,
+    typer.Option(
+        "--frequency-response", help="Of one record with a periodic excitation: a compliant two-mass drive."
+    ),
+]
+PlayOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--play",
+        metavar="RECORD",
+        help="With --frequency-response: a reversing motion, both angles.",
+    ),
+]
+PeriodOption = Annotated[
+    float | None,
+    typer.Option("--period", metavar="s", help="Period of the excitation (default: found from the command)."),
+]
 BenchOption = Annotated[
     Path | None,
     typer.Option(
@@ -77,6 +95,10 @@ FrictionOption = Annotated[
 ]
 GravityOption = Annotated[
     bool, typer.Option("--gravity", help="Of records: look for a pendulum at the output, m g l sin(angle).")
+]
+ElectricalOption = Annotated[
+    bool,
+    typer.Option("--electrical", help="Of records: R, kE and kM from u = R i + kE w first (L if it shows)."),
 ]
 RefineOption = Annotated[
     bool,
@@ -119,6 +141,9 @@ def identify(
     dynamic: DynamicOption = None,
     validate: ValidateOption = None,
     virtual_bench: BenchOption = None,
+    frequency_response: FrequencyOption = False,
+    play: PlayOption = None,
+    period: PeriodOption = None,
     design: DesignOption = None,
     fix: FixOption = None,
     accept: AcceptOption = False,
@@ -128,6 +153,7 @@ def identify(
     force: ForceOption = False,
     friction: FrictionOption = "symmetric",
     gravity: GravityOption = False,
+    electrical: ElectricalOption = False,
     refine: RefineOption = False,
     cutoff: CutoffOption = None,
     decimation: DecimationOption = None,
@@ -141,7 +167,7 @@ def identify(
     """Identify a drive from bench records, and write the result as a design with
     tolerances.
 
-    Three ways to call it:
+    Four ways to call it:
 
     identify campaign.toml --out result: C0, Cv and CM from the steady parts
     of many runs. A bad run is set aside and named, the others go on.
@@ -150,6 +176,9 @@ def identify(
     and offset from records of a motion together, by the inverse dynamic
     model; --refine simulates the drive as well. The EMPS benchmark's file is
     known as it is.
+
+    identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
+    inertias, stiffness, damping and play of a two-mass drive.
 
     identify --virtual-bench folder --seed 1: simulate a campaign of 54 runs,
     and write logs and campaign.toml as a bench would. Try the first way on
@@ -161,7 +190,7 @@ def identify(
     design is written without --accept.
     """
     from actuator_lti.errors import InputError
-    from reports.cli import identify_campaign, identify_records
+    from reports.cli import identify_campaign, identify_frequency, identify_records
     from reports.cli.identify_common import Common
 
     given = [*(files or []), *([dynamic] if dynamic is not None else [])]
@@ -182,6 +211,8 @@ def identify(
         raise InputError("give one of: a campaign file, records, --virtual-bench DIR")
     elif virtual_bench is not None:
         _bench(virtual_bench, design or "ilr33-amber", seed, force, as_json, quiet)
+    elif frequency_response:
+        identify_frequency.run(given, play, period, common)
     elif identify_campaign.is_campaign(given):
         if validate or refine:
             raise InputError("--validate and --refine go with records, not with a campaign")
@@ -190,6 +221,7 @@ def identify(
         settings = {
             "form": friction,
             "gravity": gravity,
+            "electrical": electrical,
             "cutoff_hz": cutoff,
             "decimation": decimation,
             "inertia_to": inertia_to,

@@ -76,6 +76,7 @@ def as_data(result: BenchResult, written: Path | None) -> dict[str, Any]:
             }
             for n, v, s, d in values
         },
+        "electrical": None if result.electrical is None else asdict(result.electrical),
         "laws": [asdict(law) for law in result.laws],
         "fixed": {name: asdict(one) for name, one in model.fixed.items()},
         "covariance": model.covariance,

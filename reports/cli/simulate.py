@@ -42,10 +42,15 @@ BiasOption = Annotated[
     float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
 ]
 SlopeOption = Annotated[
-    float, typer.Option("--load-slope", metavar="N_m/rad", help="Hinge moment per rad of output angle.")
+    float,
+    typer.Option(
+        "--load-slope",
+        metavar="N_m/rad",
+        help="Load torque per rad of output angle, added to the design's.",
+    ),
 ]
 LoadFileOption = Annotated[
-    Path | None, typer.Option("--load-file", metavar="CSV", help="Hinge moment over time: s, N m.")
+    Path | None, typer.Option("--load-file", metavar="CSV", help="Load torque over time: s, N m.")
 ]
 RecordOption = Annotated[
     Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
@@ -207,7 +212,7 @@ def build_command(
 
 
 def build_load(load: float, slope: float, file: Path | None) -> Any:
-    """The hinge moment asked for."""
+    """The load torque asked for."""
     from dataclasses import replace
 
     from nonlinear import loads

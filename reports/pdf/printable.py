@@ -17,7 +17,8 @@ MAX_CELL = 600
 MAX_TEXT = 20_000
 MAX_TITLE = 240
 LINE_PT = 481.0
-SCALE = 0.78
+HALF_PT = 232.0
+SCALE = 0.54
 _LONG_WORD = re.compile(r"\S{24,}")
 _BREAKS = re.compile(r"[\t\n\r\f\v\x1c-\x1f\x85\u2028\u2029]+")
 _SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
@@ -77,15 +78,15 @@ def _required(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
 
 
 def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:
-    limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'sig:4')}".strip()
+    limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'short:6')}".strip()
     return {
         "state": _STATES[item.get("passed")],
         "cells": [
             clean(item.get("label"), 200),
             _WORDS[item.get("passed")],
-            show(item.get("value"), "sig:4"),
-            clean(limit, 60),
-            show_signed(item.get("distance")),
+            clean(item["shown"], 60) if item.get("shown") else show(item.get("value"), "sig:4"),
+            "" if item.get("shown") else clean(limit, 60),
+            "" if item.get("shown") else show_signed(item.get("distance")),
             clean(item.get("unit"), 30),
         ],
         "id": clean(item.get("id"), 120),
@@ -99,8 +100,21 @@ def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, 
         "title": clean(part["title"], MAX_TITLE),
         "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
         "status": part["status"],
-        "blocks": [_block(block, drawings) for block in part["blocks"]],
+        "blocks": _paired([(_block(block, drawings), block) for block in part["blocks"]]),
     }
+
+
+def _paired(made: Sequence[tuple[dict[str, Any], Mapping[str, Any]]]) -> list[dict[str, Any]]:
+    """Put half-wide figures that follow each other in pairs beside each other."""
+    blocks: list[dict[str, Any]] = []
+    for printed, block in made:
+        if printed["kind"] != "figure" or block.get("layout", "wide") == "wide":
+            blocks.append(printed)
+        elif blocks and blocks[-1]["kind"] == "row" and len(blocks[-1]["figures"]) == 1:
+            blocks[-1]["figures"].append(printed)
+        else:
+            blocks.append({"kind": "row", "figures": [printed]})
+    return blocks
 
 
 def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
@@ -142,9 +156,10 @@ def _glance(block: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _figure(block: Mapping[str, Any], svg: str) -> dict[str, Any]:
-    """Scale every figure alike, so that their lettering is the same and two fit on a page."""
+    """Scale every figure alike, so that their lettering is the same; half-wide ones stand in pairs."""
     size = _SIZE.search(svg)
-    width = min(LINE_PT, SCALE * float(size[1])) if size else LINE_PT
+    most = LINE_PT if block.get("layout", "wide") == "wide" else HALF_PT
+    width = min(most, SCALE * float(size[1])) if size else most
     texts = {"caption": clean(block["caption"], 2000), "alt": clean(block["alt"], 2000)}
     return {"kind": "figure", "svg": visible(svg), "width": width, **texts}
 

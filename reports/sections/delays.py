@@ -21,15 +21,17 @@ PARTS = {
 
 def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
     """Make the section from the budget of each loop."""
+    parts = _parts(budgets)
     columns = [
         doc.column("loop", "Loop"),
         doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
-        *(doc.column(key, label.capitalize(), "deg", format="fix:2") for key, label in PARTS.items()),
+        *(doc.column(key, label.capitalize(), "deg", format="fix:2") for key, label in parts.items()),
         doc.column("total", "Phase in all", "deg", format="fix:2"),
         doc.column("margin", "Left to −180°", "deg", format="fix:2"),
         doc.column("one_more", "One more sample", "deg", format="fix:2"),
     ]
-    rows = [_row(name, budget) for name, budget in budgets.items()]
+    nothing = dict.fromkeys(parts, 0.0)
+    rows = [nothing | _row(name, budget) for name, budget in budgets.items()]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
         "One more "
@@ -40,8 +42,8 @@ def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
             "label": name,
             "parts": [
                 {"name": label, "deg": -budget.items[key]}
-                for key, label in PARTS.items()
-                if abs(budget.items[key]) > 0.05
+                for key, label in parts.items()
+                if abs(budget.items.get(key, 0.0)) > 0.05
             ],
         }
         for name, budget in budgets.items()
@@ -65,6 +67,14 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
         "than "
         f"any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
     )
+
+
+def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
+    """Every item that occurs, with its words: the filters between the plant and the measurement."""
+    filters = dict.fromkeys(name for budget in budgets.values() for name in budget.filters_deg)
+    parts = dict(PARTS)
+    after = {key: parts.pop(key) for key in list(parts) if key not in ("controller", "plant")}
+    return parts | {name: name for name in filters} | after
 
 
 def _row(name: str, budget: DelayBudget) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from reports.sections.identification_inputs import finding_table, input_table, v
 
 if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
+    from analyses.identification.electrical import ElectricalFit
     from analyses.identification.inverse import JointModel
 
 LABELS = {
@@ -34,6 +35,8 @@ def section(result: BenchResult, axis: str) -> dict[str, Any]:
     blocks = [verdict_block(result.items), parameter_table(result, axis)]
     if result.refined is not None:
         blocks.append(refined_table(result))
+    if result.electrical is not None:
+        blocks.append(electrical_table(result.electrical))
     if result.laws:
         blocks.append(law_table(result, axis))
     blocks += fixed_blocks(result.model, axis)
@@ -125,6 +128,29 @@ def refined_table(result: BenchResult) -> dict[str, Any]:
         f"{refined.iterations} iterations. These values are the design's."
     )
     return doc.table("Refined by simulation", columns, rows, note)
+
+
+def electrical_table(fit: ElectricalFit) -> dict[str, Any]:
+    """R, kE and, where it is shown, L."""
+    labels = {
+        "resistance": ("Resistance R", "ohm"),
+        "back_emf": ("Back-EMF constant kE (kM follows)", "V s/rad"),
+        "inductance": ("Inductance L", "H"),
+        "offset": ("Offset of the voltage", "V"),
+    }
+    columns = [
+        doc.column("name", "Voltage equation"),
+        doc.column("value", "Value", format="sig:5"),
+        doc.column("std", "Standard error", format="sig:2"),
+        doc.column("unit", "Unit"),
+    ]
+    rows = [
+        {"name": labels[name][0], "value": fit[name], "std": fit.std(name), "unit": labels[name][1]}
+        for name in fit.names
+    ]
+    rows += [{"name": f"{labels[name][0]}: {why}"} for name, why in fit.not_shown.items()]
+    note = f"u = R i + kE w + L di/dt; relative residual {100.0 * fit.relative_residual:.3g} %."
+    return doc.table("Voltage equation", columns, rows, note)
 
 
 def law_table(result: BenchResult, axis: str) -> dict[str, Any]:

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
     doc.column("limit", "Limit"),
-    doc.column("probability", "Met by", "%", format="fix:3"),
-    doc.column("low", "at least, 95 %", "%", format="fix:3"),
-    doc.column("high", "at most", "%", format="fix:3"),
+    doc.column("probability", "Probability met", "%", format="fix:3"),
+    doc.column("low", "95 % lower bound", "%", format="fix:3"),
+    doc.column("high", "95 % upper bound", "%", format="fix:3"),
     doc.column("nominal", "Nominal", format="sig:4"),
     doc.column("sampled", "Worst sample", format="sig:4"),
     doc.column("number", "No.", align="right"),
@@ -37,7 +37,7 @@ FIGURE_COLUMNS = [
     doc.column("maximum", "Max", format="sig:4"),
     doc.column("mean", "Mean", format="sig:4"),
     doc.column("std", "Std", format="sig:3"),
-    doc.column("missing", "Without", align="right"),
+    doc.column("missing", "Missing", align="right"),
 ]
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
@@ -70,10 +70,31 @@ def section(
     ]))  # fmt: skip
     failed = any(item["passed"] is False for item in items)
     intro = (
-        f"{result.samples} designs drawn from the tolerances; sampled loops. The worst case is sought by an "
-        "optimiser in the whole tolerance box, as sampling alone does not find it."
+        f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
+        "case in "
+        "the whole tolerance box, as sampling alone does not find it."
     )
-    return doc.section("monte-carlo", "Tolerances", blocks, intro=intro, status="fail" if failed else "info")
+    status = "fail" if failed else "info"
+    return doc.section(
+        "monte-carlo", "Tolerances", blocks, result=_result(result), intro=intro, status=status
+    )
+
+
+def _result(result: MonteCarloResult) -> str:
+    """Say how many samples meet everything, and which requirement fails most often."""
+    every = next((odds for odds in result.odds if odds.id == "all"), None)
+    if every is None:
+        return f"The design states no requirement; {result.samples} samples were drawn."
+    words = f"{every.passed} of {every.count} samples meet every requirement"
+    weakest = min(
+        (odds for odds in result.odds if odds.id != "all"), key=lambda odds: odds.probability, default=None
+    )
+    if weakest is None or weakest.probability == 1.0:
+        return f"{words}."
+    return (
+        f"{words}; the one missed most often is {weakest.label} ({100.0 * weakest.probability:.3g} % meet "
+        "it)."
+    )
 
 
 def _case(result: MonteCarloResult, odds: Odds) -> WorstCase | None:
@@ -130,7 +151,7 @@ def _odds_table(result: MonteCarloResult) -> dict[str, Any]:
             "worst": None if case is None else finite(case.value), "unit": odds.unit,
             "_status": "pass" if odds.passed == odds.count and (case is None or case.passed) else "fail",
         })  # fmt: skip
-    note = "A dash under worst case: not sought, or a loop is unstable there."
+    note = "A dash in the worst case: not computed, or a loop is unstable there."
     return doc.table("Odds of meeting each requirement", ODDS_COLUMNS, rows, note)
 
 
@@ -144,7 +165,7 @@ def _figure_table(columns: Iterable[ColumnStatistics]) -> dict[str, Any]:
             **{key: finite(known.get(share)) for key, share in _SHOWN.items()},
         })  # fmt: skip
     note = (
-        "Quantiles are values of samples. Without: samples that have no such figure (unstable, not reached)."
+        "Quantiles are values of samples. Missing: samples without such a figure (unstable, or not reached)."
     )
     return doc.table("Distribution of every figure", FIGURE_COLUMNS, rows, note)
 

@@ -235,7 +235,7 @@ def _step_table(result: Specification) -> dict[str, Any]:
         doc.column("fraction", "of full", "%", format="sig:2"),
         doc.column("rise", "Rise 10–90 %", "ms", format="sig:3"),
         doc.column("overshoot", "Overshoot", "%", format="fix:1"),
-        doc.column("settle", "Settled to 2 %", "ms", format="sig:3"),
+        doc.column("settle", "Settled to 2 %", "ms", format="ms:3"),
         doc.column("rate", "Peak rate", f"{unit}/s", format="sig:3"),
         doc.column("limits", "Limits that act"),
     ]

@@ -37,7 +37,7 @@ CHECK_COLUMNS = [
     doc.column("overshoot", "Overshoot", "%", format="fix:1"),
     doc.column("settling", "Settling 2 %", "ms", format="sig:3"),
     doc.column("error", "Final error", "%", format="fix:2"),
-    doc.column("limited", "Limiters that acted"),
+    doc.column("limited", "Limits that act"),
 ]
 
 
@@ -52,7 +52,7 @@ def section(result: TuningResult) -> dict[str, Any]:
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
     return doc.section(
-        "tuning", title, blocks, intro=summary(result), status="pass" if result.feasible else "fail"
+        "tuning", title, blocks, result=summary(result), status="pass" if result.feasible else "fail"
     )
 
 
@@ -64,7 +64,7 @@ def summary(result: TuningResult) -> str:
         worst = ", ".join(f"{r.id} by {_amount(r)}" for r in result.requirements if r.relative < 0.0)
         return f"No gains meet every requirement over {over}. The best compromise misses {worst}."
     if not binding:
-        return f"Every requirement is met over {over}, each with a reserve of 30 % or more; none binds."
+        return f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
     names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
     return f"Every requirement is met over {over}. Nothing better is possible because of {names}."
 

@@ -27,7 +27,7 @@ from targets import Target, targets  # noqa: E402 - needs the path
 
 from actuator_lti.errors import InputError, NumericalError  # noqa: E402
 
-LIMIT_S = 60
+LIMIT_S = 120
 
 
 @dataclass(frozen=True)

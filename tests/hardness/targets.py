@@ -33,6 +33,7 @@ from analyses.records import (
     read_csv_record,
     read_mat_record,
 )
+from analyses.records.parquet_reader import read_parquet_record
 from analyses.sampling import read_table
 from nonlinear.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry
@@ -238,6 +239,17 @@ def mat_files() -> tuple[bytes, ...]:
 
 
 @cache
+def parquet_file() -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    stream = io.BytesIO()
+    columns = {"t": np.arange(20.0), "i": np.arange(20), "n": np.ones(20, np.float32)}
+    pq.write_table(pa.table(columns), stream)
+    return stream.getvalue()
+
+
+@cache
 def history_file() -> bytes:
     import sqlite3
     import tempfile
@@ -289,6 +301,7 @@ def targets() -> tuple[Target, ...]:
         Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
         Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
+        Target("parquet", (parquet_file(),), lambda p: read_parquet_record(p, SPEC), ".parquet"),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),
         Target("samples", (b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n",),
                lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv"),

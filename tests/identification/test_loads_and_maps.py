@@ -11,10 +11,12 @@ from actuator_lti.design import load_design, read_design_text, with_values, writ
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.bench import BenchSettings, identify_bench
+from analyses.identification.electrical import electrical_estimate, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
 from analyses.identification.to_design import design_with_estimate, joint_estimate, with_structure
 from analyses.records.record import Record, RowCounts
+from analyses.sampling import sampler_of
 
 PERIOD = 1e-3
 TIME = np.arange(0.0, 20.0, PERIOD)
@@ -114,8 +116,8 @@ def test_a_friction_map_is_found_with_its_break_points() -> None:
 
 
 def test_a_plain_law_needs_no_map() -> None:
-    """Over ten draws of noise the criterion never takes a map for a drive that has none."""
-    for seed in range(10):
+    """Over five draws of noise the criterion never takes a map for a drive that has none."""
+    for seed in range(5):
         found = fit_map(load_design("emps"), [_axis_record("plain", seed)])
         assert found.knots_rad_s is None
         assert next(law for law in found.laws if law.taken).name.startswith("plain")
@@ -153,3 +155,52 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
     whole, part = fit_records(design, [told]), fit_records(design, [cut])
     assert whole.values == pytest.approx(part.values, rel=1e-12)
     assert any("enabled from 0 s" in note for note in whole.records[0].notes)
+
+
+def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() -> None:
+    from analyses.correlation import correlate_record
+
+    record = _axis_record("map")
+    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
+    result = identify_bench(load_design("emps"), [record], settings=BenchSettings(form="map"))
+    assert result.design.friction.points
+    found = correlate_record(result.design, record)
+    assert all(np.isfinite(signal.relative_error) for signal in found.signals)
+    assert "torque needed for its motion" not in result.resimulated[0].how
+
+
+def _voltage_record(noise: float, *, fast: bool) -> Record:
+    """u = R i + kE w + L di/dt with R 0.5 ohm, kE 0.02, L 3 mH; fast: the current has a part at 60 Hz."""
+    w = 200.0 * _waves(1)
+    rate = 2.0 * _waves(1)
+    current = 2.0 * _waves(0)
+    if fast:
+        current = current + 0.5 * np.sin(2.0 * np.pi * 60.0 * TIME)
+        rate = rate + 0.5 * 2.0 * np.pi * 60.0 * np.cos(2.0 * np.pi * 60.0 * TIME)
+    rng = np.random.default_rng(2)
+    voltage = 0.5 * current + 0.02 * w + 3e-3 * rate + noise * rng.standard_normal(len(TIME))
+    return _record(angle=200.0 * _waves(0), current=current, voltage=voltage, speed=w)
+
+
+def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
+    """The same motor twice: a calm record tells R and kE only, a fast one the inductance as well."""
+    calm = fit_electrical(_joint(), [_voltage_record(0.5, fast=False)])
+    assert "inductance" not in calm.names
+    assert calm.not_shown["inductance"]
+    fast = fit_electrical(_joint(), [_voltage_record(0.05, fast=True)])
+    assert fast["inductance"] == pytest.approx(3e-3, rel=0.02)
+    for fit in (calm, fast):
+        assert fit["resistance"] == pytest.approx(0.5, abs=4.0 * fit.std("resistance") + 0.02)
+        assert fit["back_emf"] == pytest.approx(0.02, rel=0.02)
+
+
+def test_the_motors_one_constant_goes_into_the_design_as_one() -> None:
+    design = _joint()
+    fit = fit_electrical(design, [_voltage_record(0.5, fast=False)])
+    made = design_with_estimate(design, electrical_estimate(design, fit, "record"))
+    back = read_design_text(write_design(made))
+    assert back.motor.torque_constant_Nm_A == back.motor.back_emf_constant_Vs_rad
+    assert back.motor.inductance_H == design.motor.inductance_H
+    sampler = sampler_of(back)
+    draws = dict(zip(sampler.paths, sampler.draw(0, 64).T, strict=True))
+    assert draws["motor.torque_constant"] == pytest.approx(draws["motor.back_emf_constant"], rel=1e-5)

@@ -162,10 +162,10 @@ def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path: Path) -> N
     from actuator_lti.design import with_values
     from analyses.correlation import correlate_record
     from analyses.records import open_record
-    from nonlinear import commands, loads, simulate
+    from nonlinear import commands, simulate
 
     design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
-    run = simulate(design, commands.sine(0.08, 2.0), 0.6, loads.proportional(-60.0))
+    run = simulate(design, commands.sine(0.08, 2.0), 0.6)
     run.to_csv(tmp_path / "r.csv")
     result = correlate_record(design, open_record(tmp_path / "r.csv"))
     assert max(signal.relative_error for signal in result.signals) < 1e-9
@@ -276,3 +276,24 @@ def test_a_coefficient_of_a_campaign_can_be_fixed(
     assert status == 1
     status, _, err = _run(capsys, *arguments[:3], "--fix", "motor.resistance=1 ohm")
     assert (status, "a campaign can fix" in err) == (2, True)
+
+
+def test_the_designs_slope_of_the_load_is_used_by_simulate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What `simulate` writes without being told of the slope is what the slope gives, and correlates."""
+    from actuator_lti.design import with_values, write_design
+
+    design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
+    (tmp_path / "d.toml").write_text(write_design(design))
+    run = ("--command", "sine", "--amplitude", "4", "--frequency", "2", "--duration", "0.4")
+    own, bare = ("simulate", str(tmp_path / "d.toml"), *run), ("simulate", "ilr33-amber", *run)
+    assert _run(capsys, *own, "--csv", str(tmp_path / "a.csv"))[0] == 0
+    assert _run(capsys, *bare, "--load-slope", "-60", "--csv", str(tmp_path / "b.csv"))[0] == 0
+    assert _run(capsys, *bare, "--csv", str(tmp_path / "c.csv"))[0] == 0
+    a, b, c = ((tmp_path / f"{name}.csv").read_text() for name in "abc")
+    assert a == b
+    assert a != c
+    status, out, _ = _run(capsys, "correlate", str(tmp_path / "d.toml"), str(tmp_path / "a.csv"), "--json")
+    assert status == 0
+    assert json.loads(out)["summary"]["current"]["relative_error"] < 1e-9

@@ -81,7 +81,8 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
         if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
             velocity = design.controller.velocity
             assert velocity is not None
-            values[path] = np.minimum(values[path], 2.5 / (velocity.every * values["control.period"]))
+            most = 2.0 if path.endswith("pole") else 2.5  # a pole on its zero would be no state at all
+            values[path] = np.minimum(values[path], most / (velocity.every * values["control.period"]))
     return values
 
 
@@ -125,6 +126,9 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
     loops = assemble_loops(design)
     for name, loop in loops.present.items():
         truth = stability_margins(loop.open_loop)
+        if truth.stable is None:  # pole of the PI on the zero that the load's stiffness puts at z = 1
+            assert name == "velocity"
+            continue
         assert figures.stable(name)[0] == truth.stable, name
         for quantity in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
             mine = figures.quantity(quantity.removesuffix("_db").removesuffix("_deg"), name)[0]

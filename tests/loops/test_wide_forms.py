@@ -212,3 +212,19 @@ def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() ->
 def test_encoder_tracking_needs_its_bandwidth() -> None:
     with pytest.raises(InputError, match="bandwidth"):
         assemble_loops(replace(drive_d(), encoder=Encoder(speed="tracking")))
+
+
+def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
+    from analyses.loop_survey import survey_loops
+    from reports.sections.delays import section
+
+    base = drive_d(*FILTERS[:2])
+    assert base.coupling is not None
+    coupling = replace(base.coupling, play_rad=0.01)
+    design = replace(base, coupling=coupling, friction=replace(base.friction, load_coefficient=0.01))
+    survey = survey_loops(design)
+    labels = [point.label for point in survey.operating_points]
+    assert labels[1:4] == ["load driven by the motor", "by the load", "in the gap of the play"]
+    rows = section(survey.budgets)["blocks"][1]["rows"]
+    assert all(row["torque notch 2 900 rad/s"] <= 0.0 for row in rows)
+    assert rows[0]["torque notch 2 900 rad/s"] == 0.0  # the current loop has none

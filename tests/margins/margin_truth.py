@@ -122,9 +122,11 @@ def _estimates(p: list[mpf]) -> np.ndarray:
     z = z / centre
     derivative = np.polyder(q)
     for _ in range(60):
-        newton = np.polyval(q, z) / np.polyval(derivative, z)
-        gap = z[:, None] - z[None, :] + np.eye(n)
-        step = newton / (1 - newton * ((1 / gap).sum(axis=1) - 1))
+        with np.errstate(all="ignore"):  # roots over too many decades for doubles stay where they started
+            newton = np.polyval(q, z) / np.polyval(derivative, z)
+            gap = z[:, None] - z[None, :] + np.eye(n)
+            step = newton / (1 - newton * ((1 / gap).sum(axis=1) - 1))
+        step = np.where(np.isfinite(step), step, 0.0)
         z = z - step
         if (np.abs(step) < 1e-13 * np.abs(z)).all():
             break

@@ -7,6 +7,7 @@ import math
 import control
 import numpy as np
 import pytest
+from margin_families import sampled_slowly_moving
 from margin_truth import truth_of
 
 from actuator_lti.errors import InputError
@@ -205,3 +206,13 @@ def test_sampled_state_spaces_with_integrators_have_an_answer(
     assert m.stable is (expected.unstable == 0)
     assert [p.deg for p in m.phase_margins] == pytest.approx(expected.phase_margins_deg, abs=1e-6)
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_slow_sampled_loops_keep_thirteen_digits(seed: int) -> None:
+    loop = sampled_slowly_moving(np.random.default_rng([seed, 5]))  # poles down to 1e-6 a sample
+    m, expected = stability_margins(loop), truth_of(loop)
+    assert m.evidence != "withheld"
+    found = [p.frequency_rad_s * loop.dt for p in m.phase_margins]
+    assert found == pytest.approx(expected.gain_crossovers, rel=2e-14)
+    assert [p.deg for p in m.phase_margins] == pytest.approx(expected.phase_margins_deg, abs=2e-12)

@@ -18,6 +18,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.errors import InputError
 from reports import document as doc
 from reports.build import design_report, write_report
+from reports.certain import certain
 from reports.html import page
 from reports.numbers import show
 
@@ -82,8 +83,8 @@ def test_the_tables_hold_the_margins_of_the_engine(built: Built, name: str) -> N
         for row in rows_of(built.document, "margins", "Stability margins")
         if row["loop"] == f"{name.capitalize()} loop"
     )
-    assert row["gain_margin_db"] == margins.gain_margin_db
-    assert row["phase_margin_deg"] == margins.phase_margin_deg
+    assert row["gain_margin_db"] == certain(margins.gain_margin_db, "db")
+    assert row["phase_margin_deg"] == certain(margins.phase_margin_deg, "deg")
     assert row["crossover_hz"] == pytest.approx(margins.phase_margin.frequency_hz)
     assert row["delay_margin_ms"] == pytest.approx(1e3 * margins.delay_margin_s)
     crossings = [
@@ -113,7 +114,8 @@ def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
     for block, loop in zip(figures, loops, strict=True):
         margins = stability_margins(loop.open_loop)
         assert len(block["data"]["gain_margins"]) == len(margins.gain_margins)
-        assert [m["deg"] for m in block["data"]["phase_margins"]] == [m.deg for m in margins.phase_margins]
+        shown = [m["deg"] for m in block["data"]["phase_margins"]]
+        assert shown == [certain(m.deg, "deg") for m in margins.phase_margins]
 
 
 def test_the_phase_of_a_figure_does_not_jump(built: Built) -> None:

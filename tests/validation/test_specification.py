@@ -110,7 +110,7 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
     assert {"map", "amplitude_bode", "torque_speed"} <= set(names)
     assert ("sawtooth" in names) == name.startswith("ilr33")
     for block in doc.figures(again):
-        svg = draw_svg(block["figure"], block["data"])
+        svg = draw_svg(block["figure"], block["data"], page=False)
         assert svg.startswith("<svg")
         assert "nan" not in svg.lower().replace("nano", "")
 

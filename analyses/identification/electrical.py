@@ -1,0 +1,150 @@
+"""Resistance, back-EMF constant and, only where the record shows it, inductance: from u, i and w."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.differentiation import central_difference
+from analyses.identification.least_squares import solve, told_apart
+from analyses.identification.rows import motion_of, recipe_for
+from analyses.identification.to_design import Estimate
+from analyses.records.prepare import period_of
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+NAMES = ("resistance", "back_emf", "inductance", "offset")
+SHOWN = 5.0
+"""A value counts as shown where it exceeds its standard error so many times."""
+KEYS = {
+    "resistance": "motor.resistance",
+    "back_emf": "motor.back_emf_constant",
+    "inductance": "motor.inductance",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElectricalFit:
+    """``u = R i + kE w + L di/dt + offset`` (equation 1), and what the records do not show, and why."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    not_shown: dict[str, str]
+    relative_residual: float
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)])
+
+    def std(self, name: str) -> float:
+        """Standard error, with the correlation of the residual in time."""
+        k = self.names.index(name)
+        return float(np.sqrt(self.covariance[k, k]))
+
+
+def fit_electrical(
+    design: Design, records: Sequence[Record], *, only: tuple[str, ...] | None = None
+) -> ElectricalFit:
+    """Fit the voltage equation to records of voltage, current and motion.
+
+    All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts later
+    by the design's computing delay and half a tick; what this shift does to the values is an error of theirs.
+    The inductance is kept out where it is not five times its standard error: a record sampled too slowly, or
+    too calm, does not show it, and none is invented.
+
+    Raises
+    ------
+    InputError
+        If a record lacks a signal, or R and kE cannot be told apart.
+    """
+    control = design.controller
+    late = control.computing_delay_s + 0.5 * control.period_s
+    found = _fitted([_rows(design, record, late) for record in records], only=only or NAMES)
+    early = _fitted([_rows(design, record, 0.0) for record in records], only=found.names)
+    moved = found.values - early.values
+    whole = replace(found, covariance=found.covariance + np.outer(moved, moved) / 3.0)
+    if only is not None or "inductance" not in whole.names:
+        return whole
+    value, std = whole["inductance"], whole.std("inductance")
+    if value > SHOWN * std:
+        return whole
+    rest = tuple(name for name in whole.names if name != "inductance")
+    told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
+    again = fit_electrical(design, records, only=rest)
+    return replace(again, not_shown={**again.not_shown, "inductance": told})
+
+
+def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> ElectricalFit:
+    """The fit of rows that are made already; ``only`` these parameters."""
+    ends = np.cumsum([len(part) for part in tables]).tolist()
+    table = np.concatenate(tables)
+    names = list(only)
+    not_shown: dict[str, str] = {}
+    while True:
+        columns = [NAMES.index(name) for name in names]
+        w, u = table[:, columns], table[:, -1]
+        kept, left = told_apart(w, names)
+        if left:
+            for one in left:
+                not_shown[one.name] = str(one)
+            names = [names[k] for k in kept]
+            continue
+        found = solve(w, u, ends)
+        break
+    for name in ("resistance", "back_emf"):
+        if name in not_shown:
+            raise InputError(f"{KEYS[name]}: {not_shown[name]}; vary speed and load, not together only")
+    return ElectricalFit(
+        names=tuple(names),
+        values=found.values,
+        covariance=found.correlated,
+        not_shown=not_shown,
+        relative_residual=float(np.linalg.norm(found.residual) / np.linalg.norm(u)),
+    )
+
+
+def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
+    """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
+    from scipy.signal import butter, filtfilt
+
+    for name in ("voltage", "current"):
+        if name not in record.signals:
+            raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
+    recipe = recipe_for(record)
+    period = period_of(record)
+    motion, _ = motion_of(design, record, recipe)
+    b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
+    current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))
+    voltage = np.interp(record.time_s - late_s, record.time_s, voltage)
+    rate = central_difference(current, period)
+    table = np.column_stack([current, motion.velocity, rate, np.ones_like(current), voltage])
+    skip = recipe.skip_samples
+    return table[skip : len(table) - skip]
+
+
+def electrical_estimate(design: Design, fit: ElectricalFit, source: str) -> Estimate:
+    """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1.
+
+    Raises
+    ------
+    InputError
+        For a motor given by AC constants, or an ideal source.
+    """
+    motor = design.motor
+    if motor.constants != "dc" or motor.torque_constant_Nm_A is None:
+        raise InputError('the voltage equation is identified for motors with "dc" constants', design.name)
+    before = motor.back_emf_constant_Vs_rad or motor.torque_constant_Nm_A
+    names = [name for name in fit.names if name in KEYS]
+    rows = [fit.names.index(name) for name in names]
+    mix = np.eye(len(names))[[*range(len(names)), names.index("back_emf")]]
+    mix[-1] *= motor.torque_constant_Nm_A / before
+    values = mix @ fit.values[rows]
+    covariance = mix @ fit.covariance[np.ix_(rows, rows)] @ mix.T
+    paths = (*(KEYS[name] for name in names), "motor.torque_constant")
+    return Estimate(paths=paths, values=values, covariance=covariance, source=source)

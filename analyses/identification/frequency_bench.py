@@ -1,0 +1,279 @@
+"""From records of a two-mass drive to a design: frequency response, play, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design.model import Coupling, Design, LoadFriction
+from actuator_lti.errors import InputError
+from analyses.identification.differentiation import filtered_motion
+from analyses.identification.frequency import (
+    Lines,
+    excited_lines,
+    period_of_excitation,
+    response,
+)
+from analyses.identification.play import Play, find_play
+from analyses.identification.rows import drive_of
+from analyses.identification.to_design import Estimate, design_with_estimate
+from analyses.identification.two_mass import TwoMass, angle_responses, fit_two_mass, start_of
+from analyses.identification.verdict import RESIDUAL_LIMIT, Item, inputs_item, simulated_item
+from analyses.identification.verdict import passed as all_passed
+from analyses.records.consistency import Finding, check_record
+from analyses.records.prepare import prepared
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+MISFIT_LIMIT = 3.0
+GUARD = 1.5
+COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
+KEYS = {
+    "motor_inertia": "motor.rotor_inertia",
+    "load_inertia": "load.inertia",
+    "stiffness": "coupling.stiffness",
+    "damping": "coupling.damping",
+    "viscous": "friction.viscous",
+    "load_viscous": "load.friction.viscous",
+}
+NOT_NEGATIVE = ("damping", "viscous", "load_viscous")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrequencyResult:
+    """What a frequency response (and a record for the play) told of a two-mass drive."""
+
+    record: Record
+    play_record: Record | None
+    lines: Lines
+    period_s: float
+    fit: TwoMass
+    play: Play | None
+    design: Design
+    text: str
+    used: Mapping[str, str]
+    findings: Mapping[str, tuple[Finding, ...]]
+    items: tuple[Item, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all_passed(self.items)
+
+
+def identify_frequency(
+    design: Design,
+    record: Record,
+    *,
+    play_record: Record | None = None,
+    period_s: float | None = None,
+    fixed: Mapping[str, float] | None = None,
+) -> FrequencyResult:
+    """Identify a compliant two-mass drive.
+
+    Parameters
+    ----------
+    design : Design
+        Rotary; its coupling (or, without one, its last gear) is where the compliance is. Its inertias beside
+        the rotor's and the load's are kept.
+    record : Record
+        Of a periodic excitation: current (or force) and motor angle; the output angle too where there is one.
+        With play it must be under a torque that keeps one flank.
+    play_record : Record, optional
+        Of a torque that reverses, with the angles of both sides.
+    period_s : float, optional
+        Of the excitation; found from the command otherwise.
+    fixed : mapping, optional
+        Values by key of the design that are held.
+
+    Raises
+    ------
+    InputError
+        If a signal is missing, nothing is periodic, or no design can be made of the result.
+    """
+    record = prepared(record)
+    play_record = None if play_record is None else prepared(play_record)
+    if "angle" not in record.signals:
+        raise InputError("the motor angle is needed for a frequency response", where=record.name)
+    reduction, behind = design.ratio_to_coupling, design.ratio_behind_coupling
+    with_torque, used = _with_torque(design, record)
+    command = next((name for name in COMMANDS if name in record.signals), "current")
+    period = period_of_excitation(record, command) if period_s is None else period_s
+    names = ["torque_at_motor", "angle"]
+    if "output_angle" in record.signals:
+        names.append("load_angle")
+        used["output_angle"] = "load's angle"
+    used = {**used, "angle": "motor angle", command: used.get(command, "its period")}
+    lines = excited_lines(with_torque, tuple(names), period)
+    held = _held(design, dict(fixed or {}))
+    fit = _fitted(lines, reduction, names, held)
+    play = None if play_record is None else _play_of(design, play_record, fit)
+    made = _made(design, fit, play, held, record.name, behind)
+    text = write_design(made)
+    records = [record] if play_record is None else [record, play_record]
+    findings = {one.name: check_record(design, one) for one in records}
+    items = [inputs_item(name, found) for name, found in findings.items()]
+    items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name)]
+    return FrequencyResult(
+        record=record,
+        play_record=play_record,
+        lines=lines,
+        period_s=period,
+        fit=fit,
+        play=play,
+        design=made,
+        text=text,
+        used=used,
+        findings=findings,
+        items=tuple(items),
+    )
+
+
+def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]]:
+    """The record with the motor's torque and the angle at the coupling's load side as signals."""
+    torque, source, told, back_emf = drive_of(design, record)
+    if back_emf:
+        raise InputError("a frequency response needs the current, not the voltage", where=record.name)
+    signals = {**record.signals, "torque_at_motor": torque}
+    if "output_angle" in record.signals:
+        signals["load_angle"] = design.ratio_behind_coupling * record["output_angle"]
+    return replace(record, signals=signals), {source: f"drive: {told}"}
+
+
+def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float]) -> TwoMass:
+    """The fit; a damping or friction that comes out no larger than its error twice is held at zero."""
+    start = {**start_of(lines, reduction, torque=names[0]), **held}
+    load = "load_angle" if "load_angle" in names else None
+    fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
+    weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
+    if not weak:
+        return fit
+    zero = dict.fromkeys(weak, 0.0)
+    return fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
+
+
+def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
+    """Values of the design's keys by the names of the fit, at the motor and at the coupling."""
+    names = {key: name for name, key in KEYS.items()}
+    held = {}
+    for path, value in fixed.items():
+        if path not in names:
+            raise InputError(f"--fix {path}: can be fixed here: {', '.join(names)}")
+        held[names[path]] = value
+    if "motor_inertia" in held:
+        held["motor_inertia"] += design.motor_side_inertia_kgm2 - design.motor.rotor_inertia_kgm2
+    if "load_inertia" in held:
+        change = held["load_inertia"] - design.load.inertia_kgm2
+        held["load_inertia"] = design.load_side_inertia_kgm2 + change / design.ratio_behind_coupling**2
+    return held
+
+
+def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
+    """The play from the twist and from the torque that the load's own motion needs."""
+    if not {"angle", "output_angle"} <= set(record.signals):
+        raise InputError("the play needs the motor's angle and the output's", where=record.name)
+    behind = design.ratio_behind_coupling
+    period = record.period_s
+    cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
+    motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)
+    load = filtered_motion(behind * record["output_angle"], period, cutoff_hz=cutoff, order=4)
+    inertial = fit["load_inertia"] * load.acceleration
+    if "torque" in record.signals:
+        inertial = inertial - record["torque"] / behind
+    twist = motor.position / fit.reduction - load.position
+    twist_rate = motor.velocity / fit.reduction - load.velocity
+    edge = min(max(round(0.5 / (cutoff * period)), 10), len(twist) // 10)
+    part = slice(edge, len(twist) - edge)
+    steps = (_resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"]))
+    return find_play(
+        twist[part],
+        (inertial - fit["damping"] * twist_rate)[part],
+        load.velocity[part],
+        stiffness_Nm_rad=fit["stiffness"],
+        viscous_Nms_rad=fit["load_viscous"],
+        guard_samples=round(GUARD / (cutoff * period)),
+        resolution_rad=float(np.hypot(*steps)),
+        smooth_samples=0.5 / (cutoff * period),
+    )
+
+
+def _resolution(values: FloatArray) -> float:
+    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
+    steps = np.diff(np.unique(values))
+    if not len(steps):
+        return 0.0
+    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
+    shares = steps / step
+    whole = np.abs(shares - np.round(shares)) < 0.01
+    return step if np.isfinite(step) and np.mean(whole) > 0.95 else 0.0
+
+
+def _misfit_item(fit: TwoMass) -> Item:
+    good = fit.misfit <= MISFIT_LIMIT
+    found = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
+    return Item(
+        id="misfit",
+        label=f"The two-mass model explains the lines ({found})",
+        passed=good,
+        reason="" if good else "play, friction or another resonance: excite on one flank, in motion",
+    )
+
+
+def _written_item(written: Design, lines: Lines, record: str) -> Item:
+    """The response of the design as it was written against the measured lines."""
+    coupling, friction = written.coupling, written.load.friction
+    assert coupling is not None
+    values = {
+        "motor_inertia": written.motor_side_inertia_kgm2,
+        "load_inertia": written.load_side_inertia_kgm2,
+        "stiffness": coupling.stiffness_Nm_rad,
+        "damping": coupling.damping_Nms_rad,
+        "viscous": written.friction.viscous_Nms_rad,
+        "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
+    }
+    model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling)
+    measured, relative = response(lines, "angle", lines.names[0])
+    weight = 1.0 / np.maximum(relative, 1e-3)
+    error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))
+    return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")
+
+
+def _made(
+    design: Design, fit: TwoMass, play: Play | None, held: Mapping[str, float], record: str, behind: float
+) -> Design:
+    """The design with the identified values, their errors and correlations."""
+    old = design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
+    coupling = replace(
+        old,
+        stiffness_Nm_rad=fit["stiffness"],
+        damping_Nms_rad=fit["damping"],
+        play_rad=old.play_rad if play is None else max(2.0 * play.half_rad, 0.0) if play.told else 0.0,
+    )
+    friction = replace(design.load.friction or LoadFriction(), viscous_Nms_rad=fit["load_viscous"])
+    base = replace(design, coupling=coupling, load=replace(design.load, friction=friction))
+    others = base.motor_side_inertia_kgm2 - base.motor.rotor_inertia_kgm2
+    own_load = base.load_side_inertia_kgm2 - base.load.inertia_kgm2 / behind**2
+    shift = {"motor_inertia": -others, "load_inertia": -own_load}
+    scale = {"load_inertia": behind**2}
+    names = [name for name in fit.names if fit[name] > 0.0]
+    rows = [fit.names.index(name) for name in names]
+    factors = np.array([scale.get(name, 1.0) for name in names])
+    values = np.array([(fit[name] + shift.get(name, 0.0)) for name in names]) * factors
+    covariance = fit.covariance[np.ix_(rows, rows)] * np.outer(factors, factors)
+    paths = [KEYS[name] for name in names]
+    if play is not None and play.told:
+        paths.append("coupling.play")
+        values = np.append(values, 2.0 * play.half_rad)
+        wide = np.zeros((len(values), len(values)))
+        wide[:-1, :-1] = covariance
+        wide[-1, -1] = 4.0 * play.half_std_rad**2
+        covariance = wide
+    estimate = Estimate(
+        paths=tuple(paths), values=values, covariance=covariance, source=f"frequency response of {record}"
+    )
+    return design_with_estimate(base, estimate)

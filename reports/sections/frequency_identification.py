@@ -1,0 +1,112 @@
+"""The identification of a two-mass drive: parameters, resonances, play, and the response with its fit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.sections.identification_inputs import finding_table, input_table, verdict_block
+
+if TYPE_CHECKING:
+    from analyses.identification.frequency_bench import FrequencyResult
+
+LABELS = {
+    "motor_inertia": ("Inertia before the coupling, at the motor", "kg m²"),
+    "load_inertia": ("Inertia behind it, at its own shaft", "kg m²"),
+    "stiffness": ("Stiffness", "N m/rad"),
+    "damping": ("Damping", "N m s/rad"),
+    "viscous": ("Viscous friction of the motor", "N m s/rad"),
+    "load_viscous": ("Viscous friction of the load", "N m s/rad"),
+}
+
+
+def section(result: FrequencyResult) -> dict[str, Any]:
+    """Make the section of a frequency response's identification."""
+    blocks = [verdict_block(result.items), parameter_table(result), *response_figures(result)]
+    blocks += [input_table(result.record, result.used)]
+    blocks += [finding_table(name, found) for name, found in result.findings.items()]
+    fit = result.fit
+    intro = (
+        f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
+        "two-mass drive by maximum likelihood with the noise of every line from the scatter between periods. "
+        f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
+    )
+    status = "pass" if result.passed else "fail"
+    return doc.section("frequency-identification", "Two-mass drive", blocks, intro=intro, status=status)
+
+
+def parameter_table(result: FrequencyResult) -> dict[str, Any]:
+    """Values with 95 % intervals; resonance, antiresonance and play among them."""
+    columns = [
+        doc.column("name", "Parameter"),
+        doc.column("value", "Value", format="sig:6"),
+        doc.column("std", "Standard error", format="sig:2"),
+        doc.column("low", "95 % from", format="sig:6"),
+        doc.column("high", "to", format="sig:6"),
+        doc.column("unit", "Unit"),
+    ]
+    rows = [
+        {
+            "name": label,
+            "value": value,
+            "std": std or None,
+            "low": value - 1.96 * std if std else None,
+            "high": value + 1.96 * std if std else None,
+            "unit": unit,
+        }
+        for label, unit, value, std in values_of(result)
+    ]
+    note = "A value without an error was held: as asked, or at zero, being within twice its error of it."
+    return doc.table("Identified two-mass drive", columns, rows, note)
+
+
+def values_of(result: FrequencyResult) -> list[tuple[str, str, float, float]]:
+    """Label, unit, value and standard error of everything that was found."""
+    fit = result.fit
+    found = [(*LABELS[name], fit[name], fit.std(name)) for name in LABELS]
+    found.append(("Antiresonance", "rad/s", *fit.antiresonance_rad_s))
+    found.append(("Resonance", "rad/s", *fit.resonance_rad_s))
+    if result.play is not None:
+        found.append(("Play, total", "rad", 2.0 * result.play.half_rad, 2.0 * result.play.half_std_rad))
+    return found
+
+
+def response_figures(result: FrequencyResult) -> list[dict[str, Any]]:
+    """Motor angle (and load angle) over motor torque: measured lines and the model."""
+    from analyses.identification.frequency import response
+    from analyses.identification.two_mass import NAMES, angle_responses
+
+    lines, fit = result.lines, result.fit
+    model = angle_responses(lines.omega_rad_s, {name: fit[name] for name in NAMES}, fit.reduction)
+    hertz = lines.omega_rad_s / (2.0 * np.pi)
+    figures = []
+    for k, (signal, label) in enumerate((("angle", "motor angle"), ("load_angle", "load angle"))):
+        if signal not in lines.names:
+            continue
+        measured, _ = response(lines, signal, lines.names[0])
+        figures.append(
+            doc.figure(
+                "curves",
+                {
+                    "series": [
+                        {
+                            "label": "measured",
+                            "x": rounded(hertz),
+                            "y": rounded(np.abs(measured)),
+                            "style": "points",
+                        },
+                        {"label": "two-mass model", "x": rounded(hertz), "y": rounded(np.abs(model[k]))},
+                    ],
+                    "x_label": "frequency, Hz",
+                    "y_label": f"{label} over torque, rad/(N m)",
+                    "x_log": True,
+                    "y_log": True,
+                },
+                caption=f"Response of the {label} to the motor's torque: measured lines and the fitted model",
+                alt=f"Magnitude of {label} over motor torque against frequency, measured and fitted",
+            )
+        )
+    return figures

@@ -1,0 +1,101 @@
+"""Kills nightlies at their file-system calls and SQL statements, one after the other; looks at what is left.
+
+``python kill_at_calls.py SITE KILLS SEED``: each round starts a nightly of a study that has changed and kills
+it with SIGKILL at one of its calls, then checks site and history. Prints one line of JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).parents[1] / "nightly"))
+
+import ruptures  # noqa: F401 - here, not in every child
+from kill_target import check_history, night
+from site_checks import check_whole
+
+CALLS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.chmod", "shutil.rmtree")
+
+
+def count_calls(tick: Callable[[str], None]) -> None:
+    """Call ``tick`` before every call that changes or opens a file, every fsync, and every SQL statement."""
+
+    def audit(event: str, _arguments: tuple[object, ...]) -> None:
+        if event in CALLS:
+            tick(event)
+
+    class Watched(sqlite3.Connection):
+        def execute(self, *arguments):  # type: ignore[no-untyped-def]
+            tick("sql")
+            return super().execute(*arguments)
+
+    whole_fsync, whole_connect = os.fsync, sqlite3.connect
+
+    def fsync(handle: int) -> None:
+        tick("fsync")
+        whole_fsync(handle)
+
+    os.fsync = fsync
+    sqlite3.connect = lambda *a, **k: whole_connect(*a, **{"factory": Watched, **k})  # type: ignore[assignment]
+    sys.addaudithook(audit)
+
+
+def child(site: Path, round_: int, last: int) -> tuple[int, int]:
+    """A nightly in a process of its own that is killed at call ``last`` (0: not at all); status and calls."""
+    read, write = os.pipe()
+    number = os.fork()
+    if number == 0:
+        os.close(read)
+        done = [0]
+
+        def tick(_event: str) -> None:
+            done[0] += 1
+            if done[0] == last:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        try:
+            count_calls(tick)
+            night(site, round_)
+            os.write(write, str(done[0]).encode())
+        finally:
+            if sys.exc_info()[1] is not None:
+                traceback.print_exc()
+            os._exit(0 if sys.exc_info()[1] is None else 1)
+    os.close(write)
+    _, status = os.waitpid(number, 0)
+    said = os.read(read, 32)
+    os.close(read)
+    return status, int(said or 0)
+
+
+def main(site: Path, kills: int, seed: int) -> dict[str, object]:
+    """Kill at calls spread over the whole nightly; every round is looked at."""
+    draw = random.Random(seed)
+    night(site, 0)
+    status, calls = child(site, 1, 0)
+    assert status == 0, status
+    places = [1 + k * calls // kills for k in range(kills)]
+    draw.shuffle(places)
+    killed = 0
+    for round_, place in enumerate(places, 2):
+        status, _ = child(site, round_, place)
+        killed += os.WIFSIGNALED(status)
+        assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, status
+        check_whole(site)
+        check_history(site.with_name(site.name + ".state") / "history.sqlite")
+    status, _ = child(site, kills + 2, 0)
+    assert status == 0, status
+    check_whole(site)
+    return {"calls": calls, "killed": killed, "places": len(set(places))}
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))) + "\n")

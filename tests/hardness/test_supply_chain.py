@@ -1,0 +1,67 @@
+"""What is installed: pinned, with hashes, the same versions everywhere they are written."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[2]
+LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+ENTRIES = [entry for entry in re.split(r"\n(?=\S)", LOCK) if entry.strip() and not entry.startswith("#")]
+LOCKED = dict(re.match(r"([A-Za-z0-9._-]+)==(\S+)", entry).groups() for entry in ENTRIES)
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def test_every_package_is_pinned_with_hashes() -> None:
+    assert len(ENTRIES) > 50
+    for entry in ENTRIES:
+        assert re.match(r"[A-Za-z0-9._-]+==\S+ ", entry), entry[:60]
+        assert len(re.findall(r"--hash=sha256:[0-9a-f]{64}", entry)) >= 1, entry[:60]
+    assert "--index-url" not in LOCK
+    assert "://" not in LOCK
+
+
+def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> None:
+    asked = [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["dev"]]
+    asked += PROJECT["build-system"]["requires"]
+    for words in asked:
+        wanted = Requirement(words)
+        name = canonicalize_name(wanted.name)
+        assert name in LOCKED, f"{name}: make lock"
+        assert wanted.specifier.contains(LOCKED[name], prereleases=True), words
+
+
+def test_the_build_back_end_is_pinned() -> None:
+    for words in PROJECT["build-system"]["requires"]:
+        assert [one.operator for one in Requirement(words).specifier] == ["=="]
+
+
+def test_lock_and_constraints_say_the_same() -> None:
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").split():
+        name, _, version = line.partition("==")
+        assert LOCKED.get(canonicalize_name(name), version) == version, f"{name}: make lock"
+
+
+def test_every_promise_of_the_security_note_names_a_test_that_is_there() -> None:
+    text = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
+    rows = [
+        row
+        for row in text.partition("## Promises")[2].partition("Not promised")[0].splitlines()
+        if row[:2] == "| "
+    ]
+    assert len(rows) > 15
+    for row in rows[1:]:
+        folder, file = Path(), Path()
+        named = re.findall(r"`((?:tests/)?[\w/]*test_\w+\.py)?(?:::(\w+))?`", row)
+        found = [(path, function) for path, function in named if path or function]
+        assert found, row
+        for path, function in found:
+            if path:
+                file = ROOT / path if "/" in path else folder / path
+                folder = file.parent
+            assert file.is_file(), (row, path)
+            assert f"def {function}" in file.read_text(encoding="utf-8"), (row, function)

@@ -1,0 +1,131 @@
+"""A robot joint that moves a pendulum, P controller on the voltage, through the command line alone.
+
+Records of the simulator seen through instruments: gravity, load friction, a supply that sags.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, write_design
+from actuator_lti.design.model import Design, Gravity, PositionLoop
+from nonlinear import commands, simulate
+from nonlinear.commands import Command
+from reports.cli.main import main
+
+RATIO = 100.0
+DURATION = 8.0
+
+
+def _joint(mass_kg: float, dry: float, viscous: float, load_friction: float, inertia: float) -> Design:
+    """100:1, back-drivable, 12 V; the position loop sets the voltage."""
+    base = load_design("ilr33-amber")
+    gear = replace(base.gears[0], name="gear", ratio=RATIO, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
+    motor = replace(
+        base.motor, rotor_inertia_kgm2=1e-6, resistance_ohm=5.0, inductance_H=3e-4,
+        torque_constant_Nm_A=0.01, back_emf_constant_Vs_rad=0.01,
+    )  # fmt: skip
+    friction = replace(
+        base.friction, dry_torque_Nm=dry, viscous_Nms_rad=viscous, load_coefficient=load_friction
+    )
+    gravity = Gravity(mass_kg=mass_kg, arm_m=0.15, offset_rad=np.pi)
+    load = replace(base.load, path="back-drivable", inertia_kgm2=inertia, moment_max_Nm=0.0, gravity=gravity)
+    control = replace(
+        base.controller, period_s=1e-3, computing_delay_s=0.0, current=None, velocity=None,
+        position=PositionLoop(gain=0.4),
+    )  # fmt: skip
+    limits = replace(
+        base.limits, voltage_V=12.0, speed_rad_s=np.inf, acceleration_rad_s2=np.inf,
+        peak_current_A=np.inf, continuous_current_A=np.inf,
+    )  # fmt: skip
+    return replace(
+        base, name="joint", gears=(gear,), motor=motor, friction=friction, load=load, controller=control,
+        limits=limits, parameters={}, requirements=(), correlations=(), facts=(),
+    )  # fmt: skip
+
+
+TRUE = _joint(0.8, 1.2e-3, 4e-6, 1.5e-3, 0.02)
+GUESS = _joint(0.5, 0.8e-3, 2e-6, 0.5e-3, 0.014)
+
+
+def _smooth_steps(levels: list[float]) -> Command:
+    """Step-like: from level to level in 0.3 s each, as servo commands are."""
+    time = np.arange(0.0, DURATION + 0.01, 1e-2)
+    each = DURATION / len(levels)
+    knots, values = [0.0], [0.0]
+    for k, level in enumerate(levels):
+        knots += [k * each + 0.3, (k + 1) * each]
+        values += [level, level]
+    return commands.sampled(time, np.interp(time, knots, values))
+
+
+MOTIONS = {
+    "sine": commands.sine(0.8, 0.4),
+    "steps": _smooth_steps([0.7, -0.5, 1.0, 0.2, -0.9, 0.0]),
+    "lifting": _smooth_steps([1.4, 1.4, -1.4, 0.0]),
+    "waves": commands.multisine(1.2, [0.25, 0.6, 1.1], DURATION, 1e-3, seed=3),
+}
+
+
+def _record(folder: Path, name: str, seed: int) -> str:
+    """100 Hz, 4096 counts at the output, 30 mV and 10 mA rms of noise, a supply that sags by 4 %."""
+    run = simulate(TRUE, MOTIONS[name], DURATION)
+    every, rng = slice(None, None, 10), np.random.default_rng(seed)
+    quantum = 2.0 * np.pi / 4096
+    rows = len(run.time_s[every])
+    table = {
+        "time_s": run.time_s[every],
+        "goal_position [deg]": np.degrees(run.reference_rad[every]),
+        "joint_angle [deg]": np.degrees(np.floor(run.output_angle_rad[every] / quantum) * quantum),
+        "current [mA]": 1e3 * run.current_A[every] + 10.0 * rng.standard_normal(rows),
+        "voltage [V]": run.voltage_V[every] + 0.03 * rng.standard_normal(rows),
+        "supply [V]": 12.0 - 0.5 * np.abs(np.sin(run.time_s[every])),
+    }
+    path = folder / f"{name}.csv"
+    np.savetxt(path, np.column_stack(list(table.values())), delimiter=";", header=";".join(table),
+               comments="", fmt="%.8g")  # fmt: skip
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("joint")
+    (folder / "guess.toml").write_text(write_design(GUESS))
+    made = {name: _record(folder, name, k) for k, name in enumerate(MOTIONS)}
+    return {**made, "guess": str(folder / "guess.toml")}
+
+
+def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
+    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Identified from two motions, held against all of them; the guess misses them by more."""
+    arguments = ["identify", files["waves"], files["lifting"], "--validate", files["steps"]]
+    arguments += [
+        "--design",
+        files["guess"],
+        "--inertia-to",
+        "load.inertia",
+        "--out",
+        str(tmp_path),
+        "--json",
+    ]
+    status = main(arguments)
+    found = json.loads(capsys.readouterr().out)
+    assert status in (0, None), [check for check in found["checks"] if check["passed"] is False]
+    written = tmp_path / "joint-identified.toml"
+    gravity = load_design(written).load.gravity
+    assert gravity is not None
+    assert gravity.peak_Nm == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)
+    records = [files[name] for name in MOTIONS]
+    main(["correlate", str(written), *records, "--json"])
+    after = json.loads(capsys.readouterr().out)
+    for record in after["records"]:
+        assert record["signals"]["output_angle"]["mean_error"] < 0.06
+    main(["correlate", files["guess"], *records, "--json"])
+    before = json.loads(capsys.readouterr().out)["summary"]["output_angle"]
+    assert after["summary"]["output_angle"]["mean_error"] < 0.5 * before["mean_error"]

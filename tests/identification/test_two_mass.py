@@ -1,0 +1,255 @@
+"""A compliant drive from its frequency response and its play from a reversal; truth: drive D of the reference
+numbers, resonance 632.4555 and antiresonance 447.2136 rad/s."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, read_design_text, with_values, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.frequency import Lines, excited_lines, period_of_excitation
+from analyses.identification.frequency_bench import identify_frequency
+from analyses.identification.two_mass import NAMES, angle_responses, fit_two_mass, start_of
+from analyses.records.record import Record, RowCounts
+from reports.cli.main import main
+
+TRUTH = {
+    "motor_inertia": 2e-5,
+    "load_inertia": 2e-3,
+    "stiffness": 400.0,
+    "damping": 0.02,
+    "viscous": 1e-5,
+    "load_viscous": 1e-3,
+}
+N, RATE, PERIODS, KM = 10.0, 2000, 8, 0.05
+HALF_PLAY = 1e-3
+HERTZ = np.arange(2.0, 400.0, 2.0)
+
+
+def _design() -> Design:
+    """One gear 10:1 without inertia of its own, the rest to be found."""
+    base = load_design("ilr33-amber")
+    gear = replace(base.gears[0], name="gear", ratio=N, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
+    kept = {
+        path: one
+        for path, one in base.parameters.items()
+        if not path.startswith(("gear.", "limits.", "load.", "validation."))
+    }
+    limits = replace(base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=20.0)
+    load = replace(base.load, path="back-drivable", inertia_kgm2=1e-3, moment_max_Nm=0.0)
+    design = replace(base, gears=(gear,), parameters=kept, limits=limits, load=load, requirements=())
+    values = {"motor.torque_constant": KM, "motor.back_emf_constant": KM, "motor.rotor_inertia": 1e-5}
+    return with_values(design, values, check=False)
+
+
+@lru_cache(maxsize=1)
+def _noiseless(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Torque, motor and load angle of a multisine in steady state: sums of lines, exact."""
+    omega = 2.0 * np.pi * HERTZ
+    phase = np.random.default_rng(7 + seed).uniform(0.0, 2.0 * np.pi, len(HERTZ))
+    torque = 0.02 * np.exp(1j * phase)
+    motor, load = angle_responses(omega, TRUTH, N)
+    time = np.arange(RATE) / RATE
+    lines = np.exp(1j * np.outer(time, omega))
+    return tuple(np.tile(np.real(lines @ a), PERIODS + 1) for a in (torque, motor * torque, load * torque))  # type: ignore[return-value]
+
+
+def _record(seed: int) -> Record:
+    """With instruments: 4096 counts at the motor, 60 mA rms on the current, 10 urad rms at the output."""
+    rng = np.random.default_rng(seed)
+    torque, motor, load = _noiseless(seed)
+    time = np.arange(len(torque)) / RATE
+    quantum = 2.0 * np.pi / 4096
+    angle = np.floor((motor + 47.3 * time) / quantum + rng.uniform()) * quantum
+    signals = {
+        "current": torque / KM + 0.06 * rng.standard_normal(len(time)),
+        "angle": angle,
+        "output_angle": load + 4.73 * time + 1e-5 * rng.standard_normal(len(time)),
+        "current_reference": torque / KM,
+    }
+    return Record(name="sweep", time_s=time, signals=signals, units={}, counts=RowCounts())
+
+
+def _lines(seed: int) -> Lines:
+    record = _record(seed)
+    told = replace(record, signals={**record.signals, "torque": KM * record["current"]})
+    return excited_lines(told, ("torque", "angle", "output_angle"), 0.5)
+
+
+def test_intervals_hold_the_truth_at_their_rate_over_100_seeds() -> None:
+    """95 % intervals: of 100 draws 88 to 100 hold the truth, for every parameter and both resonances."""
+    held = dict.fromkeys((*NAMES, "resonance", "antiresonance"), 0)
+    for seed in range(100):
+        lines = _lines(seed)
+        fit = fit_two_mass(lines, start_of(lines, N), N, load="output_angle")
+        for name in NAMES:
+            low, high = fit.interval(name)
+            held[name] += low <= TRUTH[name] <= high
+        for name, truth, (value, std) in (
+            ("resonance", 632.4555, fit.resonance_rad_s),
+            ("antiresonance", 447.2136, fit.antiresonance_rad_s),
+        ):
+            held[name] += abs(value - truth) <= 1.96 * std
+    assert all(88 <= count <= 100 for count in held.values()), held
+
+
+def test_the_motors_angle_alone_tells_the_drive_too() -> None:
+    lines = _lines(1)
+    fit = fit_two_mass(lines, start_of(lines, N), N)
+    for name in ("motor_inertia", "load_inertia", "stiffness"):
+        assert fit[name] == pytest.approx(TRUTH[name], abs=4.0 * fit.std(name))
+        assert fit[name] == pytest.approx(TRUTH[name], rel=0.01)
+
+
+def test_the_period_is_found_from_the_command() -> None:
+    assert period_of_excitation(_record(0), "current_reference") == pytest.approx(0.5)
+    noise = np.random.default_rng(0).standard_normal(4000)
+    record = replace(_record(0).slice(0, 4000), signals={"current_reference": noise})
+    with pytest.raises(InputError, match="does not repeat itself"):
+        period_of_excitation(record, "current_reference")
+
+
+@lru_cache(maxsize=1)
+def _reversal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A slow reversing torque across the play, by the fourth-order Runge-Kutta method at 40 us."""
+    step, every, seconds = 4e-5, 25, 3.0
+    jm, jl, k, c = (TRUTH[name] for name in ("motor_inertia", "load_inertia", "stiffness", "damping"))
+    cv, cl = TRUTH["viscous"], 0.05
+    hertz = 1.5
+
+    def rates(t: float, s: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        th, w, phi, load_speed = s
+        twist, rate = th / N - phi, w / N - load_speed
+        spring = 0.0
+        if twist > HALF_PLAY:
+            spring = max(0.0, k * (twist - HALF_PLAY) + c * rate)
+        elif twist < -HALF_PLAY:
+            spring = min(0.0, k * (twist + HALF_PLAY) + c * rate)
+        torque = 0.03 * np.sin(2.0 * np.pi * hertz * t)
+        return w, (torque - cv * w - spring / N) / jm, load_speed, (spring - cl * load_speed) / jl
+
+    s = (0.0, 0.0, 0.0, 0.0)
+    rows = []
+    for n in range(int(seconds / step)):
+        if n % every == 0:
+            rows.append((n * step, s[0], s[2]))
+        t = n * step
+        a = rates(t, s)
+        b = rates(t + step / 2, tuple(x + step / 2 * d for x, d in zip(s, a, strict=True)))  # type: ignore[arg-type]
+        e = rates(t + step / 2, tuple(x + step / 2 * d for x, d in zip(s, b, strict=True)))  # type: ignore[arg-type]
+        f = rates(t + step, tuple(x + step * d for x, d in zip(s, e, strict=True)))  # type: ignore[arg-type]
+        s = tuple(x + step / 6 * (p + 2 * q + 2 * r + u) for x, p, q, r, u in zip(s, a, b, e, f, strict=True))  # type: ignore[assignment]
+    table = np.array(rows)
+    return table[:, 0], table[:, 1], table[:, 2]
+
+
+def _play_record(seed: int) -> Record:
+    rng = np.random.default_rng(1000 + seed)
+    time, motor, load = _reversal()
+    quantum = 2.0 * np.pi / 4096
+    angle = np.floor(motor / quantum + rng.uniform()) * quantum
+    output = load + 1e-5 * rng.standard_normal(len(load))
+    return Record(
+        name="reversal", time_s=time, signals={"angle": angle, "output_angle": output}, units={},
+        counts=RowCounts(),
+    )  # fmt: skip
+
+
+def test_the_play_is_within_its_interval() -> None:
+    """Truth: half-play 1 mrad; 20 draws of the instruments' noise."""
+    design = _design()
+    held = 0
+    for seed in range(20):
+        play = identify_frequency(design, _record(seed), play_record=_play_record(seed)).play
+        assert play is not None
+        assert play.half_rad == pytest.approx(HALF_PLAY, rel=0.02)
+        held += abs(play.half_rad - HALF_PLAY) <= 1.96 * play.half_std_rad
+    assert held >= 17
+
+
+def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+    record = _play_record(0)
+    with pytest.raises(InputError, match="must reverse"):
+        identify_frequency(_design(), _record(0), play_record=record.slice(0, 200))
+
+
+def _csv(path: Path, record: Record) -> str:
+    units = {"current": "current_A", "angle": "motor_angle_rad", "output_angle": "output_angle_rad"}
+    units |= {"current_reference": "current_command_A"}
+    columns = {"time_s": record.time_s, **{units[name]: v for name, v in record.signals.items()}}
+    header = ",".join(columns)
+    np.savetxt(
+        path, np.column_stack(list(columns.values())), delimiter=",", header=header, comments="", fmt="%.12g"
+    )
+    return str(path)
+
+
+def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Everything comes into the written design, which reads again: inertias, coupling, play, friction."""
+    (tmp_path / "d.toml").write_text(write_design(_design()))
+    sweep, play = _csv(tmp_path / "sweep.csv", _record(3)), _csv(tmp_path / "play.csv", _play_record(3))
+    arguments = [
+        "identify",
+        sweep,
+        "--frequency-response",
+        "--play",
+        play,
+        "--design",
+        str(tmp_path / "d.toml"),
+    ]
+    status = main([*arguments, "--json", "--out", str(tmp_path / "o")])
+    found = json.loads(capsys.readouterr().out)
+    assert status in (0, None)
+    assert found["values"]["Resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
+    checks = {check["id"]: check for check in found["checks"]}
+    assert checks["written-sweep.csv"]["value"] < 0.05
+    written = load_design(next((tmp_path / "o").glob("*.toml")))
+    assert written.coupling is not None
+    assert written.coupling.stiffness_Nm_rad == pytest.approx(400.0, rel=2e-3)
+    assert written.coupling.play_rad == pytest.approx(2e-3, rel=0.01)
+    assert written.motor_side_inertia_kgm2 == pytest.approx(2e-5, rel=2e-3)
+    assert written.load_side_inertia_kgm2 == pytest.approx(2e-3, rel=2e-3)
+    assert written.parameters["coupling.play"].tolerance is not None
+    assert "two-mass" in (tmp_path / "o" / "identification.html").read_text()
+
+
+def test_a_two_mass_model_of_something_else_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A response with a third mass: the misfit is far above its noise, and no design is written."""
+    record = _record(4)
+    omega = 2.0 * np.pi * HERTZ
+    mode = 0.3 / (1.0 + 0.04j * omega / 1300.0 - (omega / 1300.0) ** 2)
+    phase = np.random.default_rng(11).uniform(0.0, 2.0 * np.pi, len(HERTZ))
+    motor, _ = angle_responses(omega, TRUTH, N)
+    time = np.arange(RATE) / RATE
+    extra = np.real(np.exp(1j * np.outer(time, omega)) @ (0.02 * np.exp(1j * phase) * motor * mode))
+    angle = record["angle"] + np.tile(extra, PERIODS + 1)
+    signals = {name: v for name, v in record.signals.items() if name != "output_angle"}
+    (tmp_path / "d.toml").write_text(write_design(_design()))
+    path = _csv(tmp_path / "r.csv", replace(record, signals={**signals, "angle": angle}))
+    status = main(["identify", path, "--frequency-response", "--design", str(tmp_path / "d.toml"), "--json",
+                   "--out", str(tmp_path / "o")])  # fmt: skip
+    found = json.loads(capsys.readouterr().out)
+    assert status == 1
+    assert found["misfit"] > 3.0
+    assert not list((tmp_path / "o").glob("*.toml"))
+
+
+def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
+    result = identify_frequency(_design(), _record(5), fixed={"coupling.damping": 0.02})
+    assert result.fit.fixed["damping"] == 0.02
+    assert read_design_text(result.text).coupling is not None
+    with pytest.raises(InputError, match="can be fixed here"):
+        identify_frequency(_design(), _record(5), fixed={"motor.resistance": 1.0})
+    record = _record(5)
+    blind = replace(record, signals={name: v for name, v in record.signals.items() if name != "angle"})
+    with pytest.raises(InputError, match="motor angle is needed"):
+        identify_frequency(_design(), blind)

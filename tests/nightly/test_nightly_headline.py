@@ -1,0 +1,113 @@
+"""A night says the cause first, then what it did to the figure that matters most."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from nightly_fakes import CODE, INLINE, Calendar, job, study
+
+from reports.nightly.changes import Cause, Change, Comparison
+from reports.nightly.figures import Verdict
+from reports.nightly.headline import cause_words, change_words, gravest, headlines, main_changes
+from reports.nightly.night import run_night
+
+
+def change(figure: str, before: float, after: float, **more) -> Change:
+    given = {"unit": "deg", "kind": "figure", "worse": after < before, "tolerance": 0.05, **more}
+    return Change(figure=figure, before=before, after=after, **given)
+
+
+PHASE = Verdict(
+    id="PM/position", label="Position loop: phase margin", value=55.3, limit=">= 45", unit="deg",
+    distance=10.3, relative=0.23, passed=True,
+)  # fmt: skip
+COMPARISON = Comparison(
+    changes=(
+        change("margins / Margins / Position loop / Gain margin", 20.0, 5.0, unit="dB"),
+        change("PM/position: distance", 17.1, 10.3, kind="distance"),
+        change("PM/position: value", 62.1, 55.3, kind="requirement", worse=None),
+    ),
+    cause=Cause(parameters=(("control.position.gain", "90 1/s", "120 1/s"),)),
+)
+
+
+def test_the_cause_comes_first_then_the_required_figure_in_words() -> None:
+    words = f"{cause_words(COMPARISON.cause)}: {gravest(COMPARISON, [PHASE])[0]}"
+    assert words == (
+        "control.position.gain 90 → 120 1/s: phase margin of the position loop 62.10 → 55.30 deg"
+    )
+
+
+def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> None:
+    many = Comparison(changes=(*COMPARISON.changes, *(change(f"x{k}", 2.0, 1.0) for k in range(49))))
+    shown = main_changes(many)
+    assert len(shown) == 5
+    assert shown[0].kind == "distance"
+    assert not any(c.kind in ("requirement", "verdict") for c in shown)
+
+
+@pytest.mark.parametrize(
+    ("cause", "words"),
+    [
+        (Cause(parameters=(("a", "1 V", "2 mV"),)), "a 1 V → 2 mV"),
+        (Cause(parameters=tuple((f"k{n}", "1", "2") for n in range(4))), "k0 1 → 2; k1 1 → 2; 2 more values"),
+        (Cause(commits=(("code", "abc fix"), ("code", "def more"))), "commit abc fix and 1 more"),
+        (Cause(libraries=(("numpy", "1", "2"),)), "numpy 1 → 2"),
+        (Cause(code=True), "sources of actuator-lti changed without a commit"),
+        (Cause(), "no input differs"),
+    ],
+)
+def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
+    assert cause_words(cause) == words
+
+
+def test_a_figure_of_a_table_is_named_by_column_and_row() -> None:
+    words = change_words(COMPARISON.changes[0], COMPARISON, [])
+    assert words == "gain margin of Position loop 20.00 → 5.000 dB"
+
+
+@pytest.fixture(scope="module")
+def nights(tmp_path_factory):
+    """Two nights: one gain falls in two designs alike, one rises, one stays."""
+    site = tmp_path_factory.mktemp("headline") / "site"
+    clock = Calendar()
+    for k in range(2):
+        clock.next()
+        jobs = [job("one", 12.0 - 2 * k), job("two", 12.0 - 2 * k), job("better", 9.0 + k), job("same", 20.0)]
+        night = run_night(study(*jobs), site, INLINE, code=CODE, clock=clock)
+    return night, site
+
+
+def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
+    night, _ = nights
+    found = headlines(night.designs)
+    assert [len(h.designs) for h in found] == [2, 1]
+    assert found[0].worse
+    assert found[0].cause == "control.position.gain 12 → 10 1/s"
+    assert found[0].effect == "gain margin 12.00 → 10.00 dB"
+    assert not found[1].worse
+
+
+def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
+    _, site = nights
+    index = (site / "index.html").read_text(encoding="utf-8")
+    assert "control.position.gain 12 → 10 1/s" in index
+    assert index.index("What changed since last night") < index.index('id="designs"')
+    page = sorted(Path(site).glob("nights/*/one-*.html"))[-1]
+    text = re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8"))
+    assert "control.position.gain 12 → 10 1/s: gain margin 12.00 → 10.00 dB" in " ".join(text.split())
+
+
+def test_a_night_that_came_closer_to_a_limit_is_marked(nights) -> None:
+    night, _ = nights
+    strips = {d.name: [state for _, state in d.strip] for d in night.designs}
+    assert strips["one"] == ["pass", "regressed"]
+    assert strips["better"] == ["pass", "pass"]
+    assert strips["same"] == ["pass", "pass"]
+
+
+def test_counts_count_designs(nights) -> None:
+    night, _ = nights
+    assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4
