@@ -95,7 +95,7 @@ def call(
 ) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
     opened = _opened(chosen())
-    if opened is None:
+    if opened is None or row[layout.ELASTIC_DRIVE] > 0.0:  # its preparation is not in C
         from nonlinear._kernels.call import call as numba_call
 
         return numba_call(row, tables, history, flags, out, shared)

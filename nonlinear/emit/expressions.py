@@ -90,36 +90,45 @@ class Expressions:
             raise self.function.error(node, "an attribute of something that is no module")
         if module is math:
             return c_float(getattr(math, node.attr)), "float"
-        return self._constant(node.attr, getattr(module, node.attr), node)
+        return self._constant(node.attr, getattr(module, node.attr), node, module.__name__)
 
-    def _constant(self, name: str, value: Any, node: ast.AST) -> Text:
+    def _constant(self, name: str, value: Any, node: ast.AST, module: str = "") -> Text:
+        """A named constant; one of another module that has its name gets that module's in front."""
         if type(value) not in (int, float):
             raise self.function.error(node, f"{name} is neither a whole number nor a float")
+        kind: Kind = "int" if type(value) is int else "float"
+        if self.constants.get(name, value) != value:
+            name = f"{(module or self.function.module).rpartition('.')[2].upper().lstrip('_')}_{name}"
         if self.constants.setdefault(name, value) != value:
             raise self.function.error(
                 node, f"the constant {name} has two values: {self.constants[name]}, {value}"
             )
-        return name, ("int" if type(value) is int else "float")
+        return name, kind
 
     def _Subscript(self, node: ast.Subscript) -> Text:
-        if self._is_length(node):
-            return f"{self.emit(node.value.value)[0]}.length", "int"  # type: ignore[attr-defined]
+        length = self._length(node)
+        if length is not None:
+            return length, "int"
         table = self._table(node.value)
         whole = table is not None and type(self.constants[table][0]) is int  # type: ignore[index]
         return self.element(node), "int" if whole else "float"
 
-    def _is_length(self, node: ast.Subscript) -> bool:
-        """``row.shape[0]`` of a row that knows its length."""
+    def _length(self, node: ast.Subscript) -> str | None:
+        """``row.shape[0]`` of a table, or of a row that knows its length; None for anything else."""
         value, index = node.value, node.slice
         if (
             not isinstance(value, ast.Attribute)
             or value.attr != "shape"
             or not isinstance(value.value, ast.Name)
         ):
-            return False
+            return None
         if not isinstance(index, ast.Constant) or index.value != 0:
-            return False
-        return self.emit(value.value)[1] == "bytes"
+            return None
+        table = self._table(value.value)
+        if table is not None:
+            return str(len(self.constants[table]))  # type: ignore[arg-type]
+        text, kind = self.emit(value.value)
+        return f"{text}.length" if kind == "bytes" else None
 
     def element(self, node: ast.Subscript) -> str:
         """``row[index]``."""
@@ -144,9 +153,12 @@ class Expressions:
             return None
         if any(type(item) is not type(value[0]) for item in value) or type(value[0]) not in (int, float):
             return None
-        if self.constants.setdefault(node.id, value) != value:
-            raise self.function.error(node, f"the table {node.id} has two values")
-        return node.id
+        name = node.id
+        if self.constants.get(name, value) != value:
+            name = f"{self.function.module.rpartition('.')[2].upper()}_{name}"
+        if self.constants.setdefault(name, value) != value:
+            raise self.function.error(node, f"the table {name} has two values")
+        return name
 
     def _BinOp(self, node: ast.BinOp) -> Text:
         (left, a), (right, b) = self.emit(node.left), self.emit(node.right)
@@ -263,6 +275,11 @@ class Expressions:
         return f"{self.prefix}{name}{suffix}({bare(texts[0])}, {bare(texts[1])})", kind
 
     def _math(self, node: ast.Call, name: str) -> tuple[str, str]:
+        if name == "ldexp":
+            (whole, kind), mantissa = self.emit(node.args[1]), bare(self.as_float(node.args[0]))
+            if kind != "int":
+                raise self.function.error(node, f"an exponent that is a {kind}; use int()")
+            return f"ldexp({mantissa}, {bare(whole)})", "float"
         texts = ", ".join(bare(self.as_float(argument)) for argument in node.args)
         if (
             name == "floor"

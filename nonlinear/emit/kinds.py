@@ -6,7 +6,8 @@ import ast
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["float", "int", "bool", "row", "bytes"]  # bytes: a row of small whole numbers and its length
+# bytes: a row of small whole numbers that knows its length
+Kind = Literal["float", "int", "bool", "row", "bytes"]
 
 C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
 
@@ -19,7 +20,7 @@ _KEYWORDS = """
 """
 FUNCTIONS = """
     sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign
-    fabs ceil floor abs isfinite isnan isinf
+    ldexp fabs ceil floor abs isfinite isnan isinf
 """
 RESERVED = frozenset((_KEYWORDS + FUNCTIONS).split())
 

@@ -40,6 +40,9 @@ class ExportedDesign:
 def exported(design: Design) -> ExportedDesign:
     """The row of a design whose hinge moment comes from outside, and the lengths that it needs."""
     row = design_row(design)
+    if row[at.ELASTIC_DRIVE] > 0.0:
+        message = "coupling, friction.point: an elastic drive train or a friction map cannot be exported"
+        raise InputError(f"{message}; allowed: a rigid one", where=design.origin or design.name)
     row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
     p, s = parameters(row)
     return ExportedDesign(design=design, row=row, p_size=p.size, s_size=s.size)

@@ -137,11 +137,22 @@ _CALLS = re.compile(rf"\b({'|'.join(sorted({*FUNCTIONS.split()} - _SAME, key=len
 _COMMENT = re.compile(r"(/\*.*?\*/)", re.DOTALL)
 
 
+_LARGEST, _SMALLEST = 3e38, 1e-37  # of single precision, rounded inwards
+
+
+def _literal(found: re.Match[str]) -> str:
+    """A literal in single precision; one beyond its range stands for never, or for almost nothing."""
+    value = float(found[1])
+    if value > _LARGEST:
+        return f"{_LARGEST!r}f"
+    return f"{_SMALLEST!r}f" if 0.0 < value < _SMALLEST else f"{found[1]}f"
+
+
 def single(text: str) -> str:
     """The same source in single precision: types, literals and functions of the C library."""
     parts = _COMMENT.split(text)
     for k in range(0, len(parts), 2):  # comments stay
         code = parts[k].replace("(double)", "(float)")
         code = re.sub(r"\bdouble\b", "float", code)
-        parts[k] = _CALLS.sub(r"\1f(", _NUMBER.sub(r"\1f", code))
+        parts[k] = _CALLS.sub(r"\1f(", _NUMBER.sub(_literal, code))
     return "".join(parts)

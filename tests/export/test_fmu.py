@@ -80,6 +80,18 @@ def test_random_drives_have_the_same_bits(seed: int, tmp_path: Path) -> None:
 
 
 @needs_compiler
+def test_the_manipulation_toolbox_finds_nothing(unit: Path) -> None:
+    tool = Path(sys.prefix) / "bin/fmutool"
+    if not tool.is_file():
+        pytest.skip("fmu-manipulation-toolbox is not installed")
+    call = [str(tool), "-input", str(unit), "-check"]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    said = done.stdout + done.stderr
+    assert "seems to be compliant" in said
+    assert "No semantic error" in said
+
+
+@needs_compiler
 def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
     description = fmpy.read_model_description(str(unit))
     design = load_design("ilr33-amber")
