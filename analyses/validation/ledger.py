@@ -134,9 +134,9 @@ def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
         return replace(row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz")
     k = int(np.searchsorted(f, at or f[-1]))
     near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
-    if row.measured is not None and not near.any():
+    if not near.any():
         return row
-    why = most_frequent(sweep.reason)
+    why = most_frequent(sweep.reason) or "beyond the frequencies measured"
     return replace(row, passed=None, tolerance=inf, reason=f"could not be measured there: {why}")
 
 
@@ -201,9 +201,9 @@ QUANTITY = {
 def _confirmed(name: str, item: Confirmation) -> Entry:
     """A margin confirmed in time, in dB or s."""
     quantity, unit = QUANTITY[item.kind]
-    if item.border.cut:
+    if item.border.unknown:
         value = _in_unit(item.predicted, item)
-        return not_judged(name, quantity, unit, value, None, "the search was cut for lack of time")
+        return not_judged(name, quantity, unit, value, None, item.border.unknown)
     values = [_in_unit(value, item) for value in (item.predicted, item.border.value)]
     tolerance = MARGIN_DB
     if unit == "s":
