@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Command, Design, Instruments
 from actuator_lti.errors import InputError
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
@@ -118,10 +118,10 @@ class _Work:
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
-        self.linear = without_instruments(self.design)
+        self.linear = on_the_bench(self.design)
         self._warm_up()
         self.budget = Budget(self.settings.seconds)
-        if self.linear != self.design:
+        if replace(self.linear, command=self.design.command) != self.design:
             self.notes.append("small signals are measured with ideal instruments: without counts and noise")
 
     def _warm_up(self) -> None:
@@ -215,8 +215,8 @@ class _Work:
         from actuator_lti.loops import assemble_loops
 
         ride(self.linear)  # a drive that has no steady motion cannot be tested
-        model = without_instruments(self.model)
-        loops = assemble_loops(model)
+        model = on_the_bench(self.model)
+        loops = assemble_loops(replace(model, command=self.model.command))
         self.held = None
         if "current" in loops.present:
             self.held = assemble_loops(model, rotor="locked").current
@@ -394,17 +394,19 @@ class _Work:
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:
-            rows += rest_entries(self.design, self.figures["position"], steps, sweep)
+            commanded = loop_figures(self.loops.present["position"], self.loops.reference_to_output)
+            rows += rest_entries(self.design, commanded, steps, sweep)
         return rows
 
 
-def without_instruments(design: Design) -> Design:
-    """A drive with ideal instruments: no counts, no noise, no resolution."""
+def on_the_bench(design: Design) -> Design:
+    """A drive as its loops are tested: ideal instruments, and the command taken as it is."""
     return replace(
         design,
         encoder=replace(design.encoder, counts_per_rev=None),
         output_encoder=replace(design.output_encoder, counts_per_rev=None),
         instruments=Instruments(),
+        command=Command(),
     )
 
 

@@ -111,6 +111,9 @@ def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ..
     tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
     sections = {part["id"]: part for part in made["sections"]}
     if "conditional" in sections:
+        from reports import document as doc
+
+        tables.append(doc.text(sections["conditional"]["result"]))
         tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
     print_blocks(tables, found.notes)
     for path in paths:
