@@ -22,7 +22,8 @@ class Conduct:
     Attributes
     ----------
     status : str
-        ``"ok"``, ``"keeps oscillating"``, ``"sits on a limit"``, ``"has not settled"``, or why the run stopped.
+        ``"ok"``, ``"keeps oscillating"``, ``"sits on a limit"``, ``"has not settled"``, or why the run
+        stopped.
     detail : str
         With figures; empty where there is nothing to say.
     """
@@ -59,8 +60,12 @@ def conduct(run: Trajectory) -> Conduct:
         if hertz is not None:
             unit, factor = ("mm", 1e3) if run.axis == "linear" else ("deg", 180.0 / np.pi)
             return Conduct("keeps oscillating", f"{0.5 * swing * factor:.3g} {unit} at {hertz:.3g} Hz")
-    held = [name for name, use in run.limits.items() if use.active and run.limit_active(name)[last].mean() >= HELD]
-    limit = ", ".join(f"{name} limit of {run.limits[name].limit:.4g} {run.limits[name].unit}" for name in held)
+    held = [
+        name for name, use in run.limits.items() if use.active and run.limit_active(name)[last].mean() >= HELD
+    ]
+    limit = ", ".join(
+        f"{name} limit of {run.limits[name].limit:.4g} {run.limits[name].unit}" for name in held
+    )
     if constant and swing > BAND * size:
         moves = f"the output still moves by {100.0 * swing / size:.2g} % of its way"
         return Conduct("has not settled", f"{moves}, at the {limit}" if limit else moves)

@@ -15,7 +15,7 @@ U = TypeVar("U")
 SECONDS = 20.0
 
 
-class OutOfTime(Exception):  # noqa: N818 - nothing is wrong
+class OutOfTime(Exception):
     """The share of a part is used up."""
 
 
@@ -82,5 +82,7 @@ class Budget:
                 return work()
         except OutOfTime:
             spent = self.clock() - before
-            self.cut.append(f"{name}: cut after {spent:.1f} s, its share of {self.seconds:g} s of processor time")
+            self.cut.append(
+                f"{name}: cut after {spent:.1f} s, its share of {self.seconds:g} s of processor time"
+            )
             return otherwise

@@ -121,7 +121,7 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
     )
 
 
-class NotMeasured(Exception):  # noqa: N818 - nothing is wrong, there is only nothing to judge
+class NotMeasured(Exception):
     """A loop of which nothing could be measured; the message says why."""
 
 
@@ -135,7 +135,7 @@ def most_frequent(reasons: Sequence[str]) -> str:
 
 
 def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, float]:
-    """Measure around the maxima of T and S until they no longer change; the sweep, and the last change (dB)."""
+    """Measure around the maxima of T and S until they no longer change; with the last change in dB."""
     before, change = _peaks_db(sweep), 0.0
     for _ in range(PEAK_ROUNDS):
         pairs = []
@@ -326,7 +326,9 @@ def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepM
     y = response / final
     moved = float(np.ptp(y[-max(y.size // 10, 2) :]))
     if not reason and moved > UNSETTLED:
-        reason = f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
+        reason = (
+            f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
+        )
     rise = float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
     outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
     settled = float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0

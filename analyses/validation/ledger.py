@@ -99,7 +99,9 @@ def loop_entries(
     if figures.peaks is not None:
         peaks = figures.peaks
         rows.append(
-            entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak_db, _peak(found))
+            entry(
+                name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak_db, _peak(found)
+            )
         )
         T = peaks.complementary_db
         rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak_db, _peak(found)))
@@ -132,7 +134,9 @@ def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
     }[row.quantity]
     f, bad = sweep.frequency_hz, ~sweep.valid
     if at is not None and at < f[0]:
-        return replace(row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz")
+        return replace(
+            row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz"
+        )
     k = int(np.searchsorted(f, at or f[-1]))
     near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
     if not near.any():

@@ -159,7 +159,9 @@ class _Work:
         with self.timed("margins by amplitude"):
             wanted = stable and self.settings.amplitude_margins
             released = (
-                self._within(0.4, "margins by amplitude", lambda: self._release(confirmed), ()) if wanted else ()
+                self._within(0.4, "margins by amplitude", lambda: self._release(confirmed), ())
+                if wanted
+                else ()
             )
         large, friction, specification = self._others(whole)
         for name, loop in loops.items():

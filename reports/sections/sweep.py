@@ -64,10 +64,14 @@ def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     )
     worst = [worst_below_third(loop) for loop in shown.values()]
     gain, phase = (max((pair[k] for pair in worst), default=0.0) for k in (0, 1))
-    result = "No loop could be measured." if not shown else (
-        "Up to a third of the Nyquist frequency, model and simulation differ by at most "
-        f"{significant(gain, 2)} dB "
-        f"and {significant(phase, 2)} deg."
+    result = (
+        "No loop could be measured."
+        if not shown
+        else (
+            "Up to a third of the Nyquist frequency, model and simulation differ by at most "
+            f"{significant(gain, 2)} dB "
+            f"and {significant(phase, 2)} deg."
+        )
     )
     return doc.section(
         "injection", "Frequency response by injection", blocks, result=result, intro=intro,

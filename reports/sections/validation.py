@@ -95,7 +95,7 @@ def result(validation: Validation) -> str:
 
 
 def findings(validation: Validation) -> list[Finding]:
-    """Name what has to be watched, the gravest first: contradictions, divergence, oscillation, what is not known."""
+    """Name what has to be watched, the gravest first."""
     found = [
         Finding(
             severity="fail",
@@ -135,8 +135,8 @@ def _released(validation: Validation) -> list[Finding]:
         decibel, linear = 20.0 * log10(worst.border.value or 1.0), 20.0 * log10(worst.linear)
         why = f", because the {worst.limiter} limit acts" if worst.limiter else ""
         text = (
-            f"The {loop_name(name).lower()} keeps oscillating if its gain is raised by {decibel:.3g} dB and it is "
-            f"released from a {worst.size} deviation{why}; its linear gain margin is {linear:.3g} dB."
+            f"The {loop_name(name).lower()} keeps oscillating if its gain is raised by {decibel:.3g} dB and "
+            f"it is released from a {worst.size} deviation{why}; its linear gain margin is {linear:.3g} dB."
         )
         found.append(Finding(severity="warn", text=text, where="validation"))
     return found

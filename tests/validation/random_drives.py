@@ -1,3 +1,4 @@
+# ruff: noqa: T201, BLE001, E501 - a script that prints lines for people
 """Random drives over decades, stable by their exact loops: what the validator is tried on.
 
 Run as a script it validates a number of them and prints a line for each::
@@ -33,7 +34,6 @@ from actuator_lti.design.model import (
     VelocityLoop,
 )
 from actuator_lti.errors import InputError, NumericalError
-
 from analyses.validation.settings import Settings
 
 TRIAL = Settings(
@@ -85,7 +85,11 @@ def random_drive(seed: int, *, wider: bool = False) -> Design:
     limits = _limits(dice, motor, control)
     ratio = float(np.prod([gear.ratio for gear in gears]))
     speed = min(limits.speed_rad_s, limits.voltage_V / (motor.back_emf_constant_Vs_rad or 1.0))
-    full = dice.decades(0.03, 3.0) * speed / (ratio * control.position_loop.gain * (1.0 if with_velocity else 3.0))
+    full = (
+        dice.decades(0.03, 3.0)
+        * speed
+        / (ratio * control.position_loop.gain * (1.0 if with_velocity else 3.0))
+    )
     torque = (motor.torque_constant_Nm_A or 0.0) * min(
         limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
     )
@@ -116,7 +120,9 @@ def _plant(dice: Dice, delay: float, axis: str) -> tuple[Motor, float, tuple[Gea
     if axis == "linear" and dice.chance(0.3):
         inertia = dice.decades(1.0, 150.0)
     share = dice.rng.uniform(0.05, 0.9)
-    gears = tuple(Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3))))
+    gears = tuple(
+        Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3)))
+    )
     ratio = float(np.prod([gear.ratio for gear in gears]))
     motor = Motor(
         rotor_inertia_kgm2=inertia * (1.0 - share),
