@@ -284,6 +284,8 @@ def _control(hunts: list[_Hunt], threads: int | None) -> None:
         own = result.part(slice(k, k + 1))
         met = [f"{name} limit" for name in LIMITERS if own.limit_fraction(name)[0] > 0.0]
         met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.ride.friction_on else []
+        if not met and not hunt.search.smooth and 0.0 <= float(hunt.search.growth(own)[0]) < inf:
+            hunt.spoiled = "the drive as it is has not come to rest within the time given"
         if met and bool(own.ok[0]):
             hunt.spoiled = f"the drive as it is meets a {met[0]} after the faintest kick"
 

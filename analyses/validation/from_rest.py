@@ -119,7 +119,8 @@ def _sweep_entries(figures: LoopFigures, sweep: RestSweep) -> list[Entry]:
     acting = next((LIMIT_NAMES[name] for name in sweep.limiter if name), "")
     reason = ", ".join(word for word in ("dry friction at every reversal", acting) if word)
     if not np.isfinite(sweep.described).any():
-        reason = acting
+        held = bool((sweep.stick_fraction > 0.0).any())
+        reason = ", ".join(word for word in ("dry friction holds the rotor" if held else "", acting) if word)
     condition = "from rest, sine of the command (with feed-forward), clear of every limit"
     rows = []
     for quantity, predicted, values, level in (
