@@ -22,7 +22,8 @@ class Conduct:
     Attributes
     ----------
     status : str
-        ``"ok"``, ``"keeps oscillating"``, ``"sits on a limit"``, ``"has not settled"``, or why the run stopped.
+        ``"ok"``, ``"keeps oscillating"``, ``"sits on a limit"``, ``"has not settled"``, or why the run
+        stopped.
     detail : str
         With figures; empty where there is nothing to say.
     """

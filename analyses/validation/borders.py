@@ -26,6 +26,7 @@ Floats = npt.NDArray[np.float64]
 Kind = Literal["gain up", "gain down", "delay"]
 Progress = Callable[[int, int], None]
 
+CUT = "the search was cut for lack of time"
 GROUP_TICKS = 2_000_000  # in one batch: time is looked at in between
 VALUES = 12  # of each search in one round
 ROUNDS = 6
@@ -102,6 +103,11 @@ class Search:
         return row
 
     @property
+    def controlled(self) -> bool:
+        """Whether the nominal drive is known to come to rest, which is looked at first."""
+        return True
+
+    @property
     def kick(self) -> float:
         """Size of the impulse, in the unit of the point."""
         signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
@@ -158,15 +164,15 @@ class Border:
     frequency_hz : float or None
         Of the oscillation at the border.
     runs : int
-    cut : bool
-        Whether the search was stopped for lack of time: no border is then no finding.
+    unknown : str
+        Why nothing is known (no time left, say): no border is then no finding.
     """
 
     value: float | None
     bracket: tuple[float, float]
     frequency_hz: float | None
     runs: int
-    cut: bool = False
+    unknown: str = ""
 
 
 @dataclass
@@ -181,6 +187,7 @@ class _Hunt:
     frequency_hz: float | None = None
     runs: int = 0
     found: bool | None = None
+    spoiled: str = ""
 
     def take(self, result: BatchResult) -> None:
         """Keep the first interval in which decay turns into growth."""
@@ -189,7 +196,7 @@ class _Hunt:
         above = np.flatnonzero(growth >= 0.0)
         if self.found is None:
             self.found = bool(above.size)
-            self.low, self.high = self._nominal(), float(self.values[-1])
+            self.low, self.high = self.nominal(), float(self.values[-1])
             if not self.found:
                 return
         k = int(above[0]) if above.size else growth.size
@@ -204,7 +211,7 @@ class _Hunt:
             if self.search.smooth and OFF_FREQUENCY < off < 0.5 / self.search.cycles:
                 self.search = replace(self.search, frequency_hz=self.frequency_hz)
 
-    def _nominal(self) -> float:
+    def nominal(self) -> float:
         return SHORTEST_DELAY_SAMPLES / 10.0 if self.search.kind == "delay" else 1.0
 
     @property
@@ -217,8 +224,8 @@ class _Hunt:
     def border(self, *, stopped: bool = False) -> Border:
         """Interpolate the growth between the ends."""
         bracket = (self.low, self.high)
-        if stopped and not self.done:
-            return Border(None, bracket, None, self.runs, cut=True)
+        if self.spoiled or (stopped and not self.done):
+            return Border(None, bracket, None, self.runs, self.spoiled or CUT)
         if not self.found:
             return Border(None, bracket, None, self.runs)
         a, b = self.growths
@@ -248,8 +255,12 @@ def find_borders(
     2.95
     """
     hunts = [_Hunt(search, search.grid()) for search in searches]
+    try:
+        _control(hunts, threads)
+    except OutOfTime:
+        return [hunt.border(stopped=True) for hunt in hunts]
     for k in range(ROUNDS):
-        waiting = [hunt for hunt in hunts if not hunt.done]
+        waiting = [hunt for hunt in hunts if not hunt.done and not hunt.spoiled]
         if not waiting:
             break
         try:
@@ -260,6 +271,23 @@ def find_borders(
         if progress is not None:
             progress(k + 1, ROUNDS)
     return [hunt.border() for hunt in hunts]
+
+
+def _control(hunts: list[_Hunt], threads: int | None) -> None:
+    """Run the nominal drives: where one meets a limit or reverses, that says nothing of growth later."""
+    ones = [hunt for hunt in hunts if hunt.search.controlled]
+    if not ones:
+        return
+    parts = [hunt.search.rows(np.array([hunt.nominal()])) for hunt in ones]
+    result = Rows.join(parts).run(threads=threads)
+    for k, hunt in enumerate(ones):
+        own = result.part(slice(k, k + 1))
+        met = [f"{name} limit" for name in LIMITERS if own.limit_fraction(name)[0] > 0.0]
+        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.ride.friction_on else []
+        if not met and not hunt.search.smooth and 0.0 <= float(hunt.search.growth(own)[0]) < inf:
+            hunt.spoiled = "the drive as it is has not come to rest within the time given"
+        if met and bool(own.ok[0]):
+            hunt.spoiled = f"the drive as it is meets a {met[0]} after the faintest kick"
 
 
 def _groups(hunts: list[_Hunt]) -> list[list[_Hunt]]:

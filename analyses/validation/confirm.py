@@ -80,7 +80,7 @@ class Confirmation:
     @property
     def passed(self) -> bool:
         """Whether both agree: within the tolerance, or in that there is no border."""
-        if self.border.cut:
+        if self.border.unknown:
             return True
         if self.predicted is None or self.border.value is None:
             return self.predicted is None and self.border.value is None

@@ -135,7 +135,7 @@ def most_frequent(reasons: Sequence[str]) -> str:
 
 
 def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, float]:
-    """Measure around the maxima of T and S until they no longer change; the sweep, and the last change (dB)."""
+    """Measure around the maxima of T and S until they no longer change; with the last change in dB."""
     before, change = _peaks_db(sweep), 0.0
     for _ in range(PEAK_ROUNDS):
         pairs = []

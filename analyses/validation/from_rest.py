@@ -83,7 +83,7 @@ def rest_entries(
     sample = 1.01 * (figures.step.period_s or 0.0)
     scale, unit = (1e3, "mm") if design.axis == "linear" else (degrees(1.0), "deg")
     for k, amplitude in enumerate(steps.amplitude_rad):
-        condition = f"from rest, step of {amplitude * scale:.3g} {unit}"
+        condition = f"from rest, step of {amplitude * scale:.3g} {unit} of the command (with feed-forward)"
         for quantity, of, wanted, seen, tolerance in (
             ("rise_time", "s", figures.step.rise_time_s, steps.rise_time_s[k], sample),
             ("overshoot", "%", figures.step.overshoot_percent, steps.overshoot_percent[k], OVERSHOOT_PERCENT),
@@ -119,8 +119,9 @@ def _sweep_entries(figures: LoopFigures, sweep: RestSweep) -> list[Entry]:
     acting = next((LIMIT_NAMES[name] for name in sweep.limiter if name), "")
     reason = ", ".join(word for word in ("dry friction at every reversal", acting) if word)
     if not np.isfinite(sweep.described).any():
-        reason = acting
-    condition = "from rest, sine clear of every limit"
+        held = bool((sweep.stick_fraction > 0.0).any())
+        reason = ", ".join(word for word in ("dry friction holds the rotor" if held else "", acting) if word)
+    condition = "from rest, sine of the command (with feed-forward), clear of every limit"
     rows = []
     for quantity, predicted, values, level in (
         ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5)),

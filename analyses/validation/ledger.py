@@ -14,11 +14,12 @@ from math import inf, isfinite, log10
 import numpy as np
 
 from analyses.loop_figures import LoopFigures
+from analyses.validation.borders import LONGEST_DELAY_SAMPLES
 from analyses.validation.confirm import Confirmation
 from analyses.validation.figures import Measured, hertz, most_frequent
 
-SMALL = "small signal, on a constant speed"
-LOCKED = "small signal, rotor held at a constant speed"
+SMALL = "feedback loop, small signal, on a constant speed"
+LOCKED = "feedback loop, small signal, rotor held at a constant speed"
 RELATIVE = 1e-3
 GAIN_DB = 0.01
 PHASE_DEG = 0.1
@@ -138,9 +139,9 @@ def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
         )
     k = int(np.searchsorted(f, at or f[-1]))
     near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
-    if row.measured is not None and not near.any():
+    if not near.any():
         return row
-    why = most_frequent(sweep.reason)
+    why = most_frequent(sweep.reason) or "beyond the frequencies measured"
     return replace(row, passed=None, tolerance=inf, reason=f"could not be measured there: {why}")
 
 
@@ -205,10 +206,13 @@ QUANTITY = {
 def _confirmed(name: str, item: Confirmation) -> Entry:
     """A margin confirmed in time, in dB or s."""
     quantity, unit = QUANTITY[item.kind]
-    if item.border.cut:
+    if item.border.unknown:
         value = _in_unit(item.predicted, item)
-        return not_judged(name, quantity, unit, value, None, "the search was cut for lack of time")
+        return not_judged(name, quantity, unit, value, None, item.border.unknown)
     values = [_in_unit(value, item) for value in (item.predicted, item.border.value)]
+    if "delay" in item.kind and values[1] is None and (item.predicted or 0.0) > 0.9 * LONGEST_DELAY_SAMPLES:
+        why = f"longer than the instrument's longest delay of {LONGEST_DELAY_SAMPLES:.0f} samples"
+        return not_judged(name, quantity, unit, values[0], None, why)
     tolerance = MARGIN_DB
     if unit == "s":
         tolerance = (item.tolerance + item.instrument_error) * (values[0] or 0.0)

@@ -64,6 +64,11 @@ class Release(Search):
             row["current_start"] = self.part * sizes["current"]
         return row
 
+    @property
+    def controlled(self) -> bool:
+        """Whether the nominal drive oscillates is part of what is looked for."""
+        return False
+
     def growth(self, result: BatchResult) -> Floats:
         """Positive where the oscillation lasts."""
         spans = [np.subtract(*result.span(self.setup.before, k)[::-1]) for k in (0, 1)]

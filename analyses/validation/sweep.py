@@ -29,6 +29,7 @@ Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
 
 STEADY = 1e-5  # relative change of the fundamental from one window to the next (rule H3)
+ARRIVED = 1e-4  # of the injected sine: so much of it may be missing behind the instrument
 USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the amplitude takes
 SETTLE_TIME_CONSTANTS = 14.0
 LONGEST_SETTLE_TICKS = 20_000  # at first; a point that is not steady then is given more
@@ -96,7 +97,7 @@ def stepped_sine(
         amplitude = fitting_amplitude(setup, window, settle_ticks, threads)
     result = _run(setup, window, amplitude, settle_ticks, threads)
     for _ in range(EXTENSIONS):
-        reasons = _reasons(setup, result)
+        reasons = _reasons(setup, result, window, amplitude)
         poor = np.flatnonzero([bool(text) for text in reasons])
         if not poor.size:
             break
@@ -187,8 +188,12 @@ def _run(
     return rows.run(threads=threads)
 
 
-def _reasons(setup: Rig, result: BatchResult) -> list[str]:
+def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Floats) -> list[str]:
     """Why a point cannot be reported, or nothing."""
+    tick_s = setup.design.controller.period_s
+    injected = amplitude * hold_factor(window.frequency_hz, tick_s, setup.hold_ticks)
+    arrived = phasor(setup, result, setup.after) - phasor(setup, result, setup.before)
+    lost = np.abs(arrived - injected) > ARRIVED * np.abs(injected)
     reasons = [""] * result.status.size
     steady = unsteadiness(setup, result) <= STEADY
     for k in range(len(reasons)):
@@ -201,6 +206,8 @@ def _reasons(setup: Rig, result: BatchResult) -> list[str]:
             reasons[k] = "speed reversal"
         elif not steady[k]:
             reasons[k] = "not steady"
+        elif lost[k]:
+            reasons[k] = "injection cut off by a limit"
     return reasons
 
 
@@ -232,7 +239,7 @@ def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult)
     held = hold_factor(f, tick, setup.hold_ticks)
     before, after = (phasor(setup, result, signal) for signal in (setup.before, setup.after))
     injected = amplitude * held
-    reasons = _reasons(setup, result)
+    reasons = _reasons(setup, result, window, amplitude)
     good = np.where([not text for text in reasons], 1.0, np.nan)
     plant = PLANT_SIGNAL.get(setup.point, "motor_speed_rad_s")
     if setup.point == "u" and "current" not in setup.stages:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Command, Design, Instruments
 from actuator_lti.errors import InputError
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
@@ -49,6 +49,7 @@ HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
+NO_POSITION = "the bench is made for drives with a position loop"
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
 PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
@@ -117,10 +118,10 @@ class _Work:
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
-        self.linear = without_instruments(self.design)
+        self.linear = on_the_bench(self.design)
         self._warm_up()
         self.budget = Budget(self.settings.seconds)
-        if self.linear != self.design:
+        if replace(self.linear, command=self.design.command) != self.design:
             self.notes.append("small signals are measured with ideal instruments: without counts and noise")
 
     def _warm_up(self) -> None:
@@ -137,16 +138,15 @@ class _Work:
             self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
         whole = stable and self.design.controller.position is not None
         if stable and not whole:
-            self.notes.append(
-                "no position loop: motion from rest, large commands and friction effects are not judged"
-            )
+            self.notes.append(f"not judged: {NO_POSITION}")
         with self.timed("frequency response"):
             share = 0.6 / max(len(self.loops.present), 1)
             loops = {name: self._loop(name, loop, share) for name, loop in self._stage_loops().items()}
         with self.timed("margins in time"):
-            confirmed = self._within(0.5, "margins in time", self._confirm, ())
+            bench = self.design.controller.position is not None
+            confirmed = () if not bench else self._within(0.5, "margins in time", self._confirm, ())
         with self.timed("break points"):
-            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
+            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if whole else {}
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -217,8 +217,8 @@ class _Work:
         from actuator_lti.loops import assemble_loops
 
         ride(self.linear)  # a drive that has no steady motion cannot be tested
-        model = without_instruments(self.model)
-        loops = assemble_loops(model)
+        model = on_the_bench(self.model)
+        loops = assemble_loops(replace(model, command=self.model.command))
         self.held = None
         if "current" in loops.present:
             self.held = assemble_loops(model, rotor="locked").current
@@ -237,7 +237,9 @@ class _Work:
         """Sweep one loop and read its figures; where that cannot be done, say why."""
         figures, nothing = self.figures[name], np.empty(0, complex)
         reason = "the linear loop is not stable: there is nothing to measure"
-        if name in self.settle:
+        if name in self.settle and self.design.controller.position is None:
+            reason = NO_POSITION
+        elif name in self.settle:
             try:
                 with self.budget.part(share):
                     return self._measured(name, loop)
@@ -394,17 +396,19 @@ class _Work:
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:
-            rows += rest_entries(self.design, self.figures["position"], steps, sweep)
+            commanded = loop_figures(self.loops.present["position"], self.loops.reference_to_output)
+            rows += rest_entries(self.design, commanded, steps, sweep)
         return rows
 
 
-def without_instruments(design: Design) -> Design:
-    """A drive with ideal instruments: no counts, no noise, no resolution."""
+def on_the_bench(design: Design) -> Design:
+    """A drive as its loops are tested: ideal instruments, and the command taken as it is."""
     return replace(
         design,
         encoder=replace(design.encoder, counts_per_rev=None),
         output_encoder=replace(design.output_encoder, counts_per_rev=None),
         instruments=Instruments(),
+        command=Command(),
     )
 
 

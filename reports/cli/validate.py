@@ -103,21 +103,22 @@ def _print_json(made: dict[str, Any]) -> None:
 
 
 def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
-    """Print the verdict, the ledger and the conditional stability."""
+    """Print the ledger, the conditional stability, and the verdict."""
     from reports.cli.output import print_line
     from reports.sections.validation import by_loop, loop_name
-    from reports.terminal import print_blocks, print_verdict
+    from reports.terminal import print_blocks
 
-    print_verdict(found.passed, str(found))
     tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
     sections = {part["id"]: part for part in made["sections"]}
     if "conditional" in sections:
-        part = sections["conditional"]
-        tables.append({"kind": "text", "text": part["result"]})
-        tables += [block for block in part["blocks"] if block["kind"] in ("text", "table")]
+        from reports import document as doc
+
+        tables.append(doc.text(sections["conditional"]["result"]))
+        tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
     print_blocks(tables, found.notes)
     for path in paths:
         print_line(str(path))
+    print_line(f"{'PASS' if found.passed else 'FAIL'}  {found}")
     print_line(f"{sum(found.seconds.values()):.1f} s")
 
 

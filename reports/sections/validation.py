@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from math import log10
 from typing import Any
 
 from analyses.validation.ledger import Entry
@@ -21,6 +22,7 @@ MORE = {
     "resonance": "resonance frequency",
     "stability": "stability",
 }
+LOST = 0.9  # of a linear gain margin: what large deviations leave of it
 STATUS = {True: "pass", False: "fail", None: "info"}
 WORD = {True: "agrees", False: "DISAGREES", None: "not judged"}
 
@@ -74,7 +76,8 @@ def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
         "the "
         "reason."
     )
-    status = "pass" if validation.passed else "fail"
+    judged = any(row.passed is not None for row in validation.ledger)
+    status = ("pass" if judged else "info") if validation.passed else "fail"
     return doc.section(
         "validation", "Linear predictions against simulation", blocks, result=result(validation), intro=intro,
         status=status, findings=findings(validation),
@@ -84,14 +87,16 @@ def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
 def result(validation: Validation) -> str:
     """Say how many predictions agree with the simulation."""
     judged = [row for row in validation.ledger if row.passed is not None]
+    if not judged:
+        return "No linear prediction could be judged."
     agree, shown = sum(row.passed is True for row in judged), len(validation.ledger) - len(judged)
     rest = f" {shown} more are shown, but not judged." if shown else ""
     return f"{agree} of {len(judged)} linear predictions agree with the simulation.{rest}"
 
 
 def findings(validation: Validation) -> list[Finding]:
-    """Name every prediction that the simulation contradicts."""
-    return [
+    """Name what has to be watched, the gravest first."""
+    found = [
         Finding(
             severity="fail",
             text=f"{loop_name(row.loop)}: {quantity_name(row)} is not confirmed by simulation.",
@@ -99,6 +104,82 @@ def findings(validation: Validation) -> list[Finding]:
         )
         for row in validation.failed
     ]
+    return found + _large(validation) + _released(validation) + _unknown(validation) + _left_out(validation)
+
+
+def _large(validation: Validation) -> list[Finding]:
+    """A step within full deflection that does not settle."""
+    conditional = validation.conditional
+    if conditional is None or not conditional.found:
+        return []
+    unit = "mm" if validation.design.axis == "linear" else "deg"
+    size = _size(conditional.next_rad or 0.0, validation.design.axis)
+    text = f"A step of {size:.3g} {unit} does not settle"
+    if conditional.limiter:
+        text += f": the {conditional.limiter} limit takes gain away"
+    return [Finding(severity="fail", text=f"{text}.", where="conditional")]
+
+
+def _released(validation: Validation) -> list[Finding]:
+    """Of each loop, the margin that a large deviation takes most of."""
+    found = []
+    for name in validation.loops:
+        own = [
+            item
+            for item in validation.amplitude_margins
+            if item.loop == name and item.kind == "gain up" and item.border.value and item.linear > 1.0
+        ]
+        worst = min(own, key=lambda item: item.border.value or 0.0, default=None)
+        if worst is None or (worst.border.value or 0.0) > LOST * worst.linear:
+            continue
+        decibel, linear = 20.0 * log10(worst.border.value or 1.0), 20.0 * log10(worst.linear)
+        why = f", because the {worst.limiter} limit acts" if worst.limiter else ""
+        text = (
+            f"The {loop_name(name).lower()} keeps oscillating if its gain is raised by {decibel:.3g} dB and "
+            f"it is released from a {worst.size} deviation{why}; its linear gain margin is {linear:.3g} dB."
+        )
+        found.append(Finding(severity="warn", text=text, where="validation"))
+    return found
+
+
+def _unknown(validation: Validation) -> list[Finding]:
+    """What could not be judged for lack of time or of measured points."""
+    found = [
+        Finding(severity="warn", text=f"{loop_name(name)} was not judged: {loop.reason}.", where="validation")
+        for name, loop in validation.loops.items()
+        if loop.figures.stable and loop.measured is None
+    ]
+    cut = [note for note in validation.notes if ": cut " in note and not note.endswith("used up")]
+    return found + [Finding(severity="warn", text=f"Not judged: {note}.", where="validation") for note in cut]
+
+
+def _left_out(validation: Validation) -> list[Finding]:
+    """What the model of this drive leaves out."""
+    found = []
+    if validation.design.coupling is None:
+        text = "A rigid drive train is assumed: no coupling is given, so no resonance and no play are in any figure."
+        found.append(Finding(severity="info", text=text, where="validation"))
+    quantum = validation.design.angle_quantum_rad
+    if quantum is not None:
+        ripple = _ripple(validation)
+        text = f"Small signals are judged without the encoder's counts; at constant speed they add {ripple}."
+        found.append(Finding(severity="info", text=text, where="validation"))
+    return found
+
+
+def _ripple(validation: Validation) -> str:
+    """Ripple of the speed estimate and standing error due to counts."""
+    design = validation.design
+    quantum = design.angle_quantum_rad or 0.0
+    standing = _size(quantum / design.total_ratio, design.axis)
+    unit = "mm" if design.axis == "linear" else "deg"
+    words = f"up to one count, {standing:.2g} {unit} at the output, of standing error"
+    velocity = design.controller.velocity
+    if design.encoder.speed == "difference" and velocity is not None:
+        span = design.encoder.difference_samples * velocity.every * design.controller.period_s
+        speed = "m/s" if design.axis == "linear" else "rad/s"
+        words += f" and steps of {quantum / span:.3g} {speed} in the speed estimate"
+    return words
 
 
 def verdict_items(validation: Validation) -> list[dict[str, Any]]:

@@ -1,3 +1,4 @@
+# ruff: noqa: T201, BLE001, E501 - a script that prints lines for people
 """Random drives over decades, stable by their exact loops: what the validator is tried on.
 
 Run as a script it validates a number of them and prints a line for each::

@@ -49,9 +49,8 @@ def test_following_a_sine_is_no_oscillation() -> None:
 
 
 def test_the_command_line_says_it(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["simulate", "--amplitude", "3", "--duration", "0.5", "--quiet", "--set"] + [
-        "control.position.gain=4000 1/s"
-    ]
+    arguments = ["simulate", "--amplitude", "3", "--duration", "0.5", "--quiet"]
+    arguments += ["--set", "control.position.gain=4000 1/s"]
     assert main(arguments) == 0
     assert "status keeps oscillating (" in capsys.readouterr().out
     assert main([*arguments, "--json"]) == 0

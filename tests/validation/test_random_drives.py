@@ -1,0 +1,41 @@
+"""A handful of random drives: no traceback, no false failure, within the time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from analyses.isolation import isolated
+from analyses.validation import validate
+from analyses.validation.budget import Budget, OutOfTime
+from tests.validation.random_drives import TRIAL, random_drive
+
+RIGID = (1, 2, 3, 16)
+WIDER = (501, 504, 508)
+
+
+@pytest.mark.parametrize(("seed", "wider"), [*((s, False) for s in RIGID), *((s, True) for s in WIDER)])
+def test_a_random_stable_drive_has_no_false_failure(seed: int, wider: bool) -> None:
+    with isolated() as missing:
+        found = validate(random_drive(seed, wider=wider), replace(TRIAL, seconds=120.0))
+    assert not missing
+    assert found.failed == ()
+    assert all(row.reason for row in found.ledger if row.passed is None)
+
+
+def test_a_part_is_cut_when_its_share_is_used_up() -> None:
+    """By a clock of its own: one second at every look."""
+    seconds = iter(range(1000))
+    budget = Budget(20.0, clock=lambda: float(next(seconds)))
+
+    def endless() -> str:
+        while True:
+            budget.look()
+
+    assert budget.within(0.25, "a part", endless, "nothing") == "nothing"
+    assert len(budget.cut) == 1
+    assert "a part: cut after" in budget.cut[0]
+    assert budget.left > 5.0
+    with pytest.raises(OutOfTime), budget.part(0.1):
+        endless()
