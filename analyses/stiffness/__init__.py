@@ -1,11 +1,12 @@
 """Stiffness of a drive at its output: dynamic, static, lost motion (model.md section 9)."""
 
 from analyses.stiffness.curves import stiffness_curves
-from analyses.stiffness.injected import check_stiffness, lost_motion_seen
-from analyses.stiffness.result import Check, LostMotion, Stiffness, StiffnessCurve
+from analyses.stiffness.injected import check_stiffness, lost_motion_seen, stiffness_at_rest
+from analyses.stiffness.result import AtRest, Check, LostMotion, Stiffness, StiffnessCurve
 from analyses.stiffness.run import stiffness
 
 __all__ = [
+    "AtRest",
     "Check",
     "LostMotion",
     "Stiffness",
@@ -13,5 +14,6 @@ __all__ = [
     "check_stiffness",
     "lost_motion_seen",
     "stiffness",
+    "stiffness_at_rest",
     "stiffness_curves",
 ]

@@ -1,4 +1,4 @@
-"""Dynamic and static stiffness from the linear loops: the inverse of the response from M_ext to the output."""
+"""Dynamic and static stiffness: the inverse of the linear response from M_ext to the output."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
 
 
 def _static(response: Any, period_s: float) -> float:
-    """|K| at zero frequency, by its slope near there: a drive that runs away has 0, one with an integral inf."""
+    """|K| at zero frequency, by its slope near there: 0 of a drive that runs away, inf with an integral."""
     low, high = np.abs(stiffness_at(response, [_SLOW_HZ, 10.0 * _SLOW_HZ], period_s))
     if not np.isfinite(low) or high < 0.5 * low:
         return float("inf")

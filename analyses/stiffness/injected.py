@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
 from analyses.stiffness.curves import compliance, stiffness_at
-from analyses.stiffness.result import Check, LostMotion
+from analyses.stiffness.result import AtRest, Check, LostMotion
 from nonlinear import commands, simulate
 from nonlinear.loads import series
 
@@ -21,7 +21,7 @@ _DEFLECTION = 1e-4  # of the full deflection: far inside every limit, so that a 
 
 
 def linear_twin(design: Design) -> Design:
-    """The design without play, quantisation, noise and friction by load; the run leaves out the dry friction."""
+    """The design without play, quantisation, noise and friction by load; the run omits the dry friction."""
     coupling = design.coupling
     return replace(
         design,
@@ -52,29 +52,46 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     if slowest >= 1.0:
         raise InputError("stiffness: the closed loop is not stable")
     settle = min(ceil(log(_SETTLED) / log(slowest)), _MOST_TICKS) if slowest > 0.0 else 1
-    every = design.controller.position.every if design.controller.position else 1
     made = []
     for asked in frequencies_hz:
-        ticks = max(4, round(1.0 / (asked * period * every))) * every
+        ticks = _ticks(design, asked)
         frequency = 1.0 / (ticks * period)
         K = complex(stiffness_at(response, frequency, period)[0])
-        made.append(Check(frequency, K, _injected(twin, K, ticks, ceil(settle / ticks) + 1)))
+        moment = _DEFLECTION * twin.validation.full_deflection_rad * abs(K)
+        made.append(Check(frequency, K, _injected(twin, moment, ticks, ceil(settle / ticks) + 1, True)))
     return tuple(made)
 
 
-def _injected(twin: Design, K: complex, ticks: int, skipped: int) -> complex:
+def stiffness_at_rest(
+    design: Design, asked: Sequence[tuple[float, float]], skipped: int = 6
+) -> tuple[AtRest, ...]:
+    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
+    made = []
+    for frequency, moment in asked:
+        ticks = _ticks(design, frequency)
+        K = _injected(design, moment, ticks, skipped, False)
+        made.append(AtRest(moment, 1.0 / (ticks * design.controller.period_s), K))
+    return tuple(made)
+
+
+def _ticks(design: Design, frequency_hz: float) -> int:
+    """Ticks of a period, a whole number of position periods."""
+    every = design.controller.position.every if design.controller.position else 1
+    return max(4, round(1.0 / (frequency_hz * design.controller.period_s * every))) * every
+
+
+def _injected(design: Design, amplitude: float, ticks: int, skipped: int, linear: bool) -> complex:
     """Stiffness seen at a moment of a period of so many ticks, after so many periods."""
-    period, count = twin.controller.period_s, (skipped + 2) * ticks
-    amplitude = _DEFLECTION * twin.validation.full_deflection_rad * abs(K)
+    period, count = design.controller.period_s, (skipped + 2) * ticks
     turn = np.exp(-2j * np.pi * np.arange(ticks) / ticks)
     moment = np.tile(-amplitude * turn.imag, skipped + 2)
     run = simulate(
-        twin, commands.hold(), count * period, series(np.arange(count) * period, moment), friction_on=False,
-        limits_on=False,
+        design, commands.hold(), count * period, series(np.arange(count) * period, moment),
+        friction_on=not linear, limits_on=not linear,
     )  # fmt: skip
     seen = run.output_angle_rad[skipped * ticks :].reshape(2, ticks) @ turn
     given = moment[skipped * ticks :].reshape(2, ticks) @ turn
-    return complex(given.sum() / seen.sum())
+    return complex(given.sum() / seen.sum()) if seen.sum() != 0.0 else complex(np.inf)
 
 
 def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
@@ -88,7 +105,7 @@ def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
 
 
 def lost_motion_seen(design: Design, moment_Nm: float | None = None, duration_s: float = 2.0) -> float:
-    """Lost motion in the simulator: a slow moment to either side and back to zero, the motor's sensor holding.
+    """Lost motion in the simulator: a slow moment to either side and back, the motor's sensor holding.
 
     Parameters
     ----------

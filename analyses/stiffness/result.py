@@ -76,6 +76,15 @@ class Check:
 
 
 @dataclass(frozen=True)
+class AtRest:
+    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment; inf: no motion."""
+
+    moment_Nm: float
+    frequency_hz: float
+    seen_Nm_rad: complex
+
+
+@dataclass(frozen=True)
 class Stiffness:
     """All of it for one design."""
 
@@ -83,6 +92,7 @@ class Stiffness:
     curves: tuple[StiffnessCurve, ...]
     lost_motion: LostMotion | None
     checks: tuple[Check, ...] = ()
+    at_rest: tuple[AtRest, ...] = ()
 
     @property
     def agrees(self) -> bool:

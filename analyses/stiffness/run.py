@@ -6,10 +6,12 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.stiffness.curves import stiffness_curves
-from analyses.stiffness.injected import check_stiffness, lost_motion
+from analyses.stiffness.injected import check_stiffness, lost_motion, stiffness_at_rest
 from analyses.stiffness.result import Stiffness
 
 CHECKED_HZ = (2.0, 10.0, 50.0)
+REST_HZ = (2.0, 20.0)
+REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
 
 
 def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
@@ -30,4 +32,7 @@ def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
     moves = bool(np.isfinite(curves[0].stiffness_Nm_rad).all())
     held = design.controller.position is not None
     checks = check_stiffness(design, CHECKED_HZ) if simulated and moves and held else ()
-    return Stiffness(design, curves, lost_motion(design, seen=simulated and held), checks)
+    largest = design.load.moment_max_Nm
+    asked = [(f, share * largest) for f in REST_HZ for share in REST_FRACTIONS]
+    rest = stiffness_at_rest(design, asked) if checks and largest > 0.0 else ()
+    return Stiffness(design, curves, lost_motion(design, seen=simulated and held), checks, rest)

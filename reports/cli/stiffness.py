@@ -63,6 +63,14 @@ def _json(found: Stiffness) -> dict[str, Any]:
             "foreseen": lost.foreseen_rad,
             "simulated": lost.seen_rad,
         },
+        "at_rest": [
+            {
+                "moment": one.moment_Nm,
+                "frequency_hz": one.frequency_hz,
+                "size": _known(abs(one.seen_Nm_rad)),
+            }
+            for one in found.at_rest
+        ],
         "checks": [
             {
                 "frequency_hz": check.frequency_hz,
@@ -91,9 +99,14 @@ def _lines(found: Stiffness) -> list[str]:
     if lost is not None:
         seen = "" if lost.seen_rad is None else f", simulated {lost.seen_rad:.4g} {angle}"
         lines.append(f"  play {lost.play_rad:.4g} {angle}; lost motion {lost.foreseen_rad:.4g} {angle}{seen}")
-    for check in found.checks:
-        lines.append(
-            f"  at {check.frequency_hz:.4g} Hz: {abs(check.foreseen_Nm_rad):.6g}, simulated "
-            f"{abs(check.seen_Nm_rad):.6g} (relative difference {check.difference:.1e})"
-        )
+    load = "N" if found.design.axis == "linear" else "N m"
+    lines.extend(
+        f"  at rest, {one.moment_Nm:.4g} {load} at {one.frequency_hz:.4g} Hz: {abs(one.seen_Nm_rad):.6g}"
+        for one in found.at_rest
+    )
+    lines.extend(
+        f"  at {check.frequency_hz:.4g} Hz: {abs(check.foreseen_Nm_rad):.6g}, simulated "
+        f"{abs(check.seen_Nm_rad):.6g} (relative difference {check.difference:.1e})"
+        for check in found.checks
+    )
     return lines

@@ -13,7 +13,7 @@ from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.stiffness import Check, Stiffness, StiffnessCurve
+    from analyses.stiffness import AtRest, Check, Stiffness, StiffnessCurve
 
 STATES = {
     "powered": "powered, command held",
@@ -35,20 +35,22 @@ def section(result: Stiffness) -> dict[str, Any]:
     blocks = [*_figure(result, unit), _table(result, unit)]
     if result.lost_motion is not None:
         blocks.append(_lost_motion(result))
+    if result.at_rest:
+        blocks.append(_at_rest(result, unit))
     if result.checks:
         blocks.append(_checks(result, unit))
     intro = (
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status = "pass" if result.agrees else "fail"
+    status = "info" if not result.checks else "pass" if result.agrees else "fail"
     return doc.section(
         "stiffness",
         "Stiffness",
         blocks,
         result=_result(result, unit),
         intro=intro,
-        **({"status": status} if result.checks else {}),
+        status=status,
     )
 
 
@@ -125,6 +127,28 @@ def _lost_motion(result: Stiffness) -> dict[str, Any]:
         "held: the play and the twist that the load's dry friction holds."
     )
     return doc.table("Lost motion at the output", columns, rows, note)
+
+
+def _at_rest(result: Stiffness, unit: str) -> dict[str, Any]:
+    columns = [
+        doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+        doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"),
+        doc.column("seen", "Stiffness", unit, format="sig:4"),
+    ]
+    note = (
+        "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
+        "command held. No value: the output does not move."
+    )
+    return doc.table("At rest, by amplitude", columns, [_rest_row(one) for one in result.at_rest], note)
+
+
+def _rest_row(one: AtRest) -> dict[str, Any]:
+    size = abs(one.seen_Nm_rad)
+    return {
+        "moment": one.moment_Nm,
+        "frequency_hz": one.frequency_hz,
+        "seen": size if math.isfinite(size) else None,
+    }
 
 
 def _checks(result: Stiffness, unit: str) -> dict[str, Any]:

@@ -11,7 +11,13 @@ import pytest
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Load
 from actuator_lti.errors import InputError
-from analyses.stiffness import check_stiffness, lost_motion_seen, stiffness, stiffness_curves
+from analyses.stiffness import (
+    check_stiffness,
+    lost_motion_seen,
+    stiffness,
+    stiffness_at_rest,
+    stiffness_curves,
+)
 from analyses.stiffness.curves import compliance, stiffness_at
 from reports.cli.main import main
 from reports.figures.registry import draw_svg
@@ -51,7 +57,7 @@ def test_an_open_winding_gives_way_at_the_resonance() -> None:
 
 
 def test_the_fin_by_hand() -> None:
-    """N^2 kM Kp Kv / (R (1 + CM N)) less the load's slope: P controllers, the output's sensor, motor driving."""
+    """N^2 kM Kp Kv / (R (1 + CM N)) less the slope: P controllers, the output's sensor, motor driving."""
     powered, shorted, open_winding = stiffness_curves(load_design("fin"))
     by_hand = 60**2 * 0.03 * 0.12 * 110 / (1.0 * (1 + 1.7e-3 * 60)) + 30
     assert powered.static_Nm_rad == pytest.approx(by_hand, rel=1e-6)
@@ -94,6 +100,22 @@ def test_lost_motion_is_play_and_what_dry_friction_holds(play: float, dry: float
         load=replace(design.load, friction=friction),
     )
     assert lost_motion_seen(changed) == pytest.approx(play + 2 * dry / 800.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("moment", [0.5, 2.0, 8.0])
+def test_at_rest_play_softens_small_moments(moment: float) -> None:
+    """A held motor, no friction: deflection b sgn(M) + M/k, so 1/K = 1/k + 4 b/(pi M) of the fundamental."""
+    design = load_design("ilr33-amber-compliant")
+    free = replace(design, load=replace(design.load, friction=None))
+    (found,) = stiffness_at_rest(free, [(0.5, moment)])
+    by_hand = 1.0 / (1.0 / 1500.0 + 4 * 0.5e-3 / (np.pi * moment))
+    assert abs(found.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
+
+
+def test_at_rest_dry_friction_holds_a_small_moment() -> None:
+    """Less than the load's dry friction, 0.05 N m, does not move it in the gap."""
+    (found,) = stiffness_at_rest(load_design("ilr33-amber-compliant"), [(2.0, 0.04)])
+    assert found.seen_Nm_rad == complex(np.inf)
 
 
 def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
