@@ -106,7 +106,7 @@ def test_files_that_are_no_records(tmp_path: Path, content: str | bytes, reason:
 
 
 def test_a_missing_file_is_one_line() -> None:
-    with pytest.raises(InputError, match=r"nowhere.csv: no such file"):
+    with pytest.raises(InputError, match=r"nowhere.csv: cannot be read: no such file"):
         read_csv_record("nowhere.csv", _spec())
 
 

@@ -49,7 +49,7 @@ def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, capsys: pytest.Capt
     status, out, _ = _run(capsys, "identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
     assert status == 0
     assert "8 of 9 runs" in out
-    assert "run05_torque.csv: no such file" in " ".join(out.split())
+    assert "run05_torque.csv: cannot be read: no such file" in " ".join(out.split())
     document = load_document(tmp_path / "identification.json")
     figures = {b["figure"] for part in document["sections"] for b in part["blocks"] if b["kind"] == "figure"}
     wanted = {"surface", "residuals", "region", "window"}
@@ -137,9 +137,9 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
     ("arguments", "reason"),
     [
         (("identify",), "give one of"),
-        (("identify", "nowhere.toml"), "nowhere.toml: no such file"),
-        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: no such file"),
-        (("correlate", "emps", "nowhere.csv"), "nowhere.csv: no such file"),
+        (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
+        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
