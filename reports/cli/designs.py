@@ -19,9 +19,11 @@ def designs(as_json: JsonOption = False) -> None:
     if as_json:
         print_json({"schema": "actuator-lti/designs", "version": 1, "designs": rows})
         return
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("name", "title", "motor", "loops", "total ratio", box=None, pad_edge=False)
+    table = Table(
+        Column("name", no_wrap=True), "title", "motor", "loops", "total ratio", box=None, pad_edge=False
+    )
     for row in rows:
         loops = ", ".join(row["loops"])
         table.add_row(row["name"], row["title"], row["motor"], loops, f"{row['total_ratio']:g}")
