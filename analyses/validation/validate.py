@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -331,11 +332,16 @@ class _Work:
         setups: dict[str, Rig] = {name: rig(self.linear, name) for name in self.settle}
         return release_margins(setups, confirmed, self.settle)
 
+    @cached_property
+    def _commanded(self) -> LoopFigures:
+        """Figures of the response to the command, with feed-forward and filters."""
+        return loop_figures(self.loops.present["position"], self.loops.reference_to_output)
+
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
         design, settle = self.design, self.settle["position"]
         part = min(design.validation.amplitude_fractions)
-        band = self.figures["position"].bandwidth
+        band = self._commanded.bandwidth
         sweep = None
         if band is not None and self.loops.limiters:
             marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
@@ -396,8 +402,7 @@ class _Work:
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:
-            commanded = loop_figures(self.loops.present["position"], self.loops.reference_to_output)
-            rows += rest_entries(self.design, commanded, steps, sweep)
+            rows += rest_entries(self.design, self._commanded, steps, sweep)
         return rows
 
 
