@@ -254,7 +254,7 @@ class _Work:
     def _measured(self, name: str, loop: Loop) -> LoopValidation:
         """Sweep one stable loop and read its figures."""
         figures = self.figures[name]
-        setup, settle = rig(self.linear, name), self.settle[name]
+        setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
         sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
         whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
         measured = measure_figures(setup, sweep, settle, whole)
@@ -300,7 +300,9 @@ class _Work:
         questions: list[Question] = []
         for name, settle in self.settle.items():
             loop, margins = self._stage_loops()[name], self.figures[name].margins
-            questions += stage_questions(small_rig(self.linear, name), loop, margins, settle)
+            questions += stage_questions(
+                small_rig(self.linear, name, held=name == "current"), loop, margins, settle
+            )
         if len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
