@@ -157,7 +157,7 @@ def _left_out(validation: Validation) -> list[Finding]:
     """What the model of this drive leaves out."""
     found = []
     if validation.design.coupling is None:
-        text = "A rigid drive train is assumed: no coupling is given, so no figure holds a resonance or play of it."
+        text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
         found.append(Finding(severity="info", text=text, where="validation"))
     quantum = validation.design.angle_quantum_rad
     if quantum is not None:
