@@ -295,7 +295,9 @@ def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
         size *= 0.2
     found = step_figures_of(time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
-        time_s, response, reason = _step(small_rig(setup.design, setup.loop), size, settle_ticks)
+        time_s, response, reason = _step(
+            small_rig(setup.design, setup.loop, held=setup.held), size, settle_ticks
+        )
         found = step_figures_of(time_s, response, reason)
     return found
 

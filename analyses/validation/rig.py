@@ -2,8 +2,8 @@
 
 The loop definition of model.md section 3 (inner loops closed, outer ones open) is made as a drive does it:
 for the velocity loop the position controller is out of action and the speed command is a constant (speed
-mode); for the current loop the current command is (torque mode), and the rotor is held at its speed, as a
-bench does it: a free rotor runs away under a constant torque, and what is measured is the back-EMF.  For a
+mode); for the current loop the current command is (torque mode).  The rotor may then be held at its speed, as
+a bench does it: a free one runs away under a constant torque, and what is measured is the back-EMF.  For a
 break point all loops run.
 """
 
@@ -40,12 +40,15 @@ class Rig:
     ride : Ride
         The motion underneath.
     limits_on : bool
+    held : bool
+        Whether the rotor is held at its speed.
     """
 
     design: Design
     loop: str
     ride: Ride
     limits_on: bool = True
+    held: bool = False
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -119,6 +122,7 @@ class Rig:
                 row[name] = 0.0
         if self.outer == "current":
             row["velocity_gain"] = row["velocity_integral"] = 0.0
+        if self.held:
             for name in ("inertia", "motor_inertia"):
                 row[name] *= HELD
         return row
@@ -181,7 +185,7 @@ GAINS = {
 }
 
 
-def rig(design: Design, loop: str, *, limits_on: bool = True) -> Rig:
+def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
     """Set a drive up for one loop, riding on a constant speed that the code chooses.
 
     Raises
@@ -192,21 +196,21 @@ def rig(design: Design, loop: str, *, limits_on: bool = True) -> Rig:
     known = (*stages_of(design), *points_of(design))
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    return Rig(design, loop, ride(design), limits_on)
+    return Rig(design, loop, ride(design), limits_on, held)
 
 
-def small_rig(design: Design, loop: str) -> Rig:
+def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
     """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
 
     At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
     growth.  With play, or friction that differs by direction, the drive has to ride on: these have a slope of
     their own about rest.
     """
-    found = rig(design, loop, limits_on=False)
+    found = rig(design, loop, limits_on=False, held=held)
     friction, play = design.friction, design.coupling is not None and design.coupling.play_rad > 0.0
     if play or friction.points or friction.viscous(1) != friction.viscous(-1):
         return found
-    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False)
+    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False, held=held)
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -253,7 +254,7 @@ class _Work:
     def _measured(self, name: str, loop: Loop) -> LoopValidation:
         """Sweep one stable loop and read its figures."""
         figures = self.figures[name]
-        setup, settle = rig(self.linear, name), self.settle[name]
+        setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
         sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
         whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
         measured = measure_figures(setup, sweep, settle, whole)
@@ -299,7 +300,9 @@ class _Work:
         questions: list[Question] = []
         for name, settle in self.settle.items():
             loop, margins = self._stage_loops()[name], self.figures[name].margins
-            questions += stage_questions(small_rig(self.linear, name), loop, margins, settle)
+            questions += stage_questions(
+                small_rig(self.linear, name, held=name == "current"), loop, margins, settle
+            )
         if len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
@@ -331,11 +334,16 @@ class _Work:
         setups: dict[str, Rig] = {name: rig(self.linear, name) for name in self.settle}
         return release_margins(setups, confirmed, self.settle)
 
+    @cached_property
+    def _commanded(self) -> LoopFigures:
+        """Figures of the response to the command, with feed-forward and filters."""
+        return loop_figures(self.loops.present["position"], self.loops.reference_to_output)
+
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
         design, settle = self.design, self.settle["position"]
         part = min(design.validation.amplitude_fractions)
-        band = self.figures["position"].bandwidth
+        band = self._commanded.bandwidth
         sweep = None
         if band is not None and self.loops.limiters:
             marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
@@ -396,8 +404,7 @@ class _Work:
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:
-            commanded = loop_figures(self.loops.present["position"], self.loops.reference_to_output)
-            rows += rest_entries(self.design, commanded, steps, sweep)
+            rows += rest_entries(self.design, self._commanded, steps, sweep)
         return rows
 
 

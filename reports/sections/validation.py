@@ -157,7 +157,7 @@ def _left_out(validation: Validation) -> list[Finding]:
     """What the model of this drive leaves out."""
     found = []
     if validation.design.coupling is None:
-        text = "A rigid drive train is assumed: no coupling is given, so no figure has a resonance or play."
+        text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
         found.append(Finding(severity="info", text=text, where="validation"))
     quantum = validation.design.angle_quantum_rad
     if quantum is not None:
@@ -189,17 +189,18 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
         judged = [row for row in rows if row.passed is not None]
         held = sum(row.passed is True for row in judged)
         worst = [f"{quantity_name(row)}: {row.reason or 'off'}" for row in judged if row.passed is False]
-        made = _verdict(
-            f"predictions-{name}",
-            f"{loop_name(name)}: linear predictions",
-            held,
-            len(judged),
-            ">=",
-            "",
-            held == len(judged) if judged else None,
-            "; ".join(worst) or _beside(len(rows) - len(judged)),
+        items.append(
+            _verdict(
+                f"predictions-{name}",
+                f"{loop_name(name)}: linear predictions that agree with simulation",
+                held,
+                len(judged),
+                ">=",
+                "",
+                held == len(judged) if judged else None,
+                "; ".join(worst) or _agreement(held, len(rows) - len(judged)),
+            )
         )
-        items.append({**made, "shown": f"{held} of {len(judged)} agree"})
     items += _response_items(validation)
     conditional = validation.conditional
     if conditional is not None:
@@ -223,9 +224,9 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
     return items
 
 
-def _beside(shown: int) -> str:
-    """Say how many predictions are shown without a verdict."""
-    return f"{shown} more shown, not judged" if shown else ""
+def _agreement(held: int, shown: int) -> str:
+    """Say that all agree, and how many are shown beside them."""
+    return f"{held} of {held} agree" + (f"; {shown} shown, not judged" if shown else "")
 
 
 def _response_items(validation: Validation) -> list[dict[str, Any]]:
