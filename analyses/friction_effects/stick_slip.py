@@ -139,12 +139,12 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
     torque_gain, resistance = _torque_gain(design)
     start = friction.dry_Nm(load_Nm) * friction.breakaway_ratio / torque_gain
     gain = velocity.gain * design.controller.position_loop.gain
-    held = {"i": start, "I_velocity": start, "hold_i_ref": start}
+    held = {"i": start, "velocity.I": start, "hold_i_ref": start}
     voltage = start * resistance if design.controller.current is not None else start
     if design.motor.has_electrical_dynamics and design.controller.current is None:
         held["i"] = start / resistance
-    held |= {"I_current": voltage} | {name: voltage for name in system.states if name[0] == "u"}
-    error = {"th": -1.0, "I_velocity": -gain, "hold_w_ref": design.controller.position_loop.gain}
+    held |= {"current.I": voltage} | {name: voltage for name in system.states if name[0] == "u"}
+    error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": design.controller.position_loop.gain}
     rests = (
         system.initial_state({k: v for k, v in held.items() if k in system.states}),
         system.initial_state({k: v for k, v in error.items() if k in system.states}),

@@ -16,8 +16,8 @@ PLACES = {
     "i": "current_start",
     "w": "speed_start",
     "th": "angle_start",
-    "I_current": "current_integrator_start",
-    "I_velocity": "velocity_integrator_start",
+    "current.I": "current_integrator_start",
+    "velocity.I": "velocity_integrator_start",
     "hold_i_ref": "current_command_start",
     "u1": "voltage_start",
 }
