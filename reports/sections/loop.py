@@ -65,7 +65,7 @@ def _intro(name: str, found: LoopFigures) -> str:
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
     words = f"Cut at its error ({found.loop.unit_in}){rate}, with {inner}."
-    return f"{words} Stability found twice: {found.margins.agreement}."
+    return f"{words} Stability is found from the poles and from the Nyquist count, or by exact arithmetic."
 
 
 def _facts(found: LoopFigures) -> dict[str, Any]:
