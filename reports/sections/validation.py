@@ -294,19 +294,24 @@ def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
     return doc.table(caption, columns, [row_of(row) for row in rows])
 
 
+NOISE = 1e-10  # of the value: a smaller difference changes with the order in which sums are taken
+
+
 def row_of(row: Entry) -> dict[str, Any]:
     """One entry as a row; seconds as ms; without the digits that are noise of the last bit."""
     scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, row.unit)
     digits = 6 if row.quantity == "resonance" else 12  # where a flat top is highest is known to 1e-7 at best
     predicted, measured = _rounded(row.predicted, scale, digits), _rounded(row.measured, scale, digits)
-    difference = _rounded(row.difference, scale, 5)
+    difference = _rounded(row.difference, scale, 2)
+    if difference is not None and abs(difference) < NOISE * abs(predicted or 0.0):
+        difference = 0.0
     if row.quantity == "resonance" and predicted is not None and measured is not None:
-        difference = _rounded(measured - predicted, 1.0, 5)
+        difference = _rounded(measured - predicted, 1.0, 2)
     values = {
         "predicted": predicted,
         "measured": measured,
         "difference": difference,
-        "tolerance": _rounded(row.tolerance, scale, 12),
+        "tolerance": _rounded(row.tolerance, scale, 4),
     }
     return {
         "quantity": quantity_name(row),
