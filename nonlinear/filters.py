@@ -44,8 +44,8 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
     --------
     >>> from actuator_lti.design.model import Filter
     >>> notch = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
-    >>> [round(x, 12) for x in section(notch, 2e-4)]  # model.md, case K3
-    [0.972166810747, -1.922292822063, 0.965981657580, -1.922292822063, 0.938148468327]
+    >>> [round(float(x), 12) for x in section(notch, 2e-4)]  # a notch at 640 rad/s
+    [0.972166810747, -1.922292822063, 0.96598165758, -1.922292822063, 0.938148468327]
     """
     if item.kind == "biquad":
         return _biquad(item, where)

@@ -29,8 +29,8 @@ def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
 
     Examples
     --------
-    >>> split_delay(3e-4, 1e-4)
-    (3.0, 0.0)
+    >>> [float(x) for x in split_delay(3e-4, 1e-4)]
+    [3.0, 0.0]
     """
     whole = np.floor(delay_s / period_s + 1e-9)
     rest = delay_s - whole * period_s

