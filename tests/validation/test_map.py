@@ -15,7 +15,7 @@ from analyses.large_signal.border import check_border
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
-from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.steady_start import PLACES, linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.static_threshold import static_threshold
 
@@ -204,3 +204,13 @@ def test_an_unstable_loop_has_no_border_and_still_a_map(amber: Design) -> None:
     assert check_border(design, loops, count=3) is None
     found = amplitude_map(design, loops, counts=(6, 4))
     assert np.isfinite(found.response).all()
+
+
+def test_every_start_has_a_state_of_the_linear_drive() -> None:
+    """A name that no drive has would be passed over, and the run would begin at rest."""
+    names = {
+        state
+        for name in ("ilr33-amber", "ilr33-amber-multirate")
+        for state in assemble_loops(load_design(name)).tick_system.states
+    }
+    assert set(PLACES) <= names
