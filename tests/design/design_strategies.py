@@ -56,7 +56,7 @@ def _value(field: Field, structure: Structure) -> st.SearchStrategy[Any]:
     if field.kind == "integer":
         return st.integers(1, int(min(4, field.high)))
     unit = field.unit(structure)
-    middle = 1.0 if field.high == BIG else min(1.0, field.high / 4)
+    middle = 1.0 if field.high == BIG else min(1.0, field.high / 5)  # four times that, and 5 % more, fits
     if field.low < 0.0 and field.high < 1.0:  # a coefficient that is negative as a rule
         middle = -middle / 100
     if field.kind == "quantities":
