@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout
+from nonlinear._kernels.lengths import lengthened
 
 Floats = npt.NDArray[np.float64]
 
@@ -95,7 +96,7 @@ def call(
 ) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
     opened = _opened(chosen())
-    if opened is None or row[layout.ELASTIC_DRIVE] > 0.0:  # its preparation is not in C
+    if opened is None:
         from nonlinear._kernels.call import call as numba_call
 
         return numba_call(row, tables, history, flags, out, shared)
@@ -105,9 +106,7 @@ def call(
 def _call(
     opened: Any, row: Floats, tables: Floats, history: Floats, flags: Any, out: Floats, shared: Floats
 ) -> int:
-    p = np.zeros(layout.length_of(row))
-    p[: layout.SIZE] = row
-    opened.drive_prepare_sizes(_at(p))
+    p = lengthened(row, lambda head: opened.drive_prepare_sizes(_at(head)))
     s = np.zeros(int(p[layout.STATE_SIZE]))
     opened.drive_derive(_at(p), _at(s))
     opened.drive_init(_at(p), _at(s))
