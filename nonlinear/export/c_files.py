@@ -11,10 +11,10 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
 from nonlinear.emit.kinds import c_float
 from nonlinear.export.program import header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
+from nonlinear.native import parameters
 from nonlinear.parameters import design_row
 
 Floats = npt.NDArray[np.float64]
