@@ -31,22 +31,24 @@ class Terminal(io.StringIO):
             self.written.set()
 
 
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+def terminal_of(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+    """Not a fixture: pytest puts its own stream in place between a fixture and its test."""
     made = Terminal()
     monkeypatch.setattr(sys, "stderr", made)
     monkeypatch.setattr(waiting, "_told", set())
     return made
 
 
-def test_a_wait_is_told_once(terminal: Terminal) -> None:
+def test_a_wait_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = terminal_of(monkeypatch)
     for _ in range(2):
         with waiting.told_if_slow("the kettle boils", 0.0):
             assert terminal.written.wait(10.0)
     assert terminal.getvalue() == "the kettle boils\n"
 
 
-def test_no_wait_no_line(terminal: Terminal) -> None:
+def test_no_wait_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = terminal_of(monkeypatch)
     with waiting.told_if_slow("the kettle boils", 1e3):
         pass
     assert terminal.getvalue() == ""
@@ -61,7 +63,9 @@ def test_nothing_is_said_to_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
     assert log.getvalue() == ""
 
 
-def test_compiling_by_numba_is_told(terminal: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiling_by_numba_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = terminal_of(monkeypatch)
+
     def slow(*_: object) -> int:
         assert terminal.written.wait(10.0)
         return 0
