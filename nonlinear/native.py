@@ -12,6 +12,8 @@ import ctypes
 import hashlib
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,11 +23,17 @@ import numpy.typing as npt
 
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout
+from nonlinear._kernels.lengths import lengthened
+from nonlinear.waiting import told_if_slow
 
 Floats = npt.NDArray[np.float64]
 
 SWITCH = "ACTUATOR_LTI_KERNEL"
 CHOICES = ("auto", "c", "numba")
+COMPILING = (
+    "numba compiles the simulator, once on this machine; python -m nonlinear.native spares it where a "
+    "C compiler is"
+)
 _HERE = Path(__file__).parent
 _FOLDER = _HERE / "_native"
 _SOURCES = ("_kernels", "emit")
@@ -70,51 +78,82 @@ def _opened(choice: str) -> ctypes.CDLL | None:
             )
         return None
     try:
-        opened = ctypes.CDLL(str(path))
+        return _loaded(path)
     except OSError:  # made for another machine
         if choice == "c":
             raise InputError(f"{path.name}: does not load; allowed: python -m nonlinear.native") from None
         return None
-    opened.drive_run.argtypes = [
-        *(ctypes.c_void_p,) * 6,
-        _Bytes,
-        ctypes.c_void_p,
-        ctypes.c_void_p,
-        ctypes.c_double,
-    ]
+
+
+def _loaded(path: Path) -> ctypes.CDLL:
+    opened = ctypes.CDLL(str(path))
+    pointers = (ctypes.c_void_p,) * 6
+    opened.drive_run.argtypes = [*pointers, _Bytes, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
     return opened
+
+
+_borrowed: list[ctypes.CDLL] = []
+
+
+@contextmanager
+def borrowed(path: Path) -> Iterator[None]:
+    """Let every run of this process go through another library of `nonlinear.export.run_library`."""
+    _borrowed.append(_loaded(path))
+    try:
+        yield
+    finally:
+        _borrowed.pop()
+
+
+def _running() -> ctypes.CDLL | None:
+    return _borrowed[-1] if _borrowed else _opened(chosen())
 
 
 def kernel_name() -> str:
     """What runs, for the provenance of a report."""
-    return "C library" if _opened(chosen()) is not None else "numba"
+    return "C library" if _running() is not None else "numba"
 
 
 def call(
     row: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint8], out: Floats, shared: Floats
 ) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
-    opened = _opened(chosen())
-    if opened is None or row[layout.ELASTIC_DRIVE] > 0.0:  # its preparation is not in C
-        from nonlinear._kernels.call import call as numba_call
+    opened = _running()
+    if opened is None:
+        with told_if_slow(COMPILING):
+            from nonlinear._kernels.call import call as numba_call
 
-        return numba_call(row, tables, history, flags, out, shared)
+            return numba_call(row, tables, history, flags, out, shared)
     return _call(opened, row, tables, history, flags, out, shared)
 
 
 def _call(
     opened: Any, row: Floats, tables: Floats, history: Floats, flags: Any, out: Floats, shared: Floats
 ) -> int:
-    p = np.zeros(layout.length_of(row))
-    p[: layout.SIZE] = row
-    opened.drive_prepare_sizes(_at(p))
-    s = np.zeros(int(p[layout.STATE_SIZE]))
-    opened.drive_derive(_at(p), _at(s))
-    opened.drive_init(_at(p), _at(s))
+    p, s = _prepared(opened, row)
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
     rows = _Bytes(flags.ctypes.data, flags.size)
     ours = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))
     return int(opened.drive_run(*ours, 1.0))
+
+
+def _prepared(opened: Any, row: Floats) -> tuple[Floats, Floats]:
+    p = lengthened(row, lambda head: opened.drive_prepare_sizes(_at(head)))
+    s = np.zeros(int(p[layout.STATE_SIZE]))
+    opened.drive_derive(_at(p), _at(s))
+    opened.drive_init(_at(p), _at(s))
+    return p, s
+
+
+def parameters(row: Floats) -> tuple[Floats, Floats]:
+    """All parameters of a row with what is derived from them, and the state at t_0."""
+    opened = _running()
+    if opened is not None:
+        return _prepared(opened, row)
+    with told_if_slow(COMPILING):
+        from nonlinear._kernels.call import parameters as numba_parameters
+
+        return numba_parameters(row)
 
 
 def _at(row: npt.NDArray[Any]) -> ctypes.c_void_p:

@@ -6,30 +6,37 @@ import numpy as np
 import numpy.typing as npt
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.elastic_prepare import prepare_elastic
+from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
-from nonlinear._kernels.prepare import prepare, prepare_sizes
+from nonlinear._kernels.lengths import lengthened
+from nonlinear._kernels.prepare import prepare, prepare_run_sizes
 from nonlinear._kernels.run import run
 from nonlinear._kernels.smooth import prepare_tanh
-from nonlinear._kernels.tick import init, init_elastic
+from nonlinear._kernels.tick import init_elastic, init_run
 
 Floats = npt.NDArray[np.float64]
 
 
 def parameters(row: Floats) -> tuple[Floats, Floats]:
     """All parameters of a row with what is derived from them, and the state at t_0."""
-    p = np.zeros(layout.length_of(row))
-    p[: layout.SIZE] = row
-    prepare_sizes(p)
+    elastic = row[layout.ELASTIC_DRIVE] > 0.0
+
+    def put_sizes(head: Floats) -> None:
+        prepare_run_sizes(head)
+        if elastic:
+            prepare_elastic_sizes(head)
+
+    p = lengthened(row, put_sizes)
     s = np.zeros(int(p[layout.STATE_SIZE]))
     prepare(p, s)
     if row[layout.WITH_ENERGY] > 0.0:
         prepare_forms(p, s)
     if row[layout.LAW] > 0.0:
         prepare_tanh(p, s)
-    init(p, s)
-    if row[layout.ELASTIC_DRIVE] > 0.0:
-        p = prepare_elastic(p)
+    if elastic:
+        prepare_elastic(p, s)
+    init_run(p, s)
+    if elastic:
         init_elastic(p, s)
     return p, s
 

@@ -55,6 +55,7 @@ MODE_CHORD = 19  # h^2/8 times the growth over h: for both segments, then for Ts
 # one transition: rows i, w, W, delta, angle increment over columns i, w, W, delta, u, torque, torque
 STEP_COLUMNS = 7
 STEP_SIZE = 35
+EL_LEAST = EL_MODES + MODE_CHORD  # length of the row that is needed to work out its length
 
 # --- state; current, speed, angle and direction of slip of the motor are those of every drive -----------
 ES_LOAD_SPEED = layout.ELASTIC_STATE  # W

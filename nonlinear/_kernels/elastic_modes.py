@@ -265,19 +265,26 @@ def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
 def elastic_start(p, s):  # type: ignore[no-untyped-def]
     """Set load side, twist and discrete state at t_0; the motor's own state stands in ``s``."""
     s[at.ES_TWIST], s[at.ES_LOAD_SPEED] = p[layout.TWIST_START], p[layout.LOAD_SPEED_START]
+    s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - s[at.ES_TWIST]
+    put_output(p, s)
+    find_mode(p, s)
+
+
+@scalar
+def find_mode(p, s):  # type: ignore[no-untyped-def]
+    """The discrete state that belongs to speeds and twist: at t_0, and after a change of parameters."""
     w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
     start_segment(p, s, 1.0 if p[at.EL_SMOOTH] > 0.0 or w > 0.0 else (-1.0 if w < 0.0 else 0.0))
     if p[layout.RIGID] == 0.0:
         s[at.ES_LOAD] = 1.0 if p[at.EL_LOAD_SMOOTH] > 0.0 or W > 0.0 else (-1.0 if W < 0.0 else 0.0)
         start_contact(p, s)
-    s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - s[at.ES_TWIST]
-    put_output(p, s)
     enter_mode(p, s)
 
 
 @scalar
 def start_contact(p, s):  # type: ignore[no-untyped-def]
     """Contact as the state says."""
+    s[at.ES_CONTACT] = at.GAP
     if p[layout.HALF_PLAY] == 0.0:
         negative = p[at.EL_LOAD_COEFFICIENT] > 0.0 and spring_expression(p, s, 1.0) < 0.0
         s[at.ES_CONTACT] = -1.0 if negative else 1.0

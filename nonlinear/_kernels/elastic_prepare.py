@@ -2,64 +2,64 @@
 
 A mode is (motor at rest or slipping on a segment of its friction map) x (gap, contact on either side) x
 (load at rest or slipping).  Each holds its matrix, a norm that its energy cannot outgrow, and exact
-transitions over both held segments and over Ts/2^j: Taylor series of the matrix exponential at the shortest,
-then squaring, for all modes at once.  Not part of the tick.
+transitions over both held segments and over Ts/2^j.  The row is as long as the modes need:
+`prepare_elastic_sizes` says how long, `prepare_elastic` fills it.
 """
 
 from __future__ import annotations
 
-from math import ceil, log2
-
-import numpy as np
-import numpy.typing as npt
+import math
 
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-
-Floats = npt.NDArray[np.float64]
+from nonlinear._kernels.compiled import entry, scalar
+from nonlinear._kernels.elastic_steps import (
+    double_step,
+    growth_of,
+    keep_step,
+    norm_of,
+    put_short_step,
+)
 
 SHORT = 0.5  # norm of A times the shortest interval
 MOST_LEVELS = 30
-COEFFICIENTS = 14
-# where each coefficient stands in the matrix over (i, w, W, delta, angle, u, motor torque, load torque)
-ROWS = (0, 0, 1, 1, 1, 1, 2, 2, 2, 3, 3, 0, 1, 2)
-COLUMNS = (0, 1, 0, 1, 2, 3, 1, 2, 3, 1, 2, 5, 6, 7)
-ORDER = 8
-STEP_COLUMNS = [0, 1, 2, 3, 5, 6, 7]
 SIDES = (0.0, 1.0, -1.0)  # gap, contact on either side
+LARGEST_POWER = 700.0  # of e in double precision
 
 
-def prepare_elastic(p: Floats) -> Floats:
-    """The row of parameters, made as long as needed and with all that is derived for the drive train.
+@entry
+def prepare_elastic_sizes(p):  # type: ignore[no-untyped-def]
+    """Shares of torque, friction segments, how often the period is halved, and the length of the row.
 
-    ``p`` reaches at least to ``layout.ELASTIC``; its own derived part is filled already.
+    ``p`` reaches at least to ``elastic_layout.EL_LEAST``.
     """
-    row = np.zeros(at.EL_MODES)
-    row[: layout.ELASTIC] = p[: layout.ELASTIC]
-    _put_shares(row)
-    modes = _modes(row)
-    A = _matrices(modes)
-    weights = _weights(row, modes)
-    norm, growth = _norm_and_growth(A, weights)
-    Ts = float(row[layout.PERIOD])
-    levels = min(max(ceil(log2(max(norm * Ts, 1e-300) / SHORT)), 0), MOST_LEVELS)
-    row[at.EL_LEVELS], row[at.EL_TERMS] = levels, _terms(norm * Ts / 2**levels)
-    lengths = [*row[layout.LENGTH : layout.LENGTH + 2], *(Ts / 2**j for j in range(levels + 1))]
-    halvings = [levels, levels, *(levels - j for j in range(levels + 1))]
-    growths = np.exp(np.minimum(np.outer(growth, lengths), 700.0))
-    block = [
-        modes,
-        weights,
-        np.exp(np.minimum(growth * Ts / 2**levels, 700.0))[:, None],
-        np.square(lengths) / 8.0 * growths,
-        *(_step(A, h, n) for h, n in zip(lengths, halvings, strict=True)),
-    ]
-    table = np.concatenate(block, axis=1)
-    row[at.EL_MODE_SIZE] = table.shape[1]
-    return np.concatenate([row, table.ravel()])
+    put_shares(p)
+    norm, modes = 0.0, mode_count(p)
+    for number in range(modes):  # one after the other in the place of the first
+        put_mode(p, number, at.EL_MODES)
+        norm = max(norm, norm_of(p, at.EL_MODES))
+    product, levels = norm * p[layout.PERIOD], 0
+    while product > SHORT and levels < MOST_LEVELS:
+        product *= 0.5
+        levels += 1
+    p[at.EL_LEVELS], p[at.EL_TERMS] = float(levels), float(terms_of(product))
+    size = at.MODE_CHORD + (3 + levels) * (1 + at.STEP_SIZE)
+    p[at.EL_MODE_SIZE] = float(size)
+    p[layout.PARAMETER_SIZE] = float(at.EL_MODES + modes * size)
 
 
-def _put_shares(p: Floats) -> None:
+@entry
+def prepare_elastic(p, s):  # type: ignore[no-untyped-def]
+    """Fill the modes, after `prepare_elastic_sizes` and `prepare`; ``s`` lends its work space."""
+    for number in range(mode_count(p)):
+        m = at.EL_MODES + number * int(p[at.EL_MODE_SIZE])
+        put_mode(p, number, m)
+        put_bounds(p, m, growth_of(p, m, s, int(p[layout.AT_WORK])))
+        put_steps(p, m, s, int(p[layout.AT_WORK]))
+
+
+@scalar
+def put_shares(p):  # type: ignore[no-untyped-def]
     """How torques pass the gears, and whether anything happens at zero speed of either side."""
     behind = p[layout.RATIO] / p[layout.RATIO_TO_COUPLING]
     rigid, back = p[layout.RIGID] > 0.0, p[layout.BACK_DRIVABLE]
@@ -67,102 +67,126 @@ def _put_shares(p: Floats) -> None:
     p[at.EL_REACTION] = back / p[layout.RATIO_TO_COUPLING]
     p[at.EL_BACK] = back / p[layout.RATIO] if rigid else 0.0
     p[at.EL_LOAD_COEFFICIENT] = p[layout.LOAD_COEFFICIENT] * (1.0 if rigid else behind)
-    lines = []
     for side in range(2):
-        segments = friction_segments(p, side)
-        p[at.EL_SEGMENTS + side] = len(segments)
-        place = at.EL_MAP + side * at.MAP_SIDE
-        p[place : place + segments.size] = segments.ravel()
-        lines.append(segments)
-    forward, reverse = lines
-    one = len(forward) == len(reverse) == 1 and forward[0, at.MAP_SLOPE] == reverse[0, at.MAP_SLOPE]
-    dry = abs(forward[0, at.MAP_LEVEL]) + abs(reverse[0, at.MAP_LEVEL]) + p[at.EL_LOAD_COEFFICIENT]
-    p[at.EL_SMOOTH] = float(one and dry == 0.0)
-    p[at.EL_LOAD_SMOOTH] = float(p[layout.LOAD_DRY] == 0.0)
+        put_segments(p, side)
+    forward, reverse = at.EL_MAP, at.EL_MAP + at.MAP_SIDE
+    one = p[at.EL_SEGMENTS] == 1.0 and p[at.EL_SEGMENTS_REVERSE] == 1.0
+    same = p[forward + at.MAP_SLOPE] == p[reverse + at.MAP_SLOPE]
+    dry = abs(p[forward + at.MAP_LEVEL]) + abs(p[reverse + at.MAP_LEVEL]) + p[at.EL_LOAD_COEFFICIENT]
+    p[at.EL_SMOOTH] = 1.0 if one and same and dry == 0.0 else 0.0
+    p[at.EL_LOAD_SMOOTH] = 1.0 if p[layout.LOAD_DRY] == 0.0 else 0.0
 
 
-def friction_segments(p: Floats, side: int) -> Floats:
+@scalar
+def put_segments(p, side):  # type: ignore[no-untyped-def]
     """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|: begins, level, slope.
 
     Without a map one line, C0 and Cv; the last slope of a map continues.
     """
-    count, place = int(p[layout.MAP_COUNT + side]), layout.MAP + side * 2 * layout.MAX_POINTS
+    count, point = int(p[layout.MAP_COUNT + side]), layout.MAP + side * 2 * layout.MAX_POINTS
+    place = at.EL_MAP + side * at.MAP_SIDE
+    p[at.EL_SEGMENTS + side] = float(max(count - 1, 1))
+    p[place + at.MAP_SPEED] = 0.0
+    p[place + at.MAP_LEVEL], p[place + at.MAP_SLOPE] = p[point + 1], 0.0
     if count == 0:
-        return np.array([[0.0, p[layout.DRY + side], p[layout.VISCOUS + side]]])
-    speed, torque = p[place : place + 2 * count].reshape(count, 2).T
-    if count == 1:
-        return np.array([[0.0, torque[0], 0.0]])
-    slope = np.diff(torque) / np.diff(speed)
-    return np.column_stack([speed[:-1], torque[:-1] - slope * speed[:-1], slope])
+        p[place + at.MAP_LEVEL], p[place + at.MAP_SLOPE] = p[layout.DRY + side], p[layout.VISCOUS + side]
+    for _ in range(count - 1):
+        slope = (p[point + 3] - p[point + 1]) / (p[point + 2] - p[point])
+        p[place + at.MAP_SPEED], p[place + at.MAP_SLOPE] = p[point], slope
+        p[place + at.MAP_LEVEL] = p[point + 1] - slope * p[point]
+        point += 2
+        place += at.MAP_SEGMENT
 
 
-def _modes(p: Floats) -> Floats:
-    """Coefficients of every mode, in the order of `elastic_modes.mode_number`."""
-    motors = [(0.0, 0.0)]
-    for side, sign in enumerate((1.0, -1.0)):
-        for j in range(int(p[at.EL_SEGMENTS + side])):
-            place = at.EL_MAP + side * at.MAP_SIDE + j * at.MAP_SEGMENT
-            motors.append((sign, float(p[place + at.MAP_SLOPE])))
-    return np.array(
-        [_mode(p, s, slope, contact, slips) for s, slope in motors for contact in SIDES for slips in (0, 1)]
-    )
+@scalar
+def mode_count(p):  # type: ignore[no-untyped-def]
+    """Number of modes: motor at rest or on a segment of either side, three contacts, load at rest or not."""
+    return 6 * (1 + int(p[at.EL_SEGMENTS]) + int(p[at.EL_SEGMENTS_REVERSE]))
 
 
-def _mode(p: Floats, s: float, slope: float, contact: float, load_slips: int) -> Floats:
-    """One mode: s the motor's direction (0 at rest), contact 0, 1 or -1."""
-    a = np.zeros(COEFFICIENTS)
-    k, c = (p[layout.STIFFNESS], p[layout.COUPLING_DAMPING]) if contact else (0.0, 0.0)
-    N_c, J_m, J_l = p[layout.RATIO_TO_COUPLING], p[layout.MOTOR_INERTIA], p[layout.LOAD_INERTIA]
+@scalar
+def motor_of(p, motor):  # type: ignore[no-untyped-def]
+    """Direction of the motor (0 at rest) and slope of its friction, by number: rest, forward, reverse."""
+    forward = int(p[at.EL_SEGMENTS])
+    if motor == 0:
+        return 0.0, 0.0
+    if motor <= forward:
+        return 1.0, p[at.EL_MAP + (motor - 1) * at.MAP_SEGMENT + at.MAP_SLOPE]
+    return -1.0, p[at.EL_MAP + at.MAP_SIDE + (motor - 1 - forward) * at.MAP_SEGMENT + at.MAP_SLOPE]
+
+
+@scalar
+def put_mode(p, number, m):  # type: ignore[no-untyped-def]
+    """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
+    for j in range(at.MODE_CHORD):
+        p[m + j] = 0.0
+    motor = int(number / 6)
+    contact = int((number - 6 * motor) / 2)
+    slips = number - 6 * motor - 2 * contact > 0
+    direction, slope = motor_of(p, motor)
     # T_s acts on the motor with 1/N_c and, through friction, with CM' sgn(w T_s)
-    share = p[at.EL_REACTION] + s * contact * p[at.EL_LOAD_COEFFICIENT]
-    if not p[layout.SOURCE]:
-        L = p[layout.INDUCTANCE]
-        a[at.A_II], a[at.B_I] = -p[layout.RESISTANCE] / L, 1.0 / L
-        if s:
-            a[at.A_IW], a[at.A_WI] = -p[layout.BACK_EMF] / L, p[layout.TORQUE_CONSTANT] / J_m
-    if s:
-        a[at.B_W], a[at.A_WW] = 1.0 / J_m, -(slope + share * c / N_c) / J_m
-        a[at.A_WD] = -share * k / J_m
-    if p[layout.RIGID]:
-        return a
-    if s:
-        a[at.A_DW] = 1.0 / N_c
+    share = p[at.EL_REACTION] + direction * SIDES[contact] * p[at.EL_LOAD_COEFFICIENT]
+    k = p[layout.STIFFNESS] if contact > 0 else 0.0
+    c = p[layout.COUPLING_DAMPING] if contact > 0 else 0.0
+    put_electrical(p, m, direction)
+    if direction != 0.0:
+        put_motor(p, m, slope, share, k, c)
+    if p[layout.RIGID] == 0.0:
+        put_load_side(p, m, direction != 0.0, slips, share, k, c)
+    put_weights(p, m)
+
+
+@scalar
+def put_electrical(p, m, direction):  # type: ignore[no-untyped-def]
+    """The current of a motor that has one."""
+    if p[layout.SOURCE] > 0.0:
+        return
+    L = p[layout.INDUCTANCE]
+    p[m + at.A_II], p[m + at.B_I] = -p[layout.RESISTANCE] / L, 1.0 / L
+    if direction != 0.0:
+        p[m + at.A_IW] = -p[layout.BACK_EMF] / L
+        p[m + at.A_WI] = p[layout.TORQUE_CONSTANT] / p[layout.MOTOR_INERTIA]
+
+
+@scalar
+def put_motor(p, m, slope, share, k, c):  # type: ignore[no-untyped-def]
+    """The slipping motor under its friction and the coupling."""
+    J = p[layout.MOTOR_INERTIA]
+    p[m + at.B_W] = 1.0 / J
+    p[m + at.A_WW] = -(slope + share * c / p[layout.RATIO_TO_COUPLING]) / J
+    p[m + at.A_WD] = -share * k / J
+
+
+@scalar
+def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[no-untyped-def]
+    """Twist and load speed."""
+    N_c, J = p[layout.RATIO_TO_COUPLING], p[layout.LOAD_INERTIA]
+    if motor_slips:
+        p[m + at.A_DW] = 1.0 / N_c
     if load_slips:
-        a[at.B_V], a[at.A_VV], a[at.A_VD] = 1.0 / J_l, -(p[layout.LOAD_VISCOUS] + c) / J_l, k / J_l
-        a[at.A_DV] = -1.0
-    if s and load_slips:
-        a[at.A_WV], a[at.A_VW] = share * c / J_m, c / (N_c * J_l)
-    return a
+        p[m + at.B_V], p[m + at.A_VD] = 1.0 / J, k / J
+        p[m + at.A_VV] = -(p[layout.LOAD_VISCOUS] + c) / J
+        p[m + at.A_DV] = -1.0
+    if motor_slips and load_slips:
+        p[m + at.A_WV], p[m + at.A_VW] = share * c / p[layout.MOTOR_INERTIA], c / (N_c * J)
 
 
-def _matrices(modes: Floats) -> Floats:
-    A = np.zeros((len(modes), ORDER, ORDER))
-    A[:, ROWS, COLUMNS] = modes
-    A[:, 4, 1] = 1.0
-    return A
-
-
-def _weights(p: Floats, modes: Floats) -> Floats:
+@scalar
+def put_weights(p, m):  # type: ignore[no-untyped-def]
     """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
 
     A state that acts on no other (the twist in the gap, the absent current) weighs nothing.
     """
-    current = 0.0 if p[layout.SOURCE] else p[layout.INDUCTANCE]
-    row = np.sqrt([current, p[layout.MOTOR_INERTIA], p[layout.LOAD_INERTIA], p[layout.STIFFNESS]])
-    weights = np.tile(row, (len(modes), 1))
-    weights[(modes[:, at.A_WD] == 0.0) & (modes[:, at.A_VD] == 0.0), 3] = 0.0
-    return weights
+    weight = m + at.MODE_WEIGHT
+    p[weight] = 0.0 if p[layout.SOURCE] > 0.0 else math.sqrt(p[layout.INDUCTANCE])
+    p[weight + 1] = math.sqrt(p[layout.MOTOR_INERTIA])
+    p[weight + 2] = math.sqrt(p[layout.LOAD_INERTIA])
+    free = p[m + at.A_WD] == 0.0 and p[m + at.A_VD] == 0.0
+    p[weight + 3] = 0.0 if free else math.sqrt(p[layout.STIFFNESS])
 
 
-def _norm_and_growth(A: Floats, weights: Floats) -> tuple[float, Floats]:
-    """Largest norm of A in the weighted states, and of each mode the logarithmic norm where positive."""
-    inverse = np.divide(1.0, weights, out=np.zeros_like(weights), where=weights > 0.0)
-    scaled = weights[:, :, None] * A[:, :4, :4] * inverse[:, None, :]
-    growth = np.linalg.eigvalsh(0.5 * (scaled + scaled.transpose(0, 2, 1)))[:, -1]
-    return float(np.sqrt((scaled * scaled).sum(axis=(1, 2))).max()), np.maximum(growth, 0.0)
-
-
-def _terms(product: float) -> int:
+@scalar
+def terms_of(product):  # type: ignore[no-untyped-def]
     """Terms of the Taylor series over an interval on which the norm of A h is ``product``."""
     terms, rest = 1, product
     while rest > 1e-18 and terms < at.MAX_TERMS:
@@ -171,14 +195,29 @@ def _terms(product: float) -> int:
     return max(terms, 4)
 
 
-def _step(A: Floats, h: float, halvings: int) -> Floats:
-    """Transitions of all modes over h, five rows of seven numbers each, the old angle left out."""
-    short = A * (h / 2**halvings)
-    result = np.tile(np.eye(ORDER), (len(A), 1, 1))
-    term = result
-    for j in range(1, at.MAX_TERMS + 2):
-        term = term @ short / j
-        result = result + term
-    for _ in range(halvings):
-        result = result @ result
-    return result[:, :5, STEP_COLUMNS].reshape(len(A), -1)
+@scalar
+def put_bounds(p, m, growth):  # type: ignore[no-untyped-def]
+    """Growth of the energy's norm over the shortest interval, and the chord bounds h^2/8 exp(growth h)."""
+    levels = int(p[at.EL_LEVELS])
+    h = math.ldexp(p[layout.PERIOD], -levels)
+    p[m + at.MODE_GROWTH] = math.exp(min(growth * h, LARGEST_POWER))
+    for j in range(3 + levels):
+        h = p[layout.LENGTH + j] if j < 2 else math.ldexp(p[layout.PERIOD], 2 - j)
+        p[m + at.MODE_CHORD + j] = h * h / 8.0 * math.exp(min(growth * h, LARGEST_POWER))
+
+
+@scalar
+def put_steps(p, m, s, work):  # type: ignore[no-untyped-def]
+    """Transitions over both held segments, and over Ts/2^j from the shortest up."""
+    levels = int(p[at.EL_LEVELS])
+    o = m + at.MODE_CHORD + 3 + levels
+    for part in range(2):
+        put_short_step(p, m, math.ldexp(p[layout.LENGTH + part], -levels), s, work)
+        for _ in range(levels):
+            double_step(s, work)
+        keep_step(p, o + part * at.STEP_SIZE, s, work)
+    put_short_step(p, m, math.ldexp(p[layout.PERIOD], -levels), s, work)
+    keep_step(p, o + (2 + levels) * at.STEP_SIZE, s, work)
+    for j in range(levels):
+        double_step(s, work)
+        keep_step(p, o + (1 + levels - j) * at.STEP_SIZE, s, work)

@@ -11,8 +11,6 @@ units are SI, motor side.
 
 from __future__ import annotations
 
-from typing import Any
-
 # --- parameters of one run -------------------------------------------------------------------------
 (
     TICKS,  # number of ticks n; rows k = 0 .. n-1 are sampled at t_k = k Ts
@@ -212,11 +210,12 @@ LENGTH = DECAY + 2  # of the two segments, s
     PROBE_RING,  # length of one ring
     AT_WORK,  # of the work space
     STATE_SIZE,
-) = range(LENGTH + 2, LENGTH + 26)
+    PARAMETER_SIZE,  # length of the row of parameters with all that is derived
+) = range(LENGTH + 2, LENGTH + 27)
 
 # integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
 FORM = 34
-FORMS = LENGTH + 26  # four: direction, segment
+FORMS = LENGTH + 27  # four: direction, segment
 P_SIZE = FORMS + 4 * FORM
 
 # --- behind that, either the block of an elastic drive train, as long as it needs ---------------------
@@ -429,10 +428,3 @@ OUT_SIZE = OUT_STEP_BEFORE + 1
 
 # --- status ----------------------------------------------------------------------------------------
 OK, TOO_MANY_EVENTS, NOT_FINITE, CANCELLED, NO_ROOT = range(5)
-
-
-def length_of(row: Any) -> int:
-    """Length of the row of parameters of a run with what is derived from it."""
-    if row[LAW] <= 0.0:
-        return P_SIZE
-    return P_SIZE + TANH_SIZE + (TANH_FORMS_SIZE if row[WITH_ENERGY] > 0.0 else 0)

@@ -11,8 +11,16 @@ from nonlinear._kernels.modal import COMPLEX, describe
 
 
 @entry
-def prepare_sizes(p):  # type: ignore[no-untyped-def]
-    """Places of the parts of the state whose lengths differ from drive to drive, and its length."""
+def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
+    """Places of the parts of the state whose lengths differ from drive to drive, and both rows' lengths.
+
+    Of an elastic drive `prepare_elastic_sizes` comes next: its row of parameters is longer.
+    """
+    p[layout.PARAMETER_SIZE] = float(layout.P_SIZE)
+    if p[layout.LAW] > 0.0:
+        p[layout.PARAMETER_SIZE] += float(layout.TANH_SIZE)
+        if p[layout.WITH_ENERGY] > 0.0:
+            p[layout.PARAMETER_SIZE] += float(layout.TANH_FORMS_SIZE)
     p[layout.DELAY_LINE] = p[layout.DELAY_TICKS] + 2.0
     p[layout.AT_ANGLES] = layout.S_QUEUE + p[layout.DELAY_LINE]
     p[layout.AT_AVERAGE] = p[layout.AT_ANGLES] + p[layout.DIFFERENCE_SAMPLES]
@@ -104,9 +112,9 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
 
 @entry
 def prepare(p, s):  # type: ignore[no-untyped-def]
-    """Fill the derived part of ``p`` (after `prepare_sizes`); ``s`` lends its work space.
+    """Fill the derived part of ``p`` (after `prepare_run_sizes`); ``s`` lends its work space.
 
-    With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`.
+    With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`, elastic `prepare_elastic`.
     """
     prepare_periods(p)
     prepare_gates(p)

@@ -1,6 +1,7 @@
-"""The drive as a machine with a state: `init` once, `step` every tick; `get` and `set_state` copy the state.
+"""The drive as a machine with a state: `init_run` once, `step` every tick.
 
-All rows are flat.  A state copied out and set again elsewhere goes on with the same bits.
+`get` and `set_state` copy the state.  All rows are flat.
+A state copied out and set again elsewhere goes on with the same bits.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.control import control
-from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start
+from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start, find_mode
 from nonlinear._kernels.estimate import TRACKING, counted
 from nonlinear._kernels.filters import settle
 from nonlinear._kernels.motion import motion, put_load
@@ -80,7 +81,7 @@ def init_lines(p, s):  # type: ignore[no-untyped-def]
 
 
 @entry
-def init(p, s):  # type: ignore[no-untyped-def]
+def init_run(p, s):  # type: ignore[no-untyped-def]
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
         s[j] = 0.0
@@ -100,10 +101,26 @@ def init(p, s):  # type: ignore[no-untyped-def]
 
 @entry
 def init_elastic(p, s):  # type: ignore[no-untyped-def]
-    """What `init` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
+    """What `init_run` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
     elastic_start(p, s)
     fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
+
+
+@entry
+def retune_rigid(p, s):  # type: ignore[no-untyped-def]
+    """What parameters changed between two ticks mean for the state: torques, and whether the motor slips."""
+    put_load(p, s, s[layout.S_LOAD], 0.0)
+    w = s[layout.S_SPEED]
+    s[layout.S_DIRECTION] = -1.0 if w < 0.0 else (1.0 if w > 0.0 else 0.0)
+    if p[layout.SMOOTH] > 0.0 or p[layout.LAW] > 0.0:
+        s[layout.S_DIRECTION] = 1.0
+
+
+@entry
+def retune_elastic(p, s):  # type: ignore[no-untyped-def]
+    """The same for an elastic drive train: contact and the load's slip too."""
+    find_mode(p, s)
 
 
 @woven

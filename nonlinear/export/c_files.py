@@ -9,14 +9,16 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
 from nonlinear.emit.kinds import c_float
 from nonlinear.export.program import header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
+from nonlinear.native import parameters
 from nonlinear.parameters import design_row
 
 Floats = npt.NDArray[np.float64]
+SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,23 +31,31 @@ class ExportedDesign:
         Parameters of a run: the design at rest, its hinge moment an input.
     p_size, s_size : int
         Lengths of the rows of parameters and state.
+    derived : ndarray, shape (p_size,)
+        The row with all that follows from it.
     """
 
     design: Design
     row: Floats
     p_size: int
     s_size: int
+    derived: Floats
 
 
 def exported(design: Design) -> ExportedDesign:
     """The row of a design whose hinge moment comes from outside, and the lengths that it needs."""
     row = design_row(design)
-    if row[at.ELASTIC_DRIVE] > 0.0:
-        message = "coupling, friction.point: an elastic drive train or a friction map cannot be exported"
-        raise InputError(f"{message}; allowed: a rigid one", where=design.origin or design.name)
     row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
     p, s = parameters(row)
-    return ExportedDesign(design=design, row=row, p_size=p.size, s_size=s.size)
+    return ExportedDesign(design=design, row=row, p_size=p.size, s_size=s.size, derived=p)
+
+
+def spare_parameters(ours: ExportedDesign) -> int:
+    """Numbers to keep free in p so that a coupling may become ``4**SPARE_LEVELS`` times as stiff."""
+    if ours.row[at.ELASTIC_DRIVE] <= 0.0:
+        return 0
+    modes = (ours.p_size - elastic.EL_MODES) // int(ours.derived[elastic.EL_MODE_SIZE])
+    return SPARE_LEVELS * modes * (1 + elastic.STEP_SIZE)
 
 
 def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str]:
@@ -162,6 +172,7 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
         "S": str(ours.s_size),
         "IO": str(at.IO_SIZE),
         "BYTES": str(number * (ours.p_size + ours.s_size + at.IO_SIZE)),
+        "STIFFER": _stiffer(ours),
         "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }
@@ -169,3 +180,10 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text
+
+
+def _stiffer(ours: ExportedDesign) -> str:
+    if ours.row[at.ELASTIC_DRIVE] <= 0.0:
+        return ""
+    step = spare_parameters(ours) // SPARE_LEVELS
+    return f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."

@@ -1,4 +1,4 @@
-"""Functions that are emitted only: what a caller outside of Python wants in one call."""
+"""Functions that are emitted only: what a caller outside of Python wants in one call, for every drive."""
 
 from __future__ import annotations
 
@@ -7,11 +7,21 @@ from typing import Any
 import numba
 
 from nonlinear._kernels import layout
+from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
-from nonlinear._kernels.prepare import prepare
+from nonlinear._kernels.prepare import prepare, prepare_run_sizes
 from nonlinear._kernels.smooth import prepare_tanh
+from nonlinear._kernels.tick import init_elastic, init_run, retune_elastic, retune_rigid
 
 emitted: Any = numba.njit(error_model="numpy")  # compiled by numba in tests alone
+
+
+@emitted
+def prepare_sizes(p):  # type: ignore[no-untyped-def]
+    """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
+    prepare_run_sizes(p)
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        prepare_elastic_sizes(p)
 
 
 @emitted
@@ -22,3 +32,21 @@ def derive(p, s):  # type: ignore[no-untyped-def]
         prepare_forms(p, s)
     if p[layout.LAW] > 0.0:
         prepare_tanh(p, s)
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        prepare_elastic(p, s)
+
+
+@emitted
+def init(p, s):  # type: ignore[no-untyped-def]
+    """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
+    init_run(p, s)
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        init_elastic(p, s)
+
+
+@emitted
+def retune(p, s):  # type: ignore[no-untyped-def]
+    """Fit the state to parameters that were changed between two ticks, after `derive`."""
+    retune_rigid(p, s)
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        retune_elastic(p, s)

@@ -14,7 +14,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear.emit.kinds import c_float
 from nonlinear.export.build import compile_files
-from nonlinear.export.c_files import c_export
+from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
 from nonlinear.export.program import template
 from nonlinear.export.trace import KeyTrace, trace_keys
@@ -96,13 +96,14 @@ def fmu_bytes(
 
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
     texts = c_export(design)
+    spare = spare_parameters(exported(design))
     bits = ", ".join(str(bit) for bit in flag_bits())
     return {
         "drive.h": texts["drive.h"],
         "drive.c": texts["drive.c"],
         "drive_design.h": texts["drive_design.h"],
         "drive_design.c": texts["drive_design.c"],
-        "fmu_design.h": _design_header(design, trace),
+        "fmu_design.h": _design_header(design, trace, spare),
         "fmu_design.c": _design_source(design, trace),
         "fmu_core.h": template("fmu_core.h"),
         "fmu_core.c": template("fmu_core.c").replace("@BITS@", bits),
@@ -116,7 +117,7 @@ def _token(texts: Mapping[str, str], variables: Sequence[Variable]) -> str:
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 
 
-def _design_header(design: Design, trace: KeyTrace) -> str:
+def _design_header(design: Design, trace: KeyTrace, spare: int) -> str:
     return f"""/*
  * Keys of the design as parameters of the unit.
  */
@@ -124,6 +125,7 @@ def _design_header(design: Design, trace: KeyTrace) -> str:
 #define FMU_DESIGN_H
 
 #define FMU_TOKEN "@TOKEN@"
+#define FMU_SPARE_P {spare} /* room for a stiffer coupling than the design's */
 #define FMU_KEYS {len(trace.keys)}U
 #define FMU_CONSTANTS {len(trace.constants)}U
 #define FMU_TEXTS {len(texts_of(design))}U

@@ -9,12 +9,10 @@ from importlib.resources import files
 
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.control import control_tick
-from nonlinear._kernels.motion import put_load
-from nonlinear._kernels.prepare import prepare_sizes
-from nonlinear._kernels.tick import get, init, set_state, tick
+from nonlinear._kernels.tick import get, set_state, tick
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import FUNCTIONS, Kind
-from nonlinear.export.entries import derive
+from nonlinear.export.entries import derive, init, prepare_sizes, retune
 from nonlinear.export.rows import names_of, parameter_names, words
 
 _ROW: Kind = "row"
@@ -24,7 +22,7 @@ ENTRIES: dict[object, tuple[Kind, ...]] = {
     init: (_ROW, _ROW),
     tick: (_ROW, _ROW, _ROW),
     control_tick: (_ROW, _ROW, _ROW),
-    put_load: (_ROW, _ROW, "float", "float"),
+    retune: (_ROW, _ROW),
     get: (_ROW, _ROW, _ROW),
     set_state: (_ROW, _ROW, _ROW),
 }
@@ -41,12 +39,12 @@ STATUS = {
     "NO_ROOT": "no time was found for a zero crossing of the speed",
 }
 _ABOUT = {
-    "prepare_sizes": "Works out the lengths: call it first, after every change of a count or a delay.",
-    "derive": "Derives all that does not change with time; call it after every change of p.",
+    "prepare_sizes": "Works out the lengths of p and s; call it first, and after every change of p.",
+    "derive": "Derives all that does not change with time; call it after `prepare_sizes`.",
     "init": "State at the first tick, from the start values in p.",
     "tick": "Sense, control and move by one period; returns a status.  Inputs io[DRIVE_IN_...] are held.",
     "control_tick": "The controller alone, on measured current, speed and angle in io; returns the voltage.",
-    "put_load": "Notes hinge moment and motor torque; needed only after a change of friction between ticks.",
+    "retune": "Fits the state to parameters changed between two ticks, after `derive`.",
     "get": "Copies the state out, p[DRIVE_STATE_SIZE] numbers.",
     "set_state": "Copies a state in.",
 }
@@ -83,7 +81,7 @@ def header_text() -> str:
         "@SIZES@", sizes).replace("@FLAGS@", f"{flags}, {at.FLAG_STICK} at rest")  # fmt: skip
 
 
-_DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE")
+_DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE", "PARAMETER_SIZE")
 
 
 def _outputs() -> list[tuple[str, int]]:

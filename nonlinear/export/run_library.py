@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from nonlinear._kernels.prepare import prepare_sizes
 from nonlinear._kernels.run import run
-from nonlinear._kernels.tick import init
 from nonlinear.emit import emit_c
 from nonlinear.emit.kinds import Kind
-from nonlinear.export.entries import derive
+from nonlinear.export.entries import derive, init, prepare_sizes
 from nonlinear.export.program import helpers_of
 
 _ROW: Kind = "row"

@@ -172,7 +172,8 @@ class KeyTrace:
 # what decides the clock, the shape of the state or its start: not to be changed during a run
 _FIXED = {
     at.PERIOD, at.EVERY_VELOCITY, at.EVERY_POSITION, at.DELAY_TICKS, at.DELAY_FRACTION, at.RATIO,
-    at.DIFFERENCE_SAMPLES, at.PROFILE_SAMPLES, at.COUNTS_PER_RAD, at.POSITION_COUNTS, at.SEED,
+    at.RATIO_TO_COUPLING, at.DIFFERENCE_SAMPLES, at.PROFILE_SAMPLES, at.COUNTS_PER_RAD,
+    at.POSITION_COUNTS, at.SEED,
 }  # fmt: skip
 _INPUTS = ("limits.voltage",)  # an input of the drive
 

@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument
 from reports.cli.targets import folder_for_results
 
+if TYPE_CHECKING:
+    from actuator_lti.design import Design
+    from analyses.code_check import CodeCheck
+
 app = typer.Typer(help="The running drive outside of Python: C99 or FMU.", no_args_is_help=True)
 
+CheckOption = Annotated[
+    bool,
+    typer.Option(
+        "--check/--no-check",
+        help="Measure the margins of the compiled code (sweep by injection, borders in time) and say so in "
+        "the export; needs a C compiler.",
+    ),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite files that exist.")]
 
 
@@ -23,20 +35,46 @@ def c(
         typer.Option("--out", metavar="DIR", help="Folder for the files.", callback=folder_for_results),
     ] = Path("drive-c"),
     single: Annotated[bool, typer.Option("--single", help="float in place of double.")] = False,
+    check: CheckOption = True,
     force: ForceOption = False,
 ) -> None:
     """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
     from actuator_lti.atomic import write_together
     from actuator_lti.design import load_design
     from nonlinear.export import c_export
+    from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.targets import refuse_existing
+    from reports.export_check import check_text
 
-    texts = c_export(load_design(design), single_precision=single)
+    drive = load_design(design)
+    texts = c_export(drive, single_precision=single)
     for name in texts:
         refuse_existing(out / name, force)
+    found = _checked(drive) if check else None
+    texts["README.md"] += "\n" + check_text(found, single_precision=single)
     write_together({out / name: text.encode() for name, text in texts.items()})
     print_line(f"{out}: {', '.join(texts)}")
+    leave_with(_said(found))
+
+
+def _checked(drive: Design) -> CodeCheck:
+    from analyses.code_check import check_code
+    from nonlinear.waiting import told_if_slow
+
+    with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
+        return check_code(drive)
+
+
+def _said(found: CodeCheck | None) -> bool:
+    """Print what the check has found; whether all is well."""
+    from reports.cli.output import print_line
+    from reports.export_check import summary
+
+    if found is None:
+        return True
+    print_line(summary(found))
+    return not found.failed
 
 
 @app.command("fmu")
@@ -50,13 +88,15 @@ def fmu(
         list[str] | None,
         typer.Option("--platform", metavar="NAME", help="linux64 or win64, may be repeated; default both."),
     ] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Without the margin report inside.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Without reports inside, and no check.")] = False,
+    check: CheckOption = True,
     force: ForceOption = False,
 ) -> None:
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
     from actuator_lti.atomic import write_bytes
     from actuator_lti.design import load_design
     from nonlinear.export import PLATFORMS, fmu_bytes
+    from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.targets import refuse_existing
     from reports.export_documents import export_documents
@@ -66,12 +106,14 @@ def fmu(
     target = out or Path(f"{drive.name}.fmu")
     refuse_existing(target, force)
     platforms = tuple(dict.fromkeys(platform or PLATFORMS))
+    found = _checked(drive) if check and not plain else None
     data = fmu_bytes(
         drive,
         version,  # type: ignore[arg-type]
         platforms,
-        documents={} if plain else export_documents(drive),
+        documents={} if plain else export_documents(drive, found),
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)
     print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
+    leave_with(_said(found))

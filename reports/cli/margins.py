@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
@@ -17,8 +20,20 @@ from reports.cli.options import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from actuator_lti.loops import Loops
     from analyses.loop_figures import LoopFigures
     from analyses.requirements import RequirementVerdict
+
+AroundOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--around",
+        metavar="FILE",
+        help="JSON file of a linear system that is closed around the drive, from its output to its command "
+        "(an airframe with its autopilot): num and den, or A, B, C and D; dt in s, or 0 for a continuous "
+        "one, then with sampling_period in s; sign -1 or 1; name, input, output.",
+    ),
+]
 
 
 def margins(
@@ -27,6 +42,7 @@ def margins(
     form: FormOption = "sampled",
     operating_point: OperatingPointOption = "sliding",
     load: LoadOption = 0.0,
+    around: AroundOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Print margins, bandwidths and verdicts of every loop.
@@ -50,6 +66,7 @@ def margins(
         operating_point=operating_point,  # type: ignore[arg-type]
         load_Nm=load,
     )
+    outer = _outer_figures(loops, around, step=form != "continuous")
     figures = all_loop_figures(loops, step=form != "continuous")
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
@@ -61,14 +78,30 @@ def margins(
     }
     where["load_unit"] = load_unit(drive)
     if as_json:
-        _print_json(where, figures, verdicts)
+        _print_json(where, figures, verdicts, outer)
     else:
-        _print_tables(where, figures, verdicts)
-    leave_with(all_pass(verdicts) and all(found.margins.stable is not False for found in figures.values()))
+        _print_tables(where, figures, verdicts, outer)
+    every = [*figures.values(), *outer.values()]
+    leave_with(all_pass(verdicts) and all(found.margins.stable is not False for found in every))
+
+
+def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str, LoopFigures]:
+    """The figures of the loop of the file, by its name; none where there is no file."""
+    if around is None:
+        return {}
+    from analyses.loop_figures import loop_figures
+    from analyses.outer_loop import loop_around
+    from analyses.outer_loop_file import read_outer_loop
+
+    outer = read_outer_loop(around)
+    return {outer.name: loop_figures(loop_around(loops, outer), step=step)}
 
 
 def _print_json(
-    where: Mapping[str, Any], figures: Mapping[str, LoopFigures], verdicts: Sequence[RequirementVerdict]
+    where: Mapping[str, Any],
+    figures: Mapping[str, LoopFigures],
+    verdicts: Sequence[RequirementVerdict],
+    outer: Mapping[str, LoopFigures],
 ) -> None:
     """Print everything for a machine."""
     from analyses.requirements import all_pass
@@ -78,20 +111,25 @@ def _print_json(
 
     loops = {name: loop_json(found) for name, found in figures.items()}
     passed = all_pass(tuple(verdicts)) and all(
-        found.margins.stable is not False for found in figures.values()
+        found.margins.stable is not False for found in (*figures.values(), *outer.values())
     )
+    around = {"around": {name: loop_json(found) for name, found in outer.items()}} if outer else {}
     print_json(
         {
             **where,
             "passed": passed,
             "loops": loops,
+            **around,
             "verdicts": [item(v, where["load_unit"]) for v in verdicts],
         }
     )
 
 
 def _print_tables(
-    where: Mapping[str, Any], figures: Mapping[str, LoopFigures], verdicts: Sequence[RequirementVerdict]
+    where: Mapping[str, Any],
+    figures: Mapping[str, LoopFigures],
+    verdicts: Sequence[RequirementVerdict],
+    outer: Mapping[str, LoopFigures],
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
     from analyses.requirements import all_pass
@@ -101,18 +139,22 @@ def _print_tables(
     from reports.terminal import print_blocks, print_verdict, side_by_side
 
     made = section(verdicts, where["load_unit"])
-    unstable = [LOOPS[name] for name, found in figures.items() if found.margins.stable is False]
-    unknown = [LOOPS[name] for name, found in figures.items() if found.margins.stable is None]
+    named = {**{LOOPS[name]: found for name, found in figures.items()}, **outer}
+    unstable = [name for name, found in named.items() if found.margins.stable is False]
+    unknown = [name for name, found in named.items() if found.margins.stable is None]
     loops = f"not stable: {', '.join(unstable)}" if unstable else "every loop is stable"
     loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
     print_verdict(all_pass(tuple(verdicts)) and not unstable, f"{where['design']}: {loops}. {made['result']}")
-    named = {LOOPS[name]: found for name, found in figures.items()}
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
-    if any(
-        len(found.margins.gain_margins) + len(found.margins.phase_margins) > 2 for found in figures.values()
-    ):
+    counts = [len(found.margins.gain_margins) + len(found.margins.phase_margins) for found in named.values()]
+    if max(counts, default=0) > 2:
         blocks.append(crossing_table(named))
-    notes = [note for found in figures.values() for note in (*found.margins.notes, *found.notes)]
+    notes = [note for found in named.values() for note in (*found.margins.notes, *found.notes)]
+    notes += [
+        f"{name}: broken at the command of the drive; margins {found.margins.evidence}: "
+        f"{found.margins.evidence_reason}"
+        for name, found in outer.items()
+    ]
     print_blocks([*blocks, *made["blocks"]], notes)

@@ -11,11 +11,14 @@ import numpy as np
 from actuator_lti import load_design
 from actuator_lti.design.model import (
     Command,
+    Coupling,
     Design,
     Encoder,
     Filter,
+    FrictionPoint,
     Gravity,
     Instruments,
+    LoadFriction,
     OutputEncoder,
     Supply,
 )
@@ -69,6 +72,47 @@ def random_drive(rng: Rng) -> Design:
         instruments=maybe(rng, Instruments(), _instruments(rng)),
         supply=maybe(rng, None, _supply(rng)),
         limits=_limits(rng, design),
+    )
+
+
+def random_elastic_drive(rng: Rng) -> Design:
+    """The same with a coupling or a friction map, or both: play, damping, friction behind the coupling."""
+    design = random_drive(rng)
+    kind = int(rng.integers(4))  # 3: a map without a coupling
+    coupling = Coupling(
+        stiffness_Nm_rad=float(10.0 ** rng.uniform(1.5, 5.0)),
+        damping_Nms_rad=maybe(rng, scaled(rng, 0.05), 0.0),
+        play_rad=maybe(rng, scaled(rng, 2e-3), 0.0),
+        after=maybe(rng, design.gears[0].name, design.gears[-1].name),
+    )
+    friction = replace(design.friction, law="coulomb")
+    if kind > 1:
+        friction = replace(friction, points=_map(rng, friction.dry_torque_Nm))
+    return replace(
+        design,
+        friction=friction,
+        coupling=None if kind == 3 else coupling,
+        load=replace(
+            design.load,
+            path="back-drivable",
+            friction=LoadFriction(
+                dry_torque_Nm=maybe(rng, scaled(rng, 0.3), 0.0),
+                viscous_Nms_rad=scaled(rng, 0.05),
+                breakaway_ratio=maybe(rng, 1.0 + rng.random(), 1.0),
+                offset_torque_Nm=maybe(rng, 0.05, 0.0),
+            ),
+        ),
+    )
+
+
+def _map(rng: Rng, level_Nm: float) -> tuple[FrictionPoint, ...]:
+    """Stribeck curves, one for both directions or one each."""
+    speeds = (0.0, scaled(rng, 3.0), scaled(rng, 60.0), scaled(rng, 600.0))
+    sides: tuple[Any, ...] = maybe(rng, ("both",), ("forward", "reverse"))
+    return tuple(
+        FrictionPoint(speed_rad_s=speed, torque_Nm=scaled(rng, level_Nm), direction=side)
+        for side in sides
+        for speed in speeds[: int(rng.integers(1, 5))]
     )
 
 

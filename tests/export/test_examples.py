@@ -25,14 +25,3 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     path = tmp_path / "drive.fmu"
     path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
-
-
-def test_an_elastic_drive_is_refused(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    from actuator_lti.design.model import Coupling
-    from actuator_lti.errors import InputError
-
-    design = replace(load_design("ilr33-amber"), coupling=Coupling(stiffness_Nm_rad=1000.0))
-    with pytest.raises(InputError, match="cannot be exported; allowed: a rigid one"):
-        fmu_bytes(design, 2, ("linux64",))

@@ -8,6 +8,8 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from random_drives import random_drive
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
-from actuator_lti.design.access import paths_of, with_values
+from actuator_lti.design.access import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
@@ -71,6 +73,20 @@ def test_unit_is_valid_and_gives_the_simulators_bits(unit: Path) -> None:
 
 
 @needs_compiler
+@pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant"])
+def test_units_of_elastic_designs_are_valid_and_give_the_simulators_bits(name: str, tmp_path: Path) -> None:
+    from fmpy.validation import validate_fmu
+
+    design = load_design(name)
+    step = design.controller.period_s
+    for version in (2, 3):
+        path = tmp_path / f"{name}{version}.fmu"
+        path.write_bytes(fmu_bytes(design, version, LINUX))  # type: ignore[arg-type]
+        assert validate_fmu(str(path)) == []
+        assert_same(run(path, step, 200 * step, {"command": 0.01, "hinge_moment": 0.1}), design, 0.01, 0.1)
+
+
+@needs_compiler
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_random_drives_have_the_same_bits(seed: int, tmp_path: Path) -> None:
     design = random_drive(np.random.default_rng(100 + seed))
@@ -98,7 +114,9 @@ def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
     known = {item.name: item for item in description.modelVariables}
     for path in paths_of(design):
         if path != "limits.voltage":  # an input
-            assert float(known[structured(path)].start) == pytest.approx(_value(design, path), rel=0, abs=0)
+            assert float(known[structured(path)].start) == pytest.approx(
+                parameter_value(design, path), rel=0, abs=0
+            )
     changes = {"motor.resistance": 0.07, "control.position.gain": 60.0, "friction.dry_torque": 0.003}
     changed = with_values(design, changes)
     result = run(unit, 1e-4, 0.05, {"command": 0.05, **changes})
@@ -106,13 +124,7 @@ def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
     assert np.abs(result["output.angle"] - ours.output_angle_rad).max() < 1e-13
 
 
-def _value(design: Design, path: str) -> float:
-    from actuator_lti.design.access import parameter_value
-
-    return parameter_value(design, path)
-
-
-@pytest.mark.parametrize("name", ["ilr33-amber", "emps", "ctms-motor-position"])
+@pytest.mark.parametrize("name", ["ilr33-amber", "emps", "ctms-motor-position", "joint"])
 def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
     """The statements, run as Python, against `design_row` of the design with these values."""
     design = load_design(name)
@@ -139,7 +151,8 @@ def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
 def _executed(lines: tuple[str, ...], k: list[float], p: dict[int, float]) -> bool:
     import math
 
-    scope: dict[str, Any] = {"k": k, "p": p, "fabs": abs, "floor": math.floor, "ceil": math.ceil, "pow": pow,
+    scope: dict[str, Any] = {**vars(math), "k": k, "p": p,
+                             "fabs": abs, "floor": math.floor, "ceil": math.ceil, "pow": pow,
                              "INFINITY": math.inf}  # fmt: skip
     for line in lines:
         if line.startswith("if"):
@@ -203,25 +216,57 @@ def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_pa
 
 
 @needs_compiler
-def test_tuning_between_steps_changes_what_follows(tmp_path: Path) -> None:
-    """A gain changed during the run: as if the simulator had been stopped and gone on with the other row."""
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("ilr33-amber", {"control.position.gain": 50.0}),
+        # a row of parameters that becomes longer, and a motor that no longer slips where it did
+        ("joint", {"coupling.stiffness": 30.0, "coupling.play": 2e-3, "friction.dry_torque": 3.0}),
+        ("ilr33-amber", {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}),
+    ],
+)
+def test_tuning_between_steps_changes_what_follows(
+    name: str, change: dict[str, float], tmp_path: Path
+) -> None:
+    """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at
     from nonlinear._kernels.call import parameters
-    from nonlinear._kernels.prepare import prepare_sizes
     from nonlinear._kernels.tick import tick
-    from nonlinear.export.c_files import exported
-    from nonlinear.export.entries import derive
+    from nonlinear.export.c_files import exported, spare_parameters
+    from nonlinear.export.entries import derive, prepare_sizes, retune
 
-    design = load_design("ilr33-amber")
+    design = load_design(name)
+    values = {path: parameter_value(design, path) * factor for path, factor in change.items()}
     path = tmp_path / "u.fmu"
     path.write_bytes(fmu_bytes(design, 2, LINUX))
-    tunable = {key.path for key in trace_keys(design).keys if not key.fixed}
-    assert "control.position.gain" in tunable
-    p, s = parameters(exported(design).row)
+    assert set(change) <= {key.path for key in trace_keys(design).keys if not key.fixed}
+    ours = exported(design)
+    p, s = parameters(ours.row)
+    p = np.concatenate([p, np.zeros(spare_parameters(ours))])
     row = np.zeros(at.IO_SIZE)
     row[at.IN_COMMAND] = 0.05
+    period = design.controller.period_s
+    with unit_of(path) as (unit, references):
+        unit.setReal([references["command"]], [0.05])
+        unit.exitInitializationMode()
+        for k in range(400):
+            if k == 200:
+                unit.setReal([references[structured(key)] for key in values], list(values.values()))
+                p[: at.SIZE] = exported(with_values(design, values)).row
+                prepare_sizes(p)
+                derive(p, s)
+                retune(p, s)
+            unit.doStep(k * period, period)
+            tick(p, s, row)
+            assert unit.getReal([references["motor.angle"]]) == [s[at.S_ANGLE]], k
+        with pytest.raises(Exception, match="fmi2SetReal failed"):
+            unit.setReal([references["control.period"]], [2.0 * period])
+
+
+@contextmanager
+def unit_of(path: Path) -> Iterator[tuple[Any, dict[str, int]]]:
+    """The unit in initialization mode, with its value references by name."""
     description = fmpy.read_model_description(str(path))
-    references = {item.name: item.valueReference for item in description.modelVariables}
     folder = fmpy.extract(str(path))
     unit = fmpy.fmi2.FMU2Slave(
         guid=description.guid, unzipDirectory=folder, modelIdentifier="drive", instanceName="a"
@@ -229,19 +274,7 @@ def test_tuning_between_steps_changes_what_follows(tmp_path: Path) -> None:
     unit.instantiate(callbacks=_callbacks())
     unit.setupExperiment()
     unit.enterInitializationMode()
-    unit.setReal([references["command"]], [0.05])
-    unit.exitInitializationMode()
-    for k in range(400):
-        if k == 200:
-            unit.setReal([references["control.position.gain"]], [50.0])
-            p[: at.SIZE] = exported(with_values(design, {"control.position.gain": 50.0})).row
-            prepare_sizes(p)
-            derive(p, s)
-        unit.doStep(k * 1e-4, 1e-4)
-        tick(p, s, row)
-        assert unit.getReal([references["motor.angle"]]) == [s[at.S_ANGLE]], k
-    with pytest.raises(Exception, match="fmi2SetReal failed"):
-        unit.setReal([references["control.period"]], [2e-4])
+    yield unit, {item.name: item.valueReference for item in description.modelVariables}
     unit.terminate()
     unit.freeInstance()
     shutil.rmtree(folder)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from random_drives import random_drive
+from random_drives import random_drive, random_elastic_drive
 
 import nonlinear.native as native
 from actuator_lti.errors import InputError
@@ -47,12 +47,12 @@ def both(monkeypatch: pytest.MonkeyPatch, work):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("seed", range(12))
 def test_runs_have_the_same_bits(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(300 + seed)
-    design = random_drive(rng)
+    design = random_elastic_drive(rng) if seed % 2 else random_drive(rng)
     probe = Probe(point="i_ref", injection=commands.sine(0.1, 40.0))
 
     def work() -> Trajectory:
         return simulate(
-            design, commands.chirp(0.05, 1.0, 40.0, 0.05), 0.05, loads.constant(2.0), energy=bool(seed % 2),
+            design, commands.chirp(0.05, 1.0, 40.0, 0.05), 0.05, loads.constant(2.0), energy=seed % 4 > 1,
             probes=[probe] if seed % 3 == 0 else [], record_every=1 + seed % 2, raise_on_failure=False,
         )  # fmt: skip
 

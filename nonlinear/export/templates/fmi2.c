@@ -3,15 +3,8 @@
  */
 #include "fmu_core.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 
 typedef void *fmi2Component;
 typedef void *fmi2ComponentEnvironment;
@@ -50,10 +43,16 @@ static fmi2Status say(const unit *m, fmi2Status status, const char *text)
     return status;
 }
 
-EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
-EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+/* What a function of the core has said. */
+static fmi2Status told(const unit *m, const char *failed)
+{
+    return (failed == NULL) ? fmi2OK : say(m, fmi2Error, failed);
+}
 
-EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
+UNIT_EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+UNIT_EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+
+UNIT_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
     (void)c;
     (void)on;
@@ -62,7 +61,7 @@ EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
     return fmi2OK;
 }
 
-EXPORT fmi2Component fmi2Instantiate(
+UNIT_EXPORT fmi2Component fmi2Instantiate(
     fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
     const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
@@ -96,7 +95,7 @@ EXPORT fmi2Component fmi2Instantiate(
     return m;
 }
 
-EXPORT void fmi2FreeInstance(fmi2Component c)
+UNIT_EXPORT void fmi2FreeInstance(fmi2Component c)
 {
     unit *m = (unit *)c;
     if (m != NULL) {
@@ -105,7 +104,7 @@ EXPORT void fmi2FreeInstance(fmi2Component c)
     }
 }
 
-EXPORT fmi2Status fmi2SetupExperiment(
+UNIT_EXPORT fmi2Status fmi2SetupExperiment(
     fmi2Component c, fmi2Boolean tolerant, fmi2Real tolerance, fmi2Real start, fmi2Boolean ends, fmi2Real stop)
 {
     unit *m = (unit *)c;
@@ -113,150 +112,109 @@ EXPORT fmi2Status fmi2SetupExperiment(
     (void)tolerance;
     (void)ends;
     (void)stop;
-    if (!isfinite(start)) {
-        return say(m, fmi2Error, "the start time is not finite");
-    }
-    m->state.start = start;
-    return fmi2OK;
+    return told(m, unit_set_start(&m->state, start));
 }
 
-EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+UNIT_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
     (void)c;
     return fmi2OK;
 }
 
-/* Outputs may be asked for before the initialisation ends: the start is worked out then. */
-static fmi2Status ready(unit *m)
-{
-    const int result = ((m->state.phase == 0) ? unit_begin(&m->state) : UNIT_OK);
-    return (result == UNIT_OK) ? fmi2OK : say(m, fmi2Error, unit_message(result));
-}
-
-EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+UNIT_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     unit *m = (unit *)c;
-    const fmi2Status status = ready(m);
+    const char *failed = unit_ready(&m->state);
     m->state.phase = 1;
-    return status;
+    return told(m, failed);
 }
 
-EXPORT fmi2Status fmi2Terminate(fmi2Component c)
+UNIT_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
     (void)c;
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2Reset(fmi2Component c)
+UNIT_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
     unit_reset(&((unit *)c)->state);
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
+UNIT_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
 {
     unit *m = (unit *)c;
-    if (ready(m) != fmi2OK) {
-        return fmi2Error;
-    }
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (unit_get_real(&m->state, vr[j], &value[j]) == 0) {
-            return say(m, fmi2Error, "there is no such real variable");
-        }
-    }
-    return fmi2OK;
+    return told(m, unit_get_reals(&m->state, vr, n, value));
 }
 
-EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
+UNIT_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
 {
     unit *m = (unit *)c;
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (unit_get_boolean(&m->state, vr[j], &value[j]) == 0) {
-            return say(m, fmi2Error, "there is no such Boolean variable");
-        }
+    const char *failed = NULL;
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
+        failed = unit_get_boolean(&m->state, vr[j], &value[j]);
     }
-    return fmi2OK;
+    return told(m, failed);
 }
 
-EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
+UNIT_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
 {
     (void)vr;
     (void)value;
     return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "there are no integer variables");
 }
 
-EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
+UNIT_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
 {
-    for (size_t j = 0U; j < n; j += 1U) {
-        value[j] = unit_get_string(vr[j]);
-        if (value[j] == NULL) {
-            return say((unit *)c, fmi2Error, "there is no such string variable");
-        }
-    }
-    return fmi2OK;
+    return told((unit *)c, unit_get_strings(vr, n, value));
 }
 
-EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
+UNIT_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
 {
     unit *m = (unit *)c;
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (unit_set_real(&m->state, vr[j], value[j]) == 0) {
-            return say(m, fmi2Error, "no such input or parameter, not now, or a value that is not allowed");
-        }
-    }
-    return fmi2OK;
+    return told(m, unit_set_reals(&m->state, vr, n, value));
 }
 
-EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
+UNIT_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
 {
     (void)vr;
     (void)value;
     return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "there are no integer variables");
 }
 
-EXPORT fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
+UNIT_EXPORT fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])
 {
     (void)vr;
     (void)value;
     return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "no Boolean variable can be set");
 }
 
-EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[])
+UNIT_EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String value[])
 {
     (void)vr;
     (void)value;
     return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "no string variable can be set");
 }
 
-EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+UNIT_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    if (*state == NULL) {
-        *state = calloc(1U, sizeof(unit_state));
-    }
-    if (*state == NULL) {
-        return say((unit *)c, fmi2Error, "no memory");
-    }
-    *(unit_state *)*state = ((unit *)c)->state;
-    return fmi2OK;
+    return told((unit *)c, unit_keep(&((unit *)c)->state, state));
 }
 
-EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+UNIT_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
     ((unit *)c)->state = *(unit_state *)state;
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+UNIT_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
     (void)c;
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
+    unit_drop(state);
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+UNIT_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
 {
     (void)c;
     (void)state;
@@ -264,31 +222,17 @@ EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+UNIT_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
 {
-    if (size < sizeof(unit_state)) {
-        return say((unit *)c, fmi2Error, "too few bytes for the state");
-    }
-    (void)memcpy(bytes, state, sizeof(unit_state));
-    return fmi2OK;
+    return told((unit *)c, unit_write(state, bytes, size));
 }
 
-EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+UNIT_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
 {
-    if (size != sizeof(unit_state)) {
-        return say((unit *)c, fmi2Error, "this is no state of this unit");
-    }
-    if (*state == NULL) {
-        *state = calloc(1U, sizeof(unit_state));
-    }
-    if (*state == NULL) {
-        return say((unit *)c, fmi2Error, "no memory");
-    }
-    (void)memcpy(*state, bytes, size);
-    return fmi2OK;
+    return told((unit *)c, unit_read(bytes, size, state));
 }
 
-EXPORT fmi2Status fmi2GetDirectionalDerivative(
+UNIT_EXPORT fmi2Status fmi2GetDirectionalDerivative(
     fmi2Component c, const fmi2ValueReference u[], size_t nu, const fmi2ValueReference k[], size_t nk,
     const fmi2Real du[], fmi2Real dk[])
 {
@@ -301,7 +245,7 @@ EXPORT fmi2Status fmi2GetDirectionalDerivative(
     return say((unit *)c, fmi2Error, "no directional derivatives");
 }
 
-EXPORT fmi2Status fmi2SetRealInputDerivatives(
+UNIT_EXPORT fmi2Status fmi2SetRealInputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[], const fmi2Real value[])
 {
     (void)vr;
@@ -311,7 +255,7 @@ EXPORT fmi2Status fmi2SetRealInputDerivatives(
     return say((unit *)c, fmi2Error, "inputs are held: no derivatives");
 }
 
-EXPORT fmi2Status fmi2GetRealOutputDerivatives(
+UNIT_EXPORT fmi2Status fmi2GetRealOutputDerivatives(
     fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[], fmi2Real value[])
 {
     (void)vr;
@@ -321,21 +265,16 @@ EXPORT fmi2Status fmi2GetRealOutputDerivatives(
     return say((unit *)c, fmi2Error, "no derivatives of outputs");
 }
 
-EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi2Boolean final)
+UNIT_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, fmi2Boolean final)
 {
     unit *m = (unit *)c;
-    int result;
     (void)final;
-    if (!(step >= 0.0)) {
-        return say(m, fmi2Error, "a step that is negative or not a number");
-    }
-    result = unit_advance(&m->state, now + step);
-    return (result == UNIT_OK) ? fmi2OK : say(m, fmi2Error, unit_message(result));
+    return told(m, unit_step(&m->state, now, step));
 }
 
-EXPORT fmi2Status fmi2CancelStep(fmi2Component c) { return say((unit *)c, fmi2Error, "no step is pending"); }
+UNIT_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) { return say((unit *)c, fmi2Error, "no step is pending"); }
 
-EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
+UNIT_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value)
 {
     (void)c;
     (void)kind;
@@ -343,7 +282,7 @@ EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     return fmi2Discard;
 }
 
-EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+UNIT_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
     const unit_state *m = &((unit *)c)->state;
     if (kind != fmi2LastSuccessfulTime) {
@@ -353,7 +292,7 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
     return fmi2OK;
 }
 
-EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
+UNIT_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value)
 {
     (void)c;
     (void)kind;
@@ -361,13 +300,13 @@ EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kin
     return fmi2Discard;
 }
 
-EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+UNIT_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
     *value = (((unit *)c)->state.status != DRIVE_OK) ? 1 : 0;
     return (kind == fmi2Terminated) ? fmi2OK : fmi2Discard;
 }
 
-EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
+UNIT_EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value)
 {
     (void)c;
     (void)kind;

@@ -3,16 +3,9 @@
  */
 #include "fmu_core.h"
 
-#include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
 
 typedef void *fmi3Instance;
 typedef void *fmi3InstanceEnvironment;
@@ -39,9 +32,15 @@ static fmi3Status say(const unit *m, fmi3Status status, const char *text)
     return status;
 }
 
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+/* What a function of the core has said. */
+static fmi3Status told(const unit *m, const char *failed)
+{
+    return (failed == NULL) ? fmi3OK : say(m, fmi3Error, failed);
+}
 
-EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[])
+UNIT_EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+
+UNIT_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[])
 {
     (void)c;
     (void)on;
@@ -50,7 +49,7 @@ EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, 
     return fmi3OK;
 }
 
-EXPORT fmi3Instance fmi3InstantiateCoSimulation(
+UNIT_EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
     fmi3Boolean events, fmi3Boolean early, const fmi3ValueReference required[], size_t count,
     fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger, void *intermediate)
@@ -80,7 +79,7 @@ EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     return m;
 }
 
-EXPORT fmi3Instance fmi3InstantiateModelExchange(
+UNIT_EXPORT fmi3Instance fmi3InstantiateModelExchange(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
     fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger)
 {
@@ -94,7 +93,7 @@ EXPORT fmi3Instance fmi3InstantiateModelExchange(
     return NULL;
 }
 
-EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
+UNIT_EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
     fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger, void *clock, void *lock, void *unlock)
 {
@@ -111,9 +110,9 @@ EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
     return NULL;
 }
 
-EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
+UNIT_EXPORT void fmi3FreeInstance(fmi3Instance c) { free(c); }
 
-EXPORT fmi3Status fmi3EnterInitializationMode(
+UNIT_EXPORT fmi3Status fmi3EnterInitializationMode(
     fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean ends, fmi3Float64 stop)
 {
     unit *m = (unit *)c;
@@ -121,125 +120,81 @@ EXPORT fmi3Status fmi3EnterInitializationMode(
     (void)tolerance;
     (void)ends;
     (void)stop;
-    if (!isfinite(start)) {
-        return say(m, fmi3Error, "the start time is not finite");
-    }
-    m->state.start = start;
-    return fmi3OK;
+    return told(m, unit_set_start(&m->state, start));
 }
 
-/* Outputs may be asked for before the initialisation ends: the start is worked out then. */
-static fmi3Status ready(unit *m)
-{
-    const int result = ((m->state.phase == 0) ? unit_begin(&m->state) : UNIT_OK);
-    return (result == UNIT_OK) ? fmi3OK : say(m, fmi3Error, unit_message(result));
-}
-
-EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
+UNIT_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
     unit *m = (unit *)c;
-    const fmi3Status status = ready(m);
+    const char *failed = unit_ready(&m->state);
     m->state.phase = 1;
-    return status;
+    return told(m, failed);
 }
 
-EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
+UNIT_EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
 {
     (void)c;
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3Reset(fmi3Instance c)
+UNIT_EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 {
     unit_reset(&((unit *)c)->state);
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3GetFloat64(
+UNIT_EXPORT fmi3Status fmi3GetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t count)
 {
     unit *m = (unit *)c;
-    if ((count < n) || (ready(m) != fmi3OK)) {
-        return fmi3Error;
-    }
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (unit_get_real(&m->state, vr[j], &value[j]) == 0) {
-            return say(m, fmi3Error, "there is no such variable");
-        }
-    }
-    return fmi3OK;
+    return told(m, (count < n) ? "fewer values than variables" : unit_get_reals(&m->state, vr, n, value));
 }
 
-EXPORT fmi3Status fmi3SetFloat64(
+UNIT_EXPORT fmi3Status fmi3SetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[], size_t count)
 {
     unit *m = (unit *)c;
-    if (count < n) {
-        return fmi3Error;
-    }
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (unit_set_real(&m->state, vr[j], value[j]) == 0) {
-            return say(m, fmi3Error, "no such input or parameter, not now, or a value that is not allowed");
-        }
-    }
-    return fmi3OK;
+    return told(m, (count < n) ? "fewer values than variables" : unit_set_reals(&m->state, vr, n, value));
 }
 
-EXPORT fmi3Status fmi3GetBoolean(
+UNIT_EXPORT fmi3Status fmi3GetBoolean(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Boolean value[], size_t count)
 {
     unit *m = (unit *)c;
-    for (size_t j = 0U; (j < n) && (j < count); j += 1U) {
+    const char *failed = (count < n) ? "fewer values than variables" : NULL;
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
         int found = 0;
-        if (unit_get_boolean(&m->state, vr[j], &found) == 0) {
-            return say(m, fmi3Error, "there is no such Boolean variable");
-        }
+        failed = unit_get_boolean(&m->state, vr[j], &found);
         value[j] = (found != 0);
     }
-    return fmi3OK;
+    return told(m, failed);
 }
 
-EXPORT fmi3Status fmi3GetString(
+UNIT_EXPORT fmi3Status fmi3GetString(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String value[], size_t count)
 {
-    for (size_t j = 0U; (j < n) && (j < count); j += 1U) {
-        value[j] = unit_get_string(vr[j]);
-        if (value[j] == NULL) {
-            return say((unit *)c, fmi3Error, "there is no such string variable");
-        }
-    }
-    return fmi3OK;
+    return told((unit *)c, (count < n) ? "fewer values than variables" : unit_get_strings(vr, n, value));
 }
 
-EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
+UNIT_EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    if (*state == NULL) {
-        *state = calloc(1U, sizeof(unit_state));
-    }
-    if (*state == NULL) {
-        return say((unit *)c, fmi3Error, "no memory");
-    }
-    *(unit_state *)*state = ((unit *)c)->state;
-    return fmi3OK;
+    return told((unit *)c, unit_keep(&((unit *)c)->state, state));
 }
 
-EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
+UNIT_EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
     ((unit *)c)->state = *(unit_state *)state;
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
+UNIT_EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
 {
     (void)c;
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
+    unit_drop(state);
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
+UNIT_EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size)
 {
     (void)c;
     (void)state;
@@ -247,57 +202,40 @@ EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state,
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
+UNIT_EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size)
 {
-    if (size < sizeof(unit_state)) {
-        return say((unit *)c, fmi3Error, "too few bytes for the state");
-    }
-    (void)memcpy(bytes, state, sizeof(unit_state));
-    return fmi3OK;
+    return told((unit *)c, unit_write(state, bytes, size));
 }
 
-EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
+UNIT_EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state)
 {
-    if (size != sizeof(unit_state)) {
-        return say((unit *)c, fmi3Error, "this is no state of this unit");
-    }
-    if (*state == NULL) {
-        *state = calloc(1U, sizeof(unit_state));
-    }
-    if (*state == NULL) {
-        return say((unit *)c, fmi3Error, "no memory");
-    }
-    (void)memcpy(*state, bytes, size);
-    return fmi3OK;
+    return told((unit *)c, unit_read(bytes, size, state));
 }
 
-EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c)
+UNIT_EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance c)
 {
     (void)c;
     return fmi3OK;
 }
 
-EXPORT fmi3Status fmi3DoStep(
+UNIT_EXPORT fmi3Status fmi3DoStep(
     fmi3Instance c, fmi3Float64 now, fmi3Float64 step, fmi3Boolean final, fmi3Boolean *event,
     fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last)
 {
     unit *m = (unit *)c;
-    int result = UNIT_TIME;
+    const char *failed = unit_step(&m->state, now, step);
     (void)final;
     *event = false;
     *terminate = false;
     *early = false;
-    if (step >= 0.0) {
-        result = unit_advance(&m->state, now + step);
-    }
-    *last = (result == UNIT_OK) ? (now + step) : now;
-    return (result == UNIT_OK) ? fmi3OK : say(m, fmi3Error, unit_message(result));
+    *last = (failed == NULL) ? (now + step) : now;
+    return told(m, failed);
 }
 
 /* What this unit does not have: the caller is told so by fmi3Error. */
 #define ABSENT(name) \
-    EXPORT fmi3Status name(fmi3Instance c); \
-    EXPORT fmi3Status name(fmi3Instance c) { return say((unit *)c, fmi3Error, #name " is not supported"); }
+    UNIT_EXPORT fmi3Status name(fmi3Instance c); \
+    UNIT_EXPORT fmi3Status name(fmi3Instance c) { return say((unit *)c, fmi3Error, #name " is not supported"); }
 
 ABSENT(fmi3GetFloat32)
 ABSENT(fmi3GetInt8)

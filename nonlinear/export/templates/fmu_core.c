@@ -5,7 +5,7 @@
 #include "fmu_core.h"
 
 #include <math.h>
-#include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double PART_OF_TICK = 1e-4; /* a communication point this close to a tick is at the tick */
@@ -27,7 +27,8 @@ static int derive(unit_state *m)
         return UNIT_STRUCTURE;
     }
     drive_prepare_sizes(m->p);
-    if (!(m->p[DRIVE_STATE_SIZE] <= (double)(DRIVE_S_LENGTH + UNIT_SPARE))) {
+    if (!(m->p[DRIVE_STATE_SIZE] <= (double)(DRIVE_S_LENGTH + UNIT_SPARE)) ||
+        !(m->p[DRIVE_PARAMETER_SIZE] <= (double)(DRIVE_P_LENGTH + FMU_SPARE_P))) {
         return UNIT_STRUCTURE;
     }
     drive_derive(m->p, m->s);
@@ -35,7 +36,7 @@ static int derive(unit_state *m)
     return UNIT_OK;
 }
 
-int unit_begin(unit_state *m)
+static int begin(unit_state *m)
 {
     int result;
 
@@ -56,7 +57,7 @@ static int retune(unit_state *m)
     const int result = derive(m);
 
     if (result == UNIT_OK) {
-        drive_put_load(m->p, m->s, m->s[DRIVE_S_LOAD], 0.0);
+        drive_retune(m->p, m->s);
         if (m->p[DRIVE_OVERLOAD] <= 0.0) {
             m->s[DRIVE_S_CURRENT_LIMIT] = m->p[DRIVE_CURRENT_LIMIT];
         }
@@ -73,7 +74,7 @@ static void supply(unit_state *m)
     }
 }
 
-int unit_advance(unit_state *m, double until)
+static int advance(unit_state *m, double until)
 {
     const double ticks = floor(((until - m->start) / m->p[DRIVE_PERIOD]) + PART_OF_TICK);
     int64_t target;
@@ -98,7 +99,7 @@ int unit_advance(unit_state *m, double until)
     return (m->status == DRIVE_OK) ? UNIT_OK : UNIT_TICK_FAILED;
 }
 
-int unit_get_real(unit_state *m, unsigned int reference, double *value)
+static int get_real(unit_state *m, unsigned int reference, double *value)
 {
     const double *p = m->p;
     const double *s = m->s;
@@ -134,7 +135,7 @@ int unit_get_real(unit_state *m, unsigned int reference, double *value)
     return 1;
 }
 
-int unit_set_real(unit_state *m, unsigned int reference, double value)
+static int set_real(unit_state *m, unsigned int reference, double value)
 {
     if (!isfinite(value)) {
         return 0;
@@ -160,32 +161,110 @@ int unit_set_real(unit_state *m, unsigned int reference, double value)
     return 1;
 }
 
-int unit_get_boolean(const unit_state *m, unsigned int reference, int *value)
-{
-    static const int bits[] = {@BITS@};
-    const unsigned int count = (unsigned int)(sizeof(bits) / sizeof(bits[0]));
-
-    if ((reference < 30U) || (reference >= 30U + count)) {
-        return 0;
-    }
-    *value = (((int)m->io[DRIVE_IO_FLAGS] & bits[reference - 30U]) != 0) ? 1 : 0;
-    return 1;
-}
-
-const char *unit_get_string(unsigned int reference)
-{
-    if ((reference < FMU_FIRST_TEXT) || (reference >= FMU_FIRST_TEXT + FMU_TEXTS)) {
-        return NULL;
-    }
-    return fmu_texts[reference - FMU_FIRST_TEXT];
-}
-
-const char *unit_message(int result)
+static const char *message(int result)
 {
     switch (result) {
     case UNIT_TICK_FAILED: return "the drive failed: too many events in a tick, or the speed is not finite";
     case UNIT_STRUCTURE: return "these parameters ask for another structure: export the changed design again";
     case UNIT_TIME: return "the communication point lies before the last one, or is not finite";
-    default: return "";
+    default: return NULL;
     }
+}
+
+const char *unit_set_start(unit_state *m, double start)
+{
+    if (!isfinite(start)) {
+        return "the start time is not finite";
+    }
+    m->start = start;
+    return NULL;
+}
+
+const char *unit_ready(unit_state *m)
+{
+    return (m->phase == 0) ? message(begin(m)) : NULL;
+}
+
+const char *unit_step(unit_state *m, double now, double step)
+{
+    return (step >= 0.0) ? message(advance(m, now + step)) : "a step that is negative or not a number";
+}
+
+const char *unit_get_reals(unit_state *m, const unsigned int *references, size_t n, double *values)
+{
+    const char *failed = unit_ready(m);
+
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
+        if (get_real(m, references[j], &values[j]) == 0) {
+            failed = "there is no such real variable";
+        }
+    }
+    return failed;
+}
+
+const char *unit_set_reals(unit_state *m, const unsigned int *references, size_t n, const double *values)
+{
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (set_real(m, references[j], values[j]) == 0) {
+            return "no such input or parameter, not now, or a value that is not allowed";
+        }
+    }
+    return NULL;
+}
+
+const char *unit_get_boolean(const unit_state *m, unsigned int reference, int *value)
+{
+    static const int bits[] = {@BITS@};
+    const unsigned int count = (unsigned int)(sizeof(bits) / sizeof(bits[0]));
+
+    if ((reference < 30U) || (reference >= 30U + count)) {
+        return "there is no such Boolean variable";
+    }
+    *value = (((int)m->io[DRIVE_IO_FLAGS] & bits[reference - 30U]) != 0) ? 1 : 0;
+    return NULL;
+}
+
+const char *unit_get_strings(const unsigned int *references, size_t n, const char **values)
+{
+    for (size_t j = 0U; j < n; j += 1U) {
+        if ((references[j] < FMU_FIRST_TEXT) || (references[j] >= FMU_FIRST_TEXT + FMU_TEXTS)) {
+            return "there is no such string variable";
+        }
+        values[j] = fmu_texts[references[j] - FMU_FIRST_TEXT];
+    }
+    return NULL;
+}
+
+const char *unit_keep(const unit_state *m, void **kept)
+{
+    if (*kept == NULL) {
+        *kept = calloc(1U, sizeof(unit_state));
+    }
+    if (*kept == NULL) {
+        return "no memory";
+    }
+    (void)memcpy(*kept, m, sizeof(unit_state));
+    return NULL;
+}
+
+void unit_drop(void **kept)
+{
+    if (kept != NULL) {
+        free(*kept);
+        *kept = NULL;
+    }
+}
+
+const char *unit_write(const void *kept, void *bytes, size_t size)
+{
+    if (size < sizeof(unit_state)) {
+        return "too few bytes for the state";
+    }
+    (void)memcpy(bytes, kept, sizeof(unit_state));
+    return NULL;
+}
+
+const char *unit_read(const void *bytes, size_t size, void **kept)
+{
+    return (size == sizeof(unit_state)) ? unit_keep((const unit_state *)bytes, kept) : "this is no state of this unit";
 }

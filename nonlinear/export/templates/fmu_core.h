@@ -8,6 +8,7 @@
 #include "drive_design.h"
 #include "fmu_design.h"
 
+#include <stddef.h>
 #include <stdint.h>
 
 #define UNIT_INPUTS 3U
@@ -22,7 +23,7 @@ enum {
 
 /* All that changes: copying it is saving the state. */
 typedef struct {
-    double p[DRIVE_P_LENGTH];
+    double p[DRIVE_P_LENGTH + FMU_SPARE_P];
     double s[DRIVE_S_LENGTH + UNIT_SPARE];
     double io[DRIVE_IO_LENGTH];
     double keys[FMU_KEYS + 1];
@@ -36,15 +37,29 @@ typedef struct {
     int32_t phase;
 } unit_state;
 
-void unit_reset(unit_state *m);
-int unit_begin(unit_state *m); /* end of the initialisation: the state at the start time */
-int unit_advance(unit_state *m, double until); /* all ticks that begin before a time */
+#ifdef _WIN32
+#define UNIT_EXPORT __declspec(dllexport)
+#else
+#define UNIT_EXPORT __attribute__((visibility("default")))
+#endif
 
-/* By value reference; 0 where there is no such variable, or a value is not allowed. */
-int unit_get_real(unit_state *m, unsigned int reference, double *value);
-int unit_set_real(unit_state *m, unsigned int reference, double value);
-int unit_get_boolean(const unit_state *m, unsigned int reference, int *value);
-const char *unit_get_string(unsigned int reference);
-const char *unit_message(int result);
+/* The functions below that return text return NULL where all went well, else the reason. */
+
+void unit_reset(unit_state *m);
+const char *unit_set_start(unit_state *m, double start);
+const char *unit_ready(unit_state *m); /* before the run: works out the state at the start time */
+const char *unit_step(unit_state *m, double now, double step); /* all ticks that begin before now + step */
+
+/* By value reference. */
+const char *unit_get_reals(unit_state *m, const unsigned int *references, size_t n, double *values);
+const char *unit_set_reals(unit_state *m, const unsigned int *references, size_t n, const double *values);
+const char *unit_get_boolean(const unit_state *m, unsigned int reference, int *value);
+const char *unit_get_strings(const unsigned int *references, size_t n, const char **values);
+
+/* Copies of the whole state; *kept is NULL or a copy made before. */
+const char *unit_keep(const unit_state *m, void **kept);
+void unit_drop(void **kept);
+const char *unit_write(const void *kept, void *bytes, size_t size);
+const char *unit_read(const void *bytes, size_t size, void **kept);
 
 #endif

@@ -3,7 +3,7 @@
  */
 #include "drive.h"
 
-enum { P_MOST = 4096, S_MOST = 65536 };
+enum { P_MOST = 131072, S_MOST = 65536 };
 
 static double p[P_MOST];
 static double s[S_MOST];
@@ -22,7 +22,7 @@ EXPORT("io_length") int io_length(void) { return DRIVE_IO_LENGTH; }
 EXPORT("start") int start(void)
 {
     drive_prepare_sizes(p);
-    if (!(p[DRIVE_STATE_SIZE] <= (double)S_MOST)) {
+    if (!(p[DRIVE_STATE_SIZE] <= (double)S_MOST) || !(p[DRIVE_PARAMETER_SIZE] <= (double)P_MOST)) {
         return 0;
     }
     drive_derive(p, s);
@@ -36,11 +36,11 @@ EXPORT("retune") int retune(void)
     const double before = p[DRIVE_STATE_SIZE];
 
     drive_prepare_sizes(p);
-    if (!(p[DRIVE_STATE_SIZE] == before)) {
+    if (!(p[DRIVE_STATE_SIZE] == before) || !(p[DRIVE_PARAMETER_SIZE] <= (double)P_MOST)) {
         return 0;
     }
     drive_derive(p, s);
-    drive_put_load(p, s, s[DRIVE_S_LOAD], 0.0);
+    drive_retune(p, s);
     return 1;
 }
 

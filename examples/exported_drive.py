@@ -1,0 +1,73 @@
+"""The C files of ``actuator-lti export c``, compiled and called from Python: one tick at a time.
+
+What a flight simulation does with them in C, with ctypes in its place.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout
+from nonlinear.export import c_export
+from nonlinear.export.build import compile_files
+
+
+class ExportedDrive:
+    """A drive that runs the exported C.
+
+    Parameters
+    ----------
+    design : Design
+    folder : Path
+        Where the shared library is put.
+    """
+
+    def __init__(self, design: Design, folder: Path) -> None:
+        texts = c_export(design)
+        sources = {name: text for name, text in texts.items() if name != "main.c" and name[-2:] != "md"}
+        data = compile_files(sources, "drive.so", "linux64", ("-shared", "-fPIC"))
+        path = folder / f"drive-{hashlib.sha256(data).hexdigest()[:16]}.so"
+        if not path.exists():  # a library that is loaded must not be written again
+            path.write_bytes(data)
+        self._c: Any = ctypes.CDLL(str(path))
+        header = texts["drive_design.h"]
+        self._p = np.zeros(_length(header, "DRIVE_P_LENGTH"))
+        self._s = np.zeros(_length(header, "DRIVE_S_LENGTH"))
+        self._io = np.zeros(layout.IO_SIZE)
+        self._c.drive_load_design(_at(self._p))
+        self._c.drive_prepare_sizes(_at(self._p))
+        self._c.drive_derive(_at(self._p), _at(self._s))
+        self.reset()
+
+    def reset(self) -> None:
+        """Everything at rest at zero."""
+        self._c.drive_init(_at(self._p), _at(self._s))
+
+    def step(self, command: float, moment: float = 0.0) -> float:
+        """One tick; returns the output at its end: rad, or m of a linear axis.
+
+        Raises
+        ------
+        RuntimeError
+            Where the tick fails.
+        """
+        self._io[layout.IN_COMMAND], self._io[layout.IN_LOAD] = command, moment
+        if self._c.drive_tick(_at(self._p), _at(self._s), _at(self._io)) != layout.OK:
+            raise RuntimeError("the drive failed")
+        if self._p[layout.ELASTIC_DRIVE] > 0.0:
+            return float(self._s[layout.S_OUTPUT])
+        return float(self._s[layout.S_ANGLE] / self._p[layout.RATIO])
+
+
+def _length(header: str, name: str) -> int:
+    return int(header.partition(f"{name} = ")[2].split()[0].rstrip(","))
+
+
+def _at(row: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(row.ctypes.data)

@@ -1,0 +1,36 @@
+"""A line on the terminal that says what is being waited for, once something takes longer than a moment."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+PATIENCE_S = 1.0
+_told: set[str] = set()
+
+
+@contextmanager
+def told_if_slow(text: str, patience_s: float = PATIENCE_S) -> Iterator[None]:
+    """Write a line to standard error if the block is still at work after a while; once in a process.
+
+    Nothing is written where standard error is no terminal, so that logs stay clean.
+    """
+    if text in _told or not sys.stderr.isatty():
+        yield
+        return
+    timer = threading.Timer(patience_s, _tell, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _tell(text: str) -> None:
+    if text not in _told:
+        _told.add(text)
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()

@@ -1,0 +1,107 @@
+"""Margins of the compiled code: the exported code meets the loops, and a wrong one would be seen."""
+
+from __future__ import annotations
+
+import re
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import analyses.code_check as code_check
+import nonlinear.export.build as build_module
+import nonlinear.export.run_library as run_library
+from actuator_lti import load_design
+from analyses.code_check import CodeCheck, check_code
+from nonlinear.export import c_export
+from nonlinear.export.build import system_compiler
+from nonlinear.export.run_library import run_sources
+from reports.cli.app import build
+from reports.export_check import check_text, summary
+
+needs_compiler = pytest.mark.skipif(
+    system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"
+)
+
+
+def functions_of(text: str) -> dict[str, str]:
+    """Bodies of the functions of a C file by name, however they are linked."""
+    plain = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    # of two constants of one name the second carries its module's, whichever comes second
+    plain = re.sub(r"\b(?:ELASTIC_)?LAYOUT_", "", plain)
+    found = re.findall(
+        r"^(?:static )?\w+ \*?(drive_\w+)\(([^)]*)\)\n\{\n(.*?)^\}", plain, re.DOTALL | re.MULTILINE
+    )
+    return {name: f"{arguments}\n{body}" for name, arguments, body in found}
+
+
+def test_what_is_measured_is_what_is_exported() -> None:
+    """Function by function the measured library holds the text of drive.c: tick and preparation."""
+    exported = functions_of(c_export(load_design("ilr33-amber"))["drive.c"])
+    measured = functions_of(run_sources()["run.c"])
+    both = set(exported) & set(measured)
+    assert {"drive_derive", "drive_init", "drive_prepare_sizes", "drive_motion", "drive_decide"} <= both
+    assert all(exported[name] == measured[name] for name in both)
+    # what only the exported file has: entries that the run does without
+    assert set(exported) - both <= {
+        "drive_tick", "drive_control_tick", "drive_retune", "drive_retune_rigid", "drive_retune_elastic",
+        "drive_get", "drive_set_state",
+    }  # fmt: skip
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["ilr33-amber", "ctms-motor-position"])
+def test_the_compiled_code_has_the_margins_of_the_loops(name: str) -> None:
+    found = check_code(load_design(name))
+    assert not found.reason
+    assert not found.failed
+    gain = found.largest("gain_margin_up", "gain_margin_down")
+    assert gain is not None
+    assert 0.0 < abs(gain.difference or 0.0) < 1e-3
+    assert {"gain_margin_up", "phase_margin", "delay_margin", "bandwidth"} <= {
+        e.quantity for e in found.entries
+    }
+
+
+@needs_compiler
+def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The current controller's gain two per cent too high in the C file alone."""
+    text = run_sources()["run.c"]
+    wrong = text.replace("p[CURRENT_GAIN]", "(1.02 * p[CURRENT_GAIN])")
+    assert wrong != text
+    monkeypatch.setattr(run_library, "run_sources", lambda: {"run.c": wrong})
+    found = check_code(load_design("ilr33-amber"))
+    assert {entry.loop for entry in found.failed} >= {"current", "u"}
+    assert "NOT MET" in check_text(found)
+
+
+def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build_module, "system_compiler", lambda: None)
+    found = check_code(load_design("ilr33-amber"))
+    assert found.reason.startswith("no C compiler")
+    assert not found.entries
+    assert "Not measured: no C compiler" in check_text(found)
+    assert "not measured" in summary(found)
+
+
+@needs_compiler
+def test_exports_say_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runner, app = CliRunner(), build()
+    done = runner.invoke(app, ["export", "c", "ctms-motor-position", "--out", str(tmp_path / "c")])
+    assert done.exit_code == 0
+    assert "predictions of the linear loops are met by the compiled code" in done.output
+    words = (tmp_path / "c/README.md").read_text()
+    assert "## Margins of the compiled code" in words
+    assert "| Position loop | phase margin | deg |" in words
+    arguments = ["export", "c", "ctms-motor-position", "--no-check", "--out", str(tmp_path / "d")]
+    assert runner.invoke(app, arguments).exit_code == 0
+    assert "Not measured at this export" in (tmp_path / "d/README.md").read_text()
+    failed = CodeCheck(reason="said here")
+    monkeypatch.setattr(code_check, "check_code", lambda _: failed)
+    unit = tmp_path / "u.fmu"
+    arguments = ["export", "fmu", "ctms-motor-position", "--platform", "linux64", "--out", str(unit)]
+    assert runner.invoke(app, arguments).exit_code == 0
+    with zipfile.ZipFile(unit) as archive:
+        assert b"Not measured: said here" in archive.read("documentation/compiled_code.md")

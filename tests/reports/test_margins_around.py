@@ -1,0 +1,160 @@
+"""An outer loop around a drive: its margins are borders of the running drive; bad files are one line."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from actuator_lti import assemble_loops, load_design
+from actuator_lti.design.access import with_values
+from actuator_lti.margins import stability_margins
+from analyses.outer_loop import loop_around
+from analyses.outer_loop_file import outer_loop
+from nonlinear.export.build import system_compiler
+from reports.cli.main import main
+
+needs_compiler = pytest.mark.skipif(
+    system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"
+)
+PERIOD = 1e-3
+# roll rate under a fin angle, p' = -2 p + 60 delta, and half of it given back: one pole
+AIRFRAME = {"num": [30.0], "den": [1.0, 2.0], "dt": 0, "sampling_period": PERIOD, "name": "roll rate"}
+# a weathercock mode with a lag, in matrices
+WEATHERCOCK = {
+    "A": [[0.0, 1.0, 0.0], [-400.0, -4.0, 300.0], [0.0, 0.0, -50.0]], "B": [[0.0], [0.0], [50.0]],
+    "C": [[1.0, 0.02, 0.0]], "D": [[0.0]], "dt": 0, "sampling_period": 3 * PERIOD,
+}  # fmt: skip
+
+
+def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:  # type: ignore[type-arg]
+    """Largest output of the last third over that of the second, the drive as its exported C in the loop."""
+    from examples.exported_drive import ExportedDrive
+
+    without = {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}
+    design = with_values(load_design("ilr33-amber"), without)
+    drive = ExportedDrive(design, folder)
+    matrices = table if "A" in table else {"A": [[-2.0]], "B": [[60.0]], "C": [[0.5]]}
+    A, B, C = (np.array(matrices[key]) for key in "ABC")
+    n, ticks = A.shape[0], round(table["sampling_period"] / design.controller.period_s)
+    step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * table["sampling_period"])
+    x, angle, found = np.full(n, 1e-5), 0.0, []
+    for _ in range(round(seconds / table["sampling_period"])):
+        found.append(float(abs(C @ x)[0]))
+        command, before = -factor * float((C @ x)[0]), angle
+        for _ in range(ticks):
+            angle = drive.step(command)
+        x = step[:n, :n] @ x + step[:n, n] * before
+    third = len(found) // 3
+    return max(found[2 * third :]) / max(found[third : 2 * third])
+
+
+@needs_compiler
+@pytest.mark.parametrize(("table", "seconds"), [(AIRFRAME, 0.6), (WEATHERCOCK, 1.5)])
+def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
+    table: dict,  # type: ignore[type-arg]
+    seconds: float,
+    tmp_path: Path,
+) -> None:
+    loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
+    found = stability_margins(loop.open_loop)
+    assert found.stable
+    limit = min(margin.ratio for margin in found.gain_margins if margin.ratio > 1.0)
+    assert loop.period_s == table["sampling_period"]
+    assert (
+        growth(table, 0.97 * limit, tmp_path, seconds) < 1.0 < growth(table, 1.03 * limit, tmp_path, seconds)
+    )
+
+
+def test_closed_forms_of_an_integrator_around_the_ideal_drive() -> None:
+    """L = -s K T/p: at low frequency T = 1, so the crossover is at K and the phase margin 90 deg less T's."""
+    K = 0.5
+    loops = assemble_loops("ilr33-amber", form="ideal")
+    table = {"num": [K], "den": [1.0, 0.0], "dt": 0}
+    loop = loop_around(loops, outer_loop(table, "test"))
+    drive = complex(loops.reference_to_output(1j * K))
+    margin = stability_margins(loop.open_loop).phase_margins[0]
+    assert margin.frequency_rad_s == pytest.approx(K, rel=1e-4)
+    assert margin.deg == pytest.approx(90.0 + np.degrees(np.angle(drive)), abs=1e-2)
+    opposite = loop_around(loops, outer_loop({**table, "sign": 1}, "test"))
+    assert complex(opposite.open_loop(2j)) == pytest.approx(-complex(loop.open_loop(2j)), rel=1e-12)
+    assert complex(loop.closed_loop(2j) + loop.sensitivity(2j)) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_coefficients_and_matrices_of_one_sampled_system_are_one_loop() -> None:
+    loops = assemble_loops("ilr33-amber")
+    pole, gain = 0.995, 0.02
+    one = outer_loop({"num": [gain], "den": [1.0, -pole], "dt": 1e-4}, "test")
+    other = outer_loop({"A": [[pole]], "B": [[1.0]], "C": [[gain]], "D": [[0.0]], "dt": 1e-4}, "test")
+    z = np.exp(0.03j)
+    want = gain / (z - pole) * complex(loops.reference_to_output(z))
+    for outer in (one, other):
+        assert complex(loop_around(loops, outer).open_loop(z)) == pytest.approx(want, rel=1e-12)
+
+
+def test_the_command_line_judges_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "airframe.json"
+    path.write_text(json.dumps(AIRFRAME))
+    assert main(["margins", "ilr33-amber", "--around", str(path), "--json"]) == 0
+    around = json.loads(capsys.readouterr().out)["around"]["roll rate"]
+    assert around["stable"] is True
+    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 0
+    words = capsys.readouterr().out
+    assert "roll rate" in words
+    assert "broken at the command of the drive" in " ".join(words.split())
+    path.write_text(json.dumps({**AIRFRAME, "num": [30.0 * 10.0 ** (1.1 * around["gain_margin_db"] / 20.0)]}))
+    assert main(["margins", "ilr33-amber", "--around", str(path), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["around"]["roll rate"]["stable"] is False
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"dt": None}, "dt: missing"),
+        ({"dt": -1.0}, "dt: allowed: a time in s"),
+        ({"dt": True}, "dt: allowed"),
+        ({"dt": 1.5e-4, "sampling_period": None}, "whole multiples of 0.0001 s"),
+        ({"sampling_period": None}, "sampling_period: missing"),
+        ({"sampling_period": 0.0}, "sampling_period: allowed: a time > 0"),
+        ({"dt": 1e-3}, "sampling_period: allowed: a time > 0 in s, for a continuous"),
+        ({"num": [1.0, 2.0, 3.0]}, "num: of a higher degree"),
+        ({"num": ["a"]}, "num: allowed: a list of numbers"),
+        ({"den": [0.0]}, "num, den: all zero"),
+        ({"den": None}, "allowed: num and den, or A"),
+        ({"A": [[1.0]]}, "allowed: num and den, or A"),
+        ({"gain": 2.0}, "gain: no such key"),
+        ({"sign": 0}, "sign: allowed"),
+        ({"name": ""}, "name: allowed: a text"),
+        ({"num": None, "den": None, "A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]}, "n by n"),
+        ({"num": None, "den": None, "A": [[1.0], [1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]},
+         "rows of different lengths"),
+    ],
+)  # fmt: skip
+def test_a_bad_file_is_one_line(
+    change: dict,  # type: ignore[type-arg]
+    said: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    table = {key: value for key, value in {**AIRFRAME, **change}.items() if value is not None}
+    path = tmp_path / "airframe.json"
+    path.write_text(json.dumps(table))
+    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert said in error
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}'])
+def test_a_file_that_is_no_object_is_one_line(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "airframe.json"
+    path.write_text(text)
+    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert main(["margins", "ilr33-amber", "--around", str(tmp_path / "none.json")]) == 2
