@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,14 @@ from numpy.typing import NDArray
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.correlation.driving import LOADS, first_state, load_of, needed_command, supply_of
+from analyses.correlation.driving import (
+    LOADS,
+    at_ticks,
+    first_states,
+    load_of,
+    needed_command,
+    supply_of,
+)
 from analyses.identification.differentiation import filtered_motion
 from analyses.records.consistency import Finding, check_record
 from analyses.records.prepare import prepared
@@ -39,6 +47,7 @@ AXIS_SIGNALS = {
 }
 """What a record of an axis may hold that the model has too."""
 VELOCITY_CUTOFF_HZ = 100.0
+FIRST_ROWS = 50
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,28 +217,53 @@ def model_signals(
         notes.append(supplied.note)
     model, load = load_of(driven.design, record, time, notes)
     period = model.controller.period_s
-    run = simulate(
+    duration = float(time[-1]) + 2.0 * period
+    go = partial(
+        simulate,
         model,
-        commands.sampled(time, driven.values, where=record.name),
-        float(time[-1]) + 2.0 * period,
-        load,
+        commands.sampled(*at_ticks(driven, time, duration), where=record.name),
+        load_Nm=load,
         supply=None if supplied is None else supplied.voltage,
         supply_scales=supplied is not None and supplied.scales,
-        initial=first_state(driven, record, measured),
-        progress=progress,
     )
-    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between samples")
+    initial, moving = first_states(driven, record, measured)
+    if moving is not initial:
+        part = time[: min(FIRST_ROWS, len(time))]
+        beginning = {name: values[: len(part)] for name, values in measured.items()}
+        off = [
+            _difference(beginning, part, _series(model, go(float(part[-1]) + 2.0 * period, initial=state)))
+            for state in (initial, moving)
+        ]
+        if off[1] < off[0]:
+            initial = moving
+            notes.append("the record begins in motion or under load, and so does the model")
+    run = go(duration, initial=initial, progress=progress)
+    between = "command linear between samples but for its steps"
+    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, {between}")
     limits = {name: use.fraction for name, use in run.limits.items()}
     series = _series(model, run)
-    return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
+    return {name: np.interp(time, series["time"], series[name]) for name in measured}, limits
+
+
+def _difference(
+    measured: Mapping[str, FloatArray], time: FloatArray, series: Mapping[str, FloatArray]
+) -> float:
+    """Sum over the signals of the squared relative difference."""
+    total = 0.0
+    for name, values in measured.items():
+        size = float(values @ values)
+        rest = np.interp(time, series["time"], series[name]) - values
+        total += float(rest @ rest) / size if size > 0.0 else 0.0
+    return total
 
 
 def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:
-    """The signals of a run under the names of a record."""
+    """The signals of a run under the names of a record, and its time."""
     motor = design.effective_motor
     gain = motor.source_gain_Nm_V
     rate = run.output_speed_rad_s
     return {
+        "time": run.time_s,
         "angle": run.motor_angle_rad,
         "output_angle": run.output_angle_rad,
         "position": run.output_angle_rad,

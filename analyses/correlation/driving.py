@@ -124,6 +124,33 @@ def _from(controller: Controller, stage: str) -> Controller:
     return replace(controller, **dict.fromkeys(outside))  # type: ignore[arg-type]
 
 
+def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
+    """Times and values of the command at the drive's ticks.
+
+    Linear between the samples; a jump between two stretches that stand still is a step of the command, and
+    comes with the later sample.
+    """
+    period = driven.design.controller.period_s
+    ticks = np.arange(round(duration_s / period) + 1) * period
+    values = np.interp(ticks, time_s, driven.values)
+    before = np.clip(np.searchsorted(time_s, ticks + 1e-6 * period, side="right") - 1, 0, len(time_s) - 1)
+    step = steps_of(driven.values)[np.minimum(before, len(time_s) - 2)] & (before < len(time_s) - 1)
+    return ticks, np.where(step, driven.values[before], values)
+
+
+def steps_of(values: FloatArray) -> NDArray[np.bool_]:
+    """For each interval between two samples, whether the values jump there from standstill to standstill.
+
+    Examples
+    --------
+    >>> steps_of(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
+    [False, True, False, False, False, False, False]
+    """
+    moves = np.diff(values) != 0.0
+    around = np.concatenate([[False], moves, [False]])
+    return np.asarray(moves & ~around[:-2] & ~around[2:])
+
+
 @dataclass(frozen=True, kw_only=True)
 class Supplied:
     """The bus voltage over time, and whether the controller's output is a share of it."""
@@ -174,11 +201,10 @@ def load_of(
     return bare, loads.series(time_s, record[name], where=record.name)
 
 
-def first_state(driven: Driven, record: Record, measured: Mapping[str, FloatArray]) -> State:
-    """The state at the record's first sample, as far as it tells.
+def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArray]) -> tuple[State, State]:
+    """The state at the record's first sample: at rest there, or in the motion that the first samples show.
 
-    A record that begins in motion (above 2 % of its largest speed), or with a current, finds the controllers
-    settled: their integrals hold what the first samples show.
+    In motion, or with a current, the controllers are settled: their integrals hold what is needed for it.
     """
     from nonlinear import State
 
@@ -189,14 +215,16 @@ def first_state(driven: Driven, record: Record, measured: Mapping[str, FloatArra
         if name in measured:
             place = float(measured[name][0]) * (1.0 if name == "angle" else ratio)
             break
-    speed = _first_speed(design, measured)
+    rest, speed = State(motor_angle_rad=place), _first_speed(design, measured)
     current = float(np.median(record["current"][:FIRST_ROWS])) if "current" in record.signals else 0.0
     if motor.source_gain_Nm_V is not None or (speed == 0.0 and not _holds(record)):
         current = 0.0
+    if speed == 0.0 and current == 0.0:
+        return rest, rest
     volts = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * speed
     cascaded = design.controller.current is not None
     first = float(driven.values[0])
-    return State(
+    return rest, State(
         motor_angle_rad=place,
         motor_speed_rad_s=speed,
         current_A=current,

@@ -60,7 +60,7 @@ def refine_records(
         If a record holds no command.
     """
     names = [output_name(design, record) for record in records]
-    measured = [measured_signals(design, record) for record in records]
+    measured = [measured_signals(design, record, derive=True) for record in records]
     sizes = [_size(one[name]) for one, name in zip(measured, names, strict=True)]
     wanted = [one[name] / size for one, name, size in zip(measured, names, sizes, strict=True)]
 

@@ -19,7 +19,7 @@ from reports.sections.identification_inputs import (
 if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
     from analyses.identification.electrical import ElectricalFit
-    from analyses.identification.inverse import JointModel
+    from analyses.identification.joint_model import JointModel
 
 LABELS = {
     "inertia": ("Inertia, all at the motor", "kg m²", "Mass", "kg"),
