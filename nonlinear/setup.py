@@ -99,6 +99,19 @@ def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
     row[at.TORQUE_TABLE], row[at.TORQUE_TABLE_LENGTH] = tables.add(values)
 
 
+def put_supply(row: Floats, design: Design, supply: Command, scales: bool, tables: Tables) -> None:
+    """Write a bus voltage over time; see `nonlinear.simulate`."""
+    nominal = design.limits.voltage_V
+    if scales and (design.controller.current is not None or not isfinite(nominal)):
+        message = "supply_scales: needs a drive without a current loop, and a finite limits.voltage"
+        raise InputError(message, where=design.name)
+    table = supply.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+    if table is None or (table < 0.0).any():
+        raise InputError("supply: voltages of 0 or more at times are needed", where=design.name)
+    row[at.SUPPLY_TABLE], row[at.SUPPLY_TABLE_LENGTH] = tables.add(table)
+    row[at.SUPPLY], row[at.SUPPLY_VOLTAGE] = at.SUPPLY_SCALES if scales else at.SUPPLY_LIMITS, nominal
+
+
 def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
     """Write the probes, at most one a point."""
     seen = set()

@@ -26,6 +26,7 @@ from nonlinear.setup import (
     put_probes,
     put_signal,
     put_state,
+    put_supply,
     put_torque,
     ticks_of,
 )
@@ -47,6 +48,8 @@ def simulate(
     probes: Sequence[Probe] = (),
     initial: State | None = None,
     disturbance_Nm: npt.ArrayLike | None = None,
+    supply: Command | None = None,
+    supply_scales: bool = False,
     friction_on: bool = True,
     limits_on: bool = True,
     energy: bool = False,
@@ -80,6 +83,12 @@ def simulate(
         Default: everything at rest at zero.
     disturbance_Nm : array_like, optional
         Extra torque at the motor shaft, one value a tick (the last is held).
+    supply : Command, optional
+        Bus voltage against time (`nonlinear.commands.sampled`), at the ticks; it takes the place of
+        ``limits.voltage`` and of the design's own supply.
+    supply_scales : bool
+        The controller's output is a duty ratio of the bus, as in a servo without a current loop: the motor
+        has ``u U(t) / limits.voltage``, with u the controller's voltage, limited by ``limits.voltage``.
     friction_on, limits_on : bool
         ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
     energy : bool
@@ -138,6 +147,8 @@ def simulate(
     put_load(row, as_load(load_Nm), tables)
     if disturbance_Nm is not None:
         put_torque(row, disturbance_Nm, tables)
+    if supply is not None:
+        put_supply(row, design, supply, supply_scales, tables)
     put_probes(row, probes, tables)
     put_state(row, initial or State())
     trajectory = run_row(design, row, tables.joined(), progress)

@@ -37,6 +37,15 @@ def print_verdict(passed: bool, words: str) -> None:
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
+def print_section(section: Mapping[str, Any], passed: bool | None, notes: Sequence[str] = ()) -> None:
+    """Print a section: verdict or result first, then how it was found, then its tables."""
+    if passed is None:
+        console().print(Text(section["result"]), soft_wrap=True)
+    else:
+        print_verdict(passed, section["result"])
+    print_blocks([{"kind": "text", "text": section["intro"]}, *section["blocks"]], notes)
+
+
 def _print(block: Mapping[str, Any], out: Console) -> None:
     """Print one block; a table that is too wide for the terminal is stacked."""
     if block["kind"] == "table":

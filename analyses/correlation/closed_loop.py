@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
+from analyses.correlation.driving import (
+    LOADS,
+    at_ticks,
+    first_states,
+    load_of,
+    needed_command,
+    supply_of,
+)
 from analyses.identification.differentiation import filtered_motion
 from analyses.records.consistency import Finding, check_record
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
-    from nonlinear import State
-    from nonlinear.loads import LoadMoment
+    from nonlinear import Trajectory
 
 FloatArray = NDArray[np.float64]
 
-LOADS = {"rotary": "torque", "linear": "load_force"}
 UNITS = {
     "angle": "rad",
     "output_angle": "rad",
@@ -35,18 +41,13 @@ UNITS = {
     "voltage": "V",
     "force": "N",
 }
-COMMANDS = {
-    ("rotary", "position"): "reference",
-    ("linear", "position"): "position_reference",
-    ("rotary", "velocity"): "speed_reference",
-    ("linear", "velocity"): "velocity_reference",
-    ("rotary", "current"): "current_reference",
-    ("linear", "current"): "current_reference",
-    ("rotary", "voltage"): "voltage_reference",
-    ("linear", "voltage"): "voltage_reference",
+AXIS_SIGNALS = {
+    "rotary": ("angle", "output_angle", "speed", "current", "voltage"),
+    "linear": ("position", "velocity", "current", "voltage", "force"),
 }
-"""The signal that commands a drive, by its axis and its outermost stage."""
+"""What a record of an axis may hold that the model has too."""
 VELOCITY_CUTOFF_HZ = 100.0
+FIRST_ROWS = 50
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,7 @@ def correlate_record(
     record: Record,
     *,
     derive_velocity: bool = True,
+    command: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
@@ -91,15 +93,17 @@ def correlate_record(
     ----------
     design : Design
     record : Record
-        Needs the command of the design's outermost stage: ``reference`` (output angle, rad) or
-        ``position_reference`` (m, linear axis) of a position loop, else that of speed, current or voltage. A
-        ``torque`` signal is the hinge moment at the output, a ``supply`` signal the bus voltage (its median
-        becomes the voltage limit). Compared are, where recorded: angle, output_angle or position, speed or
-        velocity, current, voltage, force. The force of a drive with an ideal source is its gain times the
-        voltage.
+        Needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
+        axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
+        voltage. The outermost one that is recorded drives the model, whose loops outside it do not act. A
+        ``torque`` signal is the hinge moment at the output, ``supply`` the bus voltage (see `supply_of`).
+        Compared are, where recorded: angle, output_angle or position, speed or velocity, current, voltage,
+        force. The force of a drive with an ideal source is its gain times the voltage.
     derive_velocity : bool
         Where no speed was recorded, compare with the derivative of the recorded position (4th-order
         Butterworth at 100 Hz forward and backward, central differences).
+    command : str, optional
+        The signal that drives the model instead; ``"voltage"`` is the measured voltage of the motor.
     progress : callable, optional
 
     Raises
@@ -111,9 +115,11 @@ def correlate_record(
     notes = list(record.notes)
     findings = check_record(design, record)
     measured = measured_signals(design, record, derive_velocity, notes)
+    measured = {name: values for name, values in measured.items() if name != command}
     if not measured:
-        raise InputError(f"nothing to compare; known signals: {', '.join(UNITS)}", where=record.name)
-    modelled, limits = model_signals(design, record, measured, notes, progress)
+        known = ", ".join(AXIS_SIGNALS[design.axis])
+        raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
+    modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
     signals = tuple(
         compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
@@ -127,32 +133,26 @@ def correlate_record(
         counts=str(record.counts),
         sha256=record.sha256,
         source=record,
-        used=_used(design, record, measured),
+        used=_used(design, record, measured, command),
         findings=findings,
     )
 
 
-def _used(design: Design, record: Record, measured: Mapping[str, FloatArray]) -> dict[str, str]:
+def _used(
+    design: Design, record: Record, measured: Mapping[str, FloatArray], command: str | None
+) -> dict[str, str]:
     used = {name: "compared" for name in measured if name in record.signals}
-    command = command_of(design, record)
-    if command is not None:
-        used[command[0]] = "command"
+    driven = needed_command(design, record, command)
+    used[driven.signal] = (
+        "command" if driven.stage == design.controller.outermost else f"{driven.stage} command"
+    )
     used |= {name: "load" for name in (LOADS[design.axis],) if name in record.signals}
-    used |= {"supply": "supply", "enable": "enabled part"}
+    used["enable"] = "enabled part"
+    if design.effective_motor.source_gain_Nm_V is None:
+        used["supply"] = "supply"
     if "force" in measured and "force" not in record.signals:
         used["voltage"] = "force, by the source's gain"
     return {name: text for name, text in used.items() if name in record.signals}
-
-
-def command_name(design: Design) -> str:
-    """The signal that commands a design's drive: that of its outermost stage."""
-    return COMMANDS[design.axis, design.controller.outermost]
-
-
-def command_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
-    """The command of a record that the design's drive takes: its signal and values; None without one."""
-    name = command_name(design)
-    return (name, record[name]) if name in record.signals else None
 
 
 def measured_signals(
@@ -163,7 +163,7 @@ def measured_signals(
     A signal that is zero throughout is left out.
     """
     notes = [] if notes is None else notes
-    found = {name: record[name] for name in UNITS if name in record.signals}
+    found = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
     for name in [name for name, values in found.items() if not np.any(values)]:
         del found[name]
         notes.append(f"{name} is zero throughout: not compared")
@@ -184,21 +184,14 @@ def measured_signals(
     return found
 
 
-def _with_supply(design: Design, record: Record, notes: list[str]) -> Design:
-    if "supply" not in record.signals:
-        return design
-    level = float(np.median(record["supply"]))
-    spread = float(np.std(record["supply"]))
-    notes.append(f"supply: the median of the record, {level:.4g} V (std {spread:.2g} V)")
-    return with_values(design, {"limits.voltage": level}, check=False)
-
-
 def model_signals(
     design: Design,
     record: Record,
-    measured: dict[str, FloatArray],
+    measured: Mapping[str, FloatArray],
     notes: list[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    command: str | None = None,
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
     """The model's signals at a regular record's times, and the limiters' shares of the time.
 
@@ -206,72 +199,79 @@ def model_signals(
     ----------
     design, record
         As for `correlate_record`.
-    measured : dict
-        The signals wanted; the simulation starts from the position among them, at rest.
+    measured : mapping
+        The signals wanted; the simulation starts from what their first samples show.
     notes : list of str, optional
         What was done is added to it.
+    command : str, optional
+        The signal that drives the model; default the outermost one that the record holds.
     """
     from nonlinear import commands, simulate
 
-    command = command_of(design, record)
-    if command is None:
-        wanted = command_name(design)
-        raise InputError(f'no command: the signal "{wanted}" is needed for a {design.axis} axis', record.name)
+    driven = needed_command(design, record, command)
     notes = [] if notes is None else notes
-    design = _with_supply(design, record, notes)
+    notes.extend(driven.notes)
     time = record.time_s - record.time_s[0]
-    design, load = _load(design, record, time, notes)
-    period = design.controller.period_s
-    run = simulate(
-        design,
-        commands.sampled(time, command[1], where=record.name),
-        float(time[-1]) + 2.0 * period,
-        load,
-        initial=_initial(design, measured),
-        progress=progress,
+    supplied = supply_of(driven, record, time)
+    if supplied is not None:
+        notes.append(supplied.note)
+    model, load = load_of(driven.design, record, time, notes)
+    period = model.controller.period_s
+    duration = float(time[-1]) + 2.0 * period
+    go = partial(
+        simulate,
+        model,
+        commands.sampled(*at_ticks(driven, time, duration), where=record.name),
+        load_Nm=load,
+        supply=None if supplied is None else supplied.voltage,
+        supply_scales=supplied is not None and supplied.scales,
     )
-    gain = design.effective_motor.source_gain_Nm_V
-    series = {
+    initial, moving = first_states(driven, record, measured)
+    if moving is not initial:
+        part = time[: min(FIRST_ROWS, len(time))]
+        beginning = {name: values[: len(part)] for name, values in measured.items()}
+        off = [
+            _difference(beginning, part, _series(model, go(float(part[-1]) + 2.0 * period, initial=state)))
+            for state in (initial, moving)
+        ]
+        if off[1] < off[0]:
+            initial = moving
+            notes.append("the record begins in motion or under load, and so does the model")
+    run = go(duration, initial=initial, progress=progress)
+    between = "command linear between samples but for its steps"
+    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, {between}")
+    limits = {name: use.fraction for name, use in run.limits.items()}
+    series = _series(model, run)
+    return {name: np.interp(time, series["time"], series[name]) for name in measured}, limits
+
+
+def _difference(
+    measured: Mapping[str, FloatArray], time: FloatArray, series: Mapping[str, FloatArray]
+) -> float:
+    """Sum over the signals of the squared relative difference."""
+    total = 0.0
+    for name, values in measured.items():
+        size = float(values @ values)
+        rest = np.interp(time, series["time"], series[name]) - values
+        total += float(rest @ rest) / size if size > 0.0 else 0.0
+    return total
+
+
+def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:
+    """The signals of a run under the names of a record, and its time."""
+    motor = design.effective_motor
+    gain = motor.source_gain_Nm_V
+    rate = run.output_speed_rad_s
+    return {
+        "time": run.time_s,
         "angle": run.motor_angle_rad,
         "output_angle": run.output_angle_rad,
         "position": run.output_angle_rad,
         "speed": run.motor_speed_rad_s,
-        "velocity": run.motor_speed_rad_s / design.total_ratio,
+        "velocity": run.motor_speed_rad_s / design.total_ratio if rate is None else rate,
         "current": run.current_A,
         "voltage": run.voltage_V,
-        "force": run.voltage_V * (1.0 if gain is None else gain),
+        "force": (motor.torque_constant_Nm_A or 0.0) * run.current_A
+        if gain is None
+        else gain * run.voltage_V,
     }
-    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, command linear between samples")
-    limits = {name: use.fraction for name, use in run.limits.items()}
-    return {name: np.interp(time, run.time_s, series[name]) for name in measured}, limits
-
-
-def _load(design: Design, record: Record, time: FloatArray, notes: list[str]) -> tuple[Design, LoadMoment]:
-    """The recorded load, which holds all of it; without one, the design's own slope and gravity act."""
-    from nonlinear import loads
-
-    name, own = LOADS[design.axis], []
-    if design.load.moment_slope_Nm_rad:
-        own.append("load.moment_slope")
-    if design.load.gravity is not None:
-        own.append("load.gravity")
-    if name not in record.signals:
-        notes.extend(f"load: the design's {key} acts" for key in own)
-        return design, loads.constant(0.0)
-    notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
-    bare = replace(design, load=replace(design.load, gravity=None, moment_slope_Nm_rad=0.0))
-    return bare, loads.series(time, record[name])
-
-
-def _initial(design: Design, measured: dict[str, FloatArray]) -> State:
-    """The state at the record's first sample, as far as it tells."""
-    from nonlinear import State
-
-    ratio = design.total_ratio
-    place = 0.0
-    if "angle" in measured:
-        place = float(measured["angle"][0])
-    for name in ("output_angle", "position"):
-        if name in measured and "angle" not in measured:
-            place = ratio * float(measured[name][0])
-    return State(motor_angle_rad=place)

@@ -12,7 +12,8 @@ from actuator_lti.errors import InputError
 from analyses.identification.dynamic import FrictionForm, Recipe
 from analyses.identification.electrical import ElectricalFit, electrical_estimate, fit_electrical
 from analyses.identification.friction_map import LawChoice, fit_map
-from analyses.identification.inverse import JointModel, fit_records, held_out_residual
+from analyses.identification.inverse import fit_records, held_out_residual
+from analyses.identification.joint_model import JointModel
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.refinement import refine_records
 from analyses.identification.resimulation import Resimulated, resimulate
@@ -33,6 +34,7 @@ from analyses.identification.verdict import (
     inputs_item,
     residual_item,
     rows_item,
+    sampling_item,
     simulated_item,
     size_item,
 )
@@ -115,7 +117,8 @@ def identify_bench(
         start = design_with_estimate(start, electrical_estimate(start, electrical, told))
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
-    items = _fit_items(design, findings, model, settings.residual_limit)
+    sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
+    items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled)
     try:
         estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
         made = design_with_estimate(with_structure(start, model), estimate)

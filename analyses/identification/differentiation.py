@@ -23,13 +23,33 @@ class Motion:
     acceleration: FloatArray
 
 
-def central_difference(values: FloatArray, period_s: float) -> FloatArray:
-    """First derivative: central inside, one-sided at the two ends."""
-    return np.asarray(np.gradient(values, period_s), dtype=np.float64)
+SEVEN_POINTS = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0
 
 
-def filtered_motion(position: FloatArray, period_s: float, *, cutoff_hz: float, order: int) -> Motion:
-    """Butterworth forward and backward, then central differences twice.
+def central_difference(values: FloatArray, period_s: float, points: int = 3) -> FloatArray:
+    """First derivative: central inside, one-sided at the two ends.
+
+    Over three points it falls short by ``(w T)^2 / 6`` of a sine of frequency w, over seven by
+    ``(w T)^6 / 140``; the outermost three samples have three points.
+
+    Examples
+    --------
+    >>> t = np.arange(200) * 0.1
+    >>> three, seven = (central_difference(np.sin(5.0 * t), 0.1, n)[100] / 5.0 for n in (3, 7))
+    >>> round(three / np.cos(5.0 * t[100]), 3), round(seven / np.cos(5.0 * t[100]), 3)
+    (0.959, 1.0)
+    """
+    simple = np.asarray(np.gradient(values, period_s), dtype=np.float64)
+    if points == 3 or len(values) < len(SEVEN_POINTS):
+        return simple
+    simple[3:-3] = np.convolve(values, SEVEN_POINTS, mode="valid") / period_s
+    return simple
+
+
+def filtered_motion(
+    position: FloatArray, period_s: float, *, cutoff_hz: float, order: int, points: int = 3
+) -> Motion:
+    """Butterworth forward and backward, then central differences over three or seven points twice.
 
     The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a
     filter of this order.
@@ -48,8 +68,9 @@ def filtered_motion(position: FloatArray, period_s: float, *, cutoff_hz: float, 
         raise InputError(f"{len(position)} samples: more than {padding} are needed")
     b, a = butter(order, 2.0 * cutoff_hz * period_s)
     smooth = np.asarray(filtfilt(b, a, position, padlen=padding), dtype=np.float64)
-    velocity = central_difference(smooth, period_s)
-    return Motion(position=smooth, velocity=velocity, acceleration=central_difference(velocity, period_s))
+    velocity = central_difference(smooth, period_s, points)
+    acceleration = central_difference(velocity, period_s, points)
+    return Motion(position=smooth, velocity=velocity, acceleration=acceleration)
 
 
 def decimated(columns: FloatArray, factor: int) -> FloatArray:

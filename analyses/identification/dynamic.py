@@ -32,7 +32,8 @@ class Recipe:
     """The choices of the identification; the defaults are the published ones for EMPS.
 
     ``skip_end_samples`` are left out at the end of a record that ends in motion: there the filter, which has
-    no further samples, bends the position. The published recipe keeps them.
+    no further samples, bends the position. The published recipe keeps them, and differentiates over three
+    ``points``.
     """
 
     cutoff_hz: float = 100.0
@@ -40,6 +41,7 @@ class Recipe:
     skip_samples: int = 49
     decimation: int = 10
     skip_end_samples: int = 0
+    points: int = 3
 
     def __post_init__(self) -> None:
         for name, low in (

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from actuator_lti.design.model import Design
 from analyses.identification.dynamic import Recipe
 from analyses.identification.hats import hats
-from analyses.identification.inverse import JointModel, fit_records
+from analyses.identification.inverse import fit_records
+from analyses.identification.joint_model import JointModel
 from analyses.identification.means import correlation_time
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.dynamic import FrictionForm, Recipe
+from analyses.identification.joint_model import KEYS, Fixed, JointModel, RecordFit, default_value
 from analyses.identification.least_squares import NotTold, Solution, by_record, solve, told_apart
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
@@ -18,79 +19,6 @@ from analyses.records.record import Record
 FloatArray = NDArray[np.float64]
 
 GRAVITY_ROUNDS = 6
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fixed:
-    """A parameter that was not fitted: its value (SI, at the motor) and why."""
-
-    value: float
-    reason: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class RecordFit:
-    """One record's part: rows, its relative residual under the joint model, what was used and noted."""
-
-    name: str
-    rows_in: int
-    rows_used: int
-    rows_at_rest: int
-    relative_residual: float
-    used: Mapping[str, str]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointModel:
-    """The inverse dynamic model of all records together.
-
-    ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
-    and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor. With
-    ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry.
-
-    Attributes
-    ----------
-    names, values
-        What was fitted. ``fixed`` holds the rest with the reason.
-    standard_errors : array
-        As if the residual were white, as published for EMPS.
-    covariance : array
-        With the correlation of the residual in time, and with the scatter between records where there are
-        several; ``between`` is that scatter alone, by name, as a standard deviation of one record.
-    relative_residual : float
-        Norm of the residual over norm of the drive signal, after decimation, all records.
-    """
-
-    form: FrictionForm
-    names: tuple[str, ...]
-    values: FloatArray
-    standard_errors: FloatArray
-    covariance: FloatArray
-    between: Mapping[str, float]
-    fixed: Mapping[str, Fixed]
-    relative_residual: float
-    residual: FloatArray
-    records: tuple[RecordFit, ...]
-    recipe: Recipe
-    condition: float
-    singles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    knots_rad_s: tuple[float, ...] | None = None
-
-    def __getitem__(self, name: str) -> float:
-        if name in self.names:
-            return float(self.values[self.names.index(name)])
-        return self.fixed[name].value
-
-    @property
-    def rows_in(self) -> int:
-        """Rows of all records."""
-        return sum(record.rows_in for record in self.records)
-
-    @property
-    def rows_used(self) -> int:
-        """Rows of the regression."""
-        return sum(record.rows_used for record in self.records)
 
 
 def fit_records(
@@ -165,7 +93,7 @@ def _fitted(
     w = np.concatenate([block.w for block in blocks])
     kept, left = told_apart(w[:, [names.index(name) for name in free]], free)
     for one in left:
-        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=_kept(one))
+        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=_kept(one), moves=one.moves)
     free = tuple(free[k] for k in kept)
     if not free:
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].record)
@@ -185,11 +113,27 @@ def _fitted(
             for name in negative
         }
         return replace(model, fixed={**model.fixed, **said})
-    return _model(blocks, free, fixed, form, solution, weights)
+    model = _model(blocks, free, fixed, form, solution, weights)
+    return replace(model, covariance=model.covariance + _of_fixed(design, free, fixed))
 
 
 def _kept(one: NotTold) -> str:
-    return f"{one}: the design's value kept"
+    moved = " and ".join(f"{name} by {-factor:.3g} times it" for name, factor in one.moves.items())
+    return f"{one}: the design's value kept" + (f"; an error of it moves {moved}" if moved else "")
+
+
+def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed]) -> FloatArray:
+    """What the design's own tolerances of the values kept add to the covariance of those that were found."""
+    added = np.zeros((len(free), len(free)))
+    for name, one in fixed.items():
+        parameter = design.parameters.get(KEYS.get(name, ""))
+        if parameter is None or parameter.tolerance is None:
+            continue
+        moves = np.array([one.moves.get(other, 0.0) for other in free])
+        width = parameter.tolerance.half_width or 0.0
+        std = parameter.tolerance.std or width / np.sqrt(3.0)
+        added += std**2 * np.outer(moves, moves)
+    return added
 
 
 def _negative(names: tuple[str, ...], solution: Solution) -> list[str]:
@@ -198,28 +142,6 @@ def _negative(names: tuple[str, ...], solution: Solution) -> list[str]:
     return [
         name for name, value in zip(names, solution.values, strict=True) if value < 0.0 and name not in signed
     ]
-
-
-def default_value(design: Design, name: str) -> float:
-    """The design's own value of a parameter of the model, at the motor."""
-    friction = design.friction
-    own = {
-        "inertia": design.inertia_kgm2,
-        "viscous": friction.viscous(1),
-        "dry": friction.dry_Nm(0.0, 1),
-        "offset": friction.offset_torque_Nm,
-        "viscous_forward": friction.viscous(1),
-        "dry_forward": friction.dry_Nm(0.0, 1),
-        "viscous_reverse": friction.viscous(-1),
-        "dry_reverse": friction.dry_Nm(0.0, -1),
-        "load_coefficient": friction.load_coefficient,
-    }
-    gravity = design.load.gravity
-    if gravity is not None:
-        own["gravity_sin"] = gravity.peak_Nm * float(np.cos(gravity.offset_rad))
-        own["gravity_cos"] = gravity.peak_Nm * float(np.sin(gravity.offset_rad))
-    own |= {f"map_{k}": point.torque_Nm for k, point in enumerate(friction.map(1))}
-    return own.get(name, 0.0)
 
 
 def _target(block: Rows, fixed: Mapping[str, Fixed]) -> FloatArray:

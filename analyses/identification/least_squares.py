@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,14 @@ MIN_BLOCKS = 8
 
 @dataclass(frozen=True, kw_only=True)
 class NotTold:
-    """A parameter that the rows do not tell, and which others it cannot be told from."""
+    """A parameter that the rows do not tell, and which others it cannot be told from.
+
+    ``moves``: its column is about the sum of these factors times those of the others.
+    """
 
     name: str
     like: tuple[str, ...]
+    moves: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"cannot be told from {' and '.join(self.like)}" if self.like else "is not excited at all"
@@ -64,10 +68,11 @@ def told_apart(w: FloatArray, names: Sequence[str]) -> tuple[tuple[int, ...], tu
         rest = unit - sum((b * float(b @ unit) for b in basis), np.zeros(len(unit)))
         own = float(np.linalg.norm(rest))
         if own < LEAST_OWN_SHARE:
-            table = w[:, kept] / np.linalg.norm(w[:, kept], axis=0)
-            share = np.abs(np.linalg.lstsq(table, unit, rcond=None)[0])
-            like = tuple(names[kept[j]] for j in np.flatnonzero(share > 0.2 * share.max()))
-            left.append(NotTold(name=name, like=like))
+            sizes = np.linalg.norm(w[:, kept], axis=0)
+            share = np.linalg.lstsq(w[:, kept] / sizes, unit, rcond=None)[0]
+            chosen = np.flatnonzero(np.abs(share) > 0.2 * np.abs(share).max())
+            moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
+            left.append(NotTold(name=name, like=tuple(moves), moves=moves))
             continue
         kept.append(k)
         basis.append(rest / own)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.correlation.closed_loop import command_of, measured_signals, model_signals
+from analyses.correlation.closed_loop import measured_signals, model_signals
+from analyses.correlation.driving import command_of
 from analyses.identification.output_error import OutputErrorResult, refine_by_output_error
 from analyses.records.record import Record
 
@@ -34,7 +35,7 @@ def output_name(design: Design, record: Record) -> str:
     if command is None:
         raise InputError("no command: a refinement by simulation needs it", where=record.name)
     there = measured_signals(design, record)
-    closed = command[0] not in ("current_reference", "voltage_reference")
+    closed = command.stage not in ("current", "voltage")
     order = (*DRIVE_SIGNALS, *MOTION_SIGNALS) if closed else (*MOTION_SIGNALS, *DRIVE_SIGNALS)
     for name in order:
         if name in there and np.any(there[name]):
@@ -59,7 +60,7 @@ def refine_records(
         If a record holds no command.
     """
     names = [output_name(design, record) for record in records]
-    measured = [measured_signals(design, record) for record in records]
+    measured = [measured_signals(design, record, derive=True) for record in records]
     sizes = [_size(one[name]) for one, name in zip(measured, names, strict=True)]
     wanted = [one[name] / size for one, name, size in zip(measured, names, sizes, strict=True)]
 

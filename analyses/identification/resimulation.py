@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import correlate_record
 from analyses.identification.dynamic import FrictionForm
-from analyses.identification.inverse import default_value
+from analyses.identification.joint_model import default_value
 from analyses.identification.refinement import has_command, output_name
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record

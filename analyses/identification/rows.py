@@ -49,7 +49,8 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     """The published recipe, moved to another sampling period.
 
     100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
-    at the start and, where a record ends in motion, at the end. The record of the EMPS benchmark has the
+    at the start and, where a record ends in motion, at the end; differences over seven points, as three
+    would make the inertia too small by some tenths of a per cent. The record of the EMPS benchmark has the
     published recipe to the letter, which keeps the end.
     """
     period = period_of(record)
@@ -58,7 +59,7 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     cutoff = min(100.0, 0.1 / period) if cutoff_hz is None else cutoff_hz
     factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation
     skip = max(round(0.049 / period), 5)
-    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip)
+    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip, points=7)
 
 
 def is_benchmark(record: Record) -> bool:
@@ -105,15 +106,27 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     period = period_of(record)
     place = place_of(design, record)
     if place is not None:
-        made = filtered_motion(place[1], period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order)
-        return made, place[0]
+        return _filtered(place[1], period, recipe), place[0]
     rate = "velocity" if design.axis == "linear" else "speed"
     if rate not in record.signals:
         wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
         raise InputError(f"no motion: {wanted} is needed", where=record.name)
-    made = filtered_motion(record[rate], period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order)
+    made = _filtered(record[rate], period, recipe)
     whole = np.concatenate([[0.0], np.cumsum(made.position[:-1] * period)])
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
+
+
+def _late_s(design: Design, record: Record) -> float:
+    """How much later a recorded voltage acts: the computing delay, and half of what it is held for."""
+    control = design.controller
+    stage = control.current or control.velocity or control.position
+    held = control.period_s * getattr(stage, "every", 1)
+    return control.computing_delay_s + 0.5 * min(held, period_of(record))
+
+
+def _filtered(values: FloatArray, period: float, recipe: Recipe) -> Motion:
+    cutoff, order = recipe.cutoff_hz, recipe.filter_order
+    return filtered_motion(values, period, cutoff_hz=cutoff, order=order, points=recipe.points)
 
 
 def moment_of(
@@ -171,11 +184,13 @@ def record_rows(
     recipe = recipe_for(record) if recipe is None else recipe
     motion, place = motion_of(design, record, recipe)
     drive, driven_by, told, back_emf = drive_of(design, record)
+    if driven_by.startswith("voltage") and not is_benchmark(record):
+        drive = np.interp(record.time_s - _late_s(design, record), record.time_s, drive)
     names, columns = _friction_columns(motion, form, knots_rad_s)
     used = {place: "motion", driven_by: f"drive: {told}"}
     if back_emf:
         drive = drive - _damping(design) * motion.velocity
-    angle = motion.position / design.total_ratio
+    angle = _output_angle(design, record, motion, recipe)
     free = design.load.path == "back-drivable"
     if gravity and not free:
         raise InputError(
@@ -186,6 +201,10 @@ def record_rows(
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
     if free:
         drive = drive + known / design.total_ratio
+    if design.coupling is not None:
+        reaction = _load_side(design, motion)
+        known = known - design.ratio_behind_coupling * reaction[0]
+        drive = drive - (reaction[1] / design.ratio_to_coupling if free else 0.0)
     sines = np.column_stack([np.sin(angle), np.cos(angle)])
     table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
     moving = ~_at_rest(motion.velocity, period_of(record))
@@ -222,6 +241,38 @@ def _end_skip(motion: Motion, recipe: Recipe) -> int:
     speed = np.abs(motion.velocity)
     moving = float(speed[-1]) > END_SHARE * float(np.max(speed))
     return recipe.skip_end_samples if moving and len(speed) > 4 * recipe.skip_end_samples else 0
+
+
+def _output_angle(design: Design, record: Record, motion: Motion, recipe: Recipe) -> FloatArray:
+    """Angle of the output, on which slope and gravity depend: recorded, or that of the motor over N.
+
+    Behind a coupling the static twist under the design's own moments is taken off a motor's angle; play is
+    not.
+    """
+    rigid = motion.position / design.total_ratio
+    coupling = design.coupling
+    if coupling is None or design.axis == "linear":
+        return np.asarray(rigid)
+    if "output_angle" in record.signals:
+        return _filtered(record["output_angle"], period_of(record), recipe).position
+    moment, _ = moment_of(design, record, rigid)
+    behind = design.ratio_behind_coupling
+    twist = (_load_side(design, motion)[0] - moment / behind) / coupling.stiffness_Nm_rad
+    return np.asarray(rigid - twist / behind)
+
+
+def _load_side(design: Design, motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Torque that the load side takes without a moment, and its friction alone, at the coupling's shaft.
+
+    The coupling's twist is left out; inertia and friction behind it are the design's.
+    """
+    ratio, friction = design.ratio_to_coupling, design.load.friction
+    own = np.zeros_like(motion.velocity)
+    if friction is not None:
+        side = np.sign(motion.velocity)
+        viscous = friction.viscous_Nms_rad / ratio * motion.velocity
+        own = friction.dry_torque_Nm * side + viscous + friction.offset_torque_Nm
+    return design.load_side_inertia_kgm2 / ratio * motion.acceleration + own, own
 
 
 def _damping(design: Design) -> float:

@@ -13,7 +13,7 @@ from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
-from analyses.identification.inverse import JointModel
+from analyses.identification.joint_model import KEYS, JointModel
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.surface import PATHS, SurfaceFit
 
@@ -46,17 +46,6 @@ def surface_estimate(fit: SurfaceFit, source: str) -> Estimate:
     )
 
 
-KEYS = {
-    "viscous": "friction.viscous",
-    "dry": "friction.dry_torque",
-    "offset": "friction.offset_torque",
-    "viscous_forward": "friction.viscous",
-    "dry_forward": "friction.dry_torque",
-    "viscous_reverse": "friction.viscous_reverse",
-    "dry_reverse": "friction.dry_torque_reverse",
-    "load_coefficient": "friction.load_coefficient",
-}
-"""The design's key of each parameter of an inverse model; the inertia has a choice."""
 PLAIN_KEYS = (
     "friction.viscous",
     "friction.dry_torque",

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from actuator_lti.design.model import Design
-from analyses.identification.inverse import JointModel, default_value
+from analyses.identification.joint_model import JointModel, default_value
 from analyses.records.consistency import Finding
 from analyses.records.factors import named_factor
+from analyses.records.record import Record
 
 RESIDUAL_LIMIT = 0.20
 """Largest relative residual that is taken without being told to."""
 LARGEST_FACTOR = 3.0
+LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
 HELD_OUT_FACTOR = 1.5
 HELD_OUT_EXTRA = 0.02
@@ -52,6 +56,24 @@ def residual_item(residual: float, limit: float) -> Item:
         limit=limit,
         reason="" if residual <= limit else "the model does not explain these records",
     )
+
+
+def sampling_item(record: Record) -> Item | None:
+    """Whether the current is sampled fast enough for its mean between the samples to be known."""
+    if "current" not in record.signals:
+        return None
+    x = record["current"]
+    size = float(np.sqrt(np.mean(x**2)))
+    if len(x) < 3 or size == 0.0:
+        return None
+    off = float(np.sqrt(np.mean((x[1:-1] - 0.5 * (x[:-2] + x[2:])) ** 2))) / size
+    slow = off > LARGEST_LINE_ERROR
+    reason = (
+        f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
+        "sampled too slowly, or noise; the inertia cannot be trusted"
+    )
+    label = f"{record.name}: current sampled fast enough"
+    return Item(id=f"sampling-{record.name}", label=label, passed=not slow, reason=reason if slow else "")
 
 
 def rows_item(rows: int, parameters: int) -> Item:

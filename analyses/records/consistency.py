@@ -132,12 +132,26 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     ratio, alike = _ratio(a, design.total_ratio * b)
     if abs(alike) < ALIKE:
         return Finding(subject="angle against output angle", passed=False, text="they are not alike")
-    passed = abs(ratio - 1.0) <= RATE_TOLERANCE
+    passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     factor = None if passed else named_factor(ratio, {design.total_ratio: "the reduction, counted twice"})
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction" + (
         f": factor {factor}" if factor else ""
     )
     return Finding(subject="angle against output angle", passed=passed, text=text)
+
+
+def _twist_share(design: Design, record: Record) -> float:
+    """What play and the largest moment twist the coupling by, as a share of the output's motion (rms)."""
+    if design.coupling is None:
+        return 0.0
+    own = record["output_angle"]
+    moment = float(np.max(np.abs(record["torque"]))) if "torque" in record.signals else 0.0
+    moment = max(moment, abs(design.load.moment_slope_Nm_rad) * float(np.max(np.abs(own))))
+    if design.load.gravity is not None:
+        moment = max(moment, design.load.gravity.peak_Nm)
+    behind = design.ratio_behind_coupling
+    twist = 0.5 * design.coupling.play_rad + moment / behind / design.coupling.stiffness_Nm_rad
+    return twist / behind / max(float(np.std(own)), 1e-300)
 
 
 def _electrical(design: Design, record: Record) -> Finding | None:
@@ -223,7 +237,7 @@ def _current_limit(design: Design, record: Record) -> Finding | None:
     if "current" not in record.signals:
         return None
     motor, limits = design.effective_motor, design.limits
-    limit = limits.peak_current_A
+    limit = limits.peak_current_A if design.controller.current is not None else inf
     if not isfinite(limit) and motor.resistance_ohm is not None:
         limit = 2.0 * limits.voltage_V / motor.resistance_ohm
     return _within("current against its limit", "current", _largest(record["current"]), limit, "A")

@@ -70,6 +70,8 @@ from __future__ import annotations
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
     TORQUE_TABLE_LENGTH,
+    SUPPLY_TABLE,  # bus voltage
+    SUPPLY_TABLE_LENGTH,
     MAX_EVENTS,  # per tick
     RECORD_EVERY,
     WITH_ENERGY,
@@ -104,8 +106,8 @@ from __future__ import annotations
     CURRENT_TRACKING,
     BACK_EMF_FEEDFORWARD,  # share times kE
     RESISTANCE_FEEDFORWARD,  # share times R
-    SUPPLY,  # 1: the supply is modelled
-    SUPPLY_VOLTAGE,
+    SUPPLY,  # 1: the supply is modelled; its voltage is a table: 2 that limits u, 3 that u is a share of
+    SUPPLY_VOLTAGE,  # of the source; of the table, the voltage at which gains are in volts
     SUPPLY_RESISTANCE,
     REGENERATIVE,
     CAPACITANCE,
@@ -138,7 +140,7 @@ from __future__ import annotations
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(125)
+) = range(127)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -321,8 +323,9 @@ WORK_MORE = 4 * 49
 
 # --- inputs of a block of ticks, worked out ahead: commands, loads, torques, injected signals ------------
 BLOCK, EVERY_TICK = 256, 1
-BLOCK_LOAD, BLOCK_TORQUE, BLOCK_PROBES = BLOCK, 2 * BLOCK, 3 * BLOCK
-BLOCK_SIZE = 7 * BLOCK
+BLOCK_LOAD, BLOCK_TORQUE, BLOCK_PROBES, BLOCK_SUPPLY = BLOCK, 2 * BLOCK, 3 * BLOCK, 7 * BLOCK
+BLOCK_SIZE = 8 * BLOCK
+SUPPLY_LIMITS, SUPPLY_SCALES = 2.0, 3.0
 
 # --- inputs and outputs of one tick -------------------------------------------------------------------
 (

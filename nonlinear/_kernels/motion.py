@@ -9,7 +9,7 @@ from nonlinear._kernels.compiled import inlined, scalar, woven
 from nonlinear._kernels.elastic import elastic_motion
 from nonlinear._kernels.energy import energy_stick, energy_whole
 from nonlinear._kernels.segment import segment, slip_step
-from nonlinear._kernels.sense import output_angle
+from nonlinear._kernels.sense import applied_voltage, output_angle
 from nonlinear._kernels.smooth import tanh_segment
 
 FINITE = 1e15
@@ -115,7 +115,7 @@ def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
     last = layout.S_QUEUE + int(p[layout.DELAY_LINE]) - 1
     for j in range(layout.S_QUEUE, last):
         s[j] = s[j + 1]
-    s[last] = s[layout.S_VOLTAGE]
+    s[last] = applied_voltage(p, s, io)
     if p[layout.RARE_LOAD] > 0.0:
         put_load(p, s, hinge_moment(p, s, io), io[layout.IN_TORQUE])
     events = 0.0

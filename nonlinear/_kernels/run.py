@@ -17,12 +17,15 @@ def run_block(p, s, io, block, first, count, history, flag_history, out, rare): 
     row = int((first + every - 1) / every)
     to_record = row * every if rows > 0 else -1
     feeding = p[layout.PROBING] > 0.0 or p[layout.RARE_LOAD] > 0.0
+    supplied = p[layout.SUPPLY] >= layout.SUPPLY_LIMITS
     reducing = p[layout.WINDOW] > 0.0 or p[layout.WITH_EXTREMES] > 0.0 or p[layout.STEP_TARGET] != 0.0
     flags, since, k = 0.0, first, first
     while k < first + count:
         io[layout.IN_COMMAND] = block[k - first]
         if feeding:
             feed(block, k - first, io)
+        if supplied:
+            io[layout.IN_BUS] = block[layout.BLOCK_SUPPLY + k - first]
         step(p, s, io, rare)
         if io[layout.IO_FLAGS] != flags:
             note_limits(p, flags, since, k, out)

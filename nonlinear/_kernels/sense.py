@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
+from nonlinear._kernels.compiled import inlined, scalar
 from nonlinear._kernels.elastic_modes import elastic_slopes
 from nonlinear._kernels.modal import derivative
 from nonlinear._kernels.random import normal
@@ -59,11 +59,22 @@ def supply(p, s):  # type: ignore[no-untyped-def]
     s[ledger + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
 
 
+@inlined
+def applied_voltage(p, s, io):  # type: ignore[no-untyped-def]
+    """What acts on the motor: the controller's voltage, or its share of a bus voltage that varies."""
+    u = s[layout.S_VOLTAGE]
+    if p[layout.SUPPLY] == layout.SUPPLY_SCALES:
+        u *= io[layout.IN_BUS] / p[layout.SUPPLY_VOLTAGE]
+    return u
+
+
 @scalar
 def sense(p, s, io):  # type: ignore[no-untyped-def]
     """Write what the controller measures of current, speed and angles, and the bus voltage."""
     i, w, th, y = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], output_angle(p, s)
-    if p[layout.SUPPLY] > 0.0:
+    if p[layout.SUPPLY] == layout.SUPPLY_LIMITS:
+        s[layout.S_VOLTAGE_LIMIT] = io[layout.IN_BUS]
+    elif p[layout.SUPPLY] > 0.0 and p[layout.SUPPLY] < layout.SUPPLY_LIMITS:
         if s[layout.S_TICK] > 0.0:
             supply(p, s)
         io[layout.IN_BUS] = s[layout.S_VOLTAGE_LIMIT]

@@ -101,6 +101,9 @@ def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyp
     length = int(p[layout.TORQUE_TABLE_LENGTH])
     if length > 0:
         add_table(tables, int(p[layout.TORQUE_TABLE]), length, first, count, block, layout.BLOCK_TORQUE)
+    length = int(p[layout.SUPPLY_TABLE_LENGTH])
+    if length > 0:
+        add_table(tables, int(p[layout.SUPPLY_TABLE]), length, first, count, block, layout.BLOCK_SUPPLY)
 
 
 @scalar

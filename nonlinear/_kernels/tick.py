@@ -16,7 +16,7 @@ from nonlinear._kernels.motion import motion, put_load
 from nonlinear._kernels.probes import fill_ring
 from nonlinear._kernels.random import seed_streams
 from nonlinear._kernels.regulator import clamp
-from nonlinear._kernels.sense import sense
+from nonlinear._kernels.sense import applied_voltage, sense
 
 
 @scalar
@@ -135,7 +135,8 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
     io[layout.IO_REFERENCE] = io[layout.IN_COMMAND]
     io[layout.IO_OUTPUT] = s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else th / p[layout.RATIO]
     io[layout.IO_SPEED], io[layout.IO_CURRENT], io[layout.IO_ANGLE] = w, i, th
-    io[layout.IO_VOLTAGE], io[layout.IO_CURRENT_COMMAND] = s[layout.S_VOLTAGE], s[layout.S_CURRENT_REFERENCE]
+    io[layout.IO_VOLTAGE] = applied_voltage(p, s, io)
+    io[layout.IO_CURRENT_COMMAND] = s[layout.S_CURRENT_REFERENCE]
     io[layout.IO_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE]
     io[layout.IO_FLAGS] = s[layout.S_FLAGS_OUTER] + s[layout.S_FLAGS_VELOCITY] + s[layout.S_FLAGS_CURRENT]
     if s[layout.S_DIRECTION] == 0.0:

@@ -39,6 +39,21 @@ FolderOption = Annotated[
         help="Write the page with the pictures, and its JSON, there.",
     ),
 ]
+CommandOption = Annotated[
+    str | None,
+    typer.Option(
+        "--command",
+        metavar="SIGNAL",
+        help="Signal that drives the model: a recorded command (default: the outermost), or voltage (the "
+        "motor's measured one).",
+    ),
+]
+ErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        "--error-limit", metavar="PERCENT", min=0.0, help="Relative error above which a signal fails."
+    ),
+]
 ChirpOption = Annotated[
     Path | None,
     typer.Option(
@@ -51,6 +66,8 @@ def correlate(
     design: DesignPlace,
     records: RecordsArgument,
     out: FolderOption = None,
+    command: CommandOption = None,
+    error_limit: ErrorOption = None,
     predict: ChirpOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
@@ -62,7 +79,12 @@ def correlate(
     error, delay; over several records also all together, and the worst; with
     --out pictures of both and the difference. Where a record contradicts
     itself or the design's limits (a wrong unit, swapped columns, a clock that
-    is off) the status is 1.
+    is off), or a signal is off by more than --error-limit, the status is 1.
+
+    The outermost command that is recorded drives the model: reference of the
+    output angle, speed, current (or torque), or voltage; loops outside it do
+    not act. A recorded supply limits the voltage over time, and scales it
+    where a loop sets the voltage itself.
 
     A CSV, Parquet or MATLAB file with columns such as time_s, reference_deg,
     Output angle [deg], motor_speed_rpm, current_A, load_Nm is read as it is,
@@ -94,10 +116,12 @@ def correlate(
     results = []
     for record in named_apart([open_record(path) for path in records]):
         with progress(f"simulating {record.name}", quiet=quiet) as bar:
-            results.append(correlate_record(drive, record, progress=bar))
-    sections = [pages.section(result, k) for k, result in enumerate(results, 1)]
+            results.append(correlate_record(drive, record, command=command, progress=bar))
+    limit = None if error_limit is None else error_limit / 100.0
+    sections = [pages.section(result, k, error_limit=limit) for k, result in enumerate(results, 1)]
     if len(results) > 1:
-        sections.insert(0, pages.summary_section(results))
+        sections.insert(0, pages.summary_section(results, error_limit=limit))
+    verdict = pages.verdict(results, limit)
     if out is not None:
         from reports.study_pages import study_document, write_pages
 
@@ -107,19 +131,17 @@ def correlate(
         with progress("drawing figures", quiet=quiet) as bar:
             write_pages(document, out, "correlation", progress=bar)
     if as_json:
-        print_json(_data(results))
+        print_json(_data(results) | {"passed": verdict})
     else:
-        _show(sections)
-    leave_with(all(finding.passed is not False for result in results for finding in result.findings))
+        _show(sections, verdict)
+    leave_with(verdict is not False)
 
 
-def _show(sections: list[dict[str, Any]]) -> None:
-    from reports.cli.output import print_line
-    from reports.terminal import print_blocks
+def _show(sections: list[dict[str, Any]], verdict: bool | None) -> None:
+    from reports.terminal import print_section
 
-    for made in sections:
-        print_line(made["intro"])
-        print_blocks([block for block in made["blocks"] if block["kind"] in ("table", "text")])
+    for k, made in enumerate(sections):
+        print_section(made, verdict if k == 0 else None)
 
 
 def _data(results: list[CorrelationResult]) -> dict[str, Any]:
@@ -179,4 +201,4 @@ def _predict(steps: list[Path], chirp: Path, out: Path | None, as_json: bool, qu
             }
         )
     else:
-        _show([pages.section(motor, found, chirp.name)])
+        _show([pages.section(motor, found, chirp.name)], None)

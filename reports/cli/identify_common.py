@@ -88,13 +88,12 @@ def finish(
 
 
 def say(common: Common, section: dict[str, Any], written: Path | None, items: Sequence[Item]) -> None:
-    """Print the section, and what was written or why nothing was."""
+    """Print the verdict, the section, and what was written or why nothing was."""
     from analyses.identification.verdict import passed
     from reports.cli.output import print_line
-    from reports.terminal import print_blocks
+    from reports.terminal import print_section
 
-    print_line(section["intro"])
-    print_blocks([b for b in section["blocks"] if b["kind"] in ("table", "text", "verdicts")])
+    print_section(section, passed(items))
     if written is not None:
         print_line(f"design written: {written}" + ("" if passed(items) else " (accepted, a check failed)"))
     elif not passed(items):

@@ -47,4 +47,9 @@ def section(motor: VoltageMotor, found: ChirpPrediction, record: str) -> dict[st
     made = doc.table(
         "Prediction of the chirp by the motor fitted to the step; last row: all of it", columns, rows
     )
-    return doc.section("chirp", f"Prediction of {record}", [made, signal_figure(whole)], intro=intro)
+    result = (
+        f"Speed over the chirp predicted within {100.0 * whole.relative_error:.3g} % by the motor fitted to "
+        f"the step, up to {found.law.frequency_hz(found.law.end_s):.3g} Hz."
+    )
+    figure = signal_figure(whole)
+    return doc.section("chirp", f"Prediction of {record}", [made, figure], result=result, intro=intro)

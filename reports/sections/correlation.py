@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from analyses.correlation.summary import summarise, worst_of
 from reports import document as doc
 from reports.document import rounded
+from reports.numbers import show
 from reports.sections.identification_inputs import finding_table, result_input_table
 from reports.sections.thinning import kept_rows
 
@@ -28,8 +29,10 @@ NAMES = {
 }
 
 
-def section(result: CorrelationResult, number: int = 1) -> dict[str, Any]:
-    """Make the section of one record."""
+def section(
+    result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
+) -> dict[str, Any]:
+    """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
     figures = [signal_figure(signal) for signal in result.signals]
     active = {name: share for name, share in result.limits.items() if share > 0.0}
     limits = ", ".join(f"{name} {100.0 * share:.1f} % of the time" for name, share in active.items())
@@ -44,17 +47,51 @@ def section(result: CorrelationResult, number: int = 1) -> dict[str, Any]:
         finding_table(result.record, result.findings),
         *[doc.text(note) for note in result.notes],
     ]
-    wrong = any(finding.passed is False for finding in result.findings)
+    judged = verdict([result], error_limit)
     return doc.section(
         f"correlation-{number}",
         f"Model against {result.record}",
         blocks,
+        result=words([result], error_limit),
         intro=intro,
-        status="fail" if wrong else "info",
+        status="info" if judged is None else "pass" if judged else "fail",
     )
 
 
-def summary_section(results: Sequence[CorrelationResult]) -> dict[str, Any]:
+def verdict(results: Sequence[CorrelationResult], error_limit: float | None) -> bool | None:
+    """Whether records and errors are in order; None where neither contradicts nor is judged."""
+    if any(finding.passed is False for result in results for finding in result.findings):
+        return False
+    if error_limit is None:
+        return None
+    return all(signal.relative_error <= error_limit for result in results for signal in result.signals)
+
+
+def words(results: Sequence[CorrelationResult], error_limit: float | None = None) -> str:
+    """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
+    wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
+    parts = [f"{record}: {found.subject}: {found.text}." for record, found in wrong[:2]]
+    result, motion = worst_of(results)
+    where = f" ({result.record})" if len(results) > 1 else ""
+    parts.append(
+        f"{NAMES.get(motion.name, motion.name)} of the model within "
+        f"{show(100.0 * motion.relative_error, 'sig:3')} % of the measured{where}, "
+        f"rms {show(motion.rms_error, 'sig:3')} {motion.unit}, "
+        f"largest {show(motion.max_error, 'sig:3')} {motion.unit}."
+    )
+    far = max((s for r in results for s in r.signals), key=lambda s: s.relative_error)
+    if far.name != motion.name:
+        share = show(100.0 * far.relative_error, "sig:3")
+        parts.append(f"Furthest off: {NAMES.get(far.name, far.name).lower()}, {share} %.")
+    if error_limit is not None:
+        over = far.relative_error > error_limit
+        parts.append(f"{'Above' if over else 'Within'} the limit of {100.0 * error_limit:g} %.")
+    return " ".join(parts)
+
+
+def summary_section(
+    results: Sequence[CorrelationResult], *, error_limit: float | None = None
+) -> dict[str, Any]:
     """Make the section of all records together: a table with a row for all, and the worst one's figure."""
     columns = [
         doc.column("name", "Signal"),
@@ -76,7 +113,12 @@ def summary_section(results: Sequence[CorrelationResult]) -> dict[str, Any]:
     figure["caption"] = f"The worst record, {result.record}. {figure['caption']}"
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
     table = doc.table("All records", columns, rows)
-    return doc.section("correlation", "All records", [table, figure], intro=intro)
+    judged = verdict(results, error_limit)
+    status = "info" if judged is None else "pass" if judged else "fail"
+    return doc.section(
+        "correlation", "All records", [table, figure],
+        result=words(results, error_limit), intro=intro, status=status,
+    )  # fmt: skip
 
 
 def _summary_row(label: str, record: str, signal: SignalComparison | SignalSummary) -> dict[str, Any]:
@@ -102,7 +144,7 @@ def comparison_table(result: CorrelationResult) -> dict[str, Any]:
         doc.column("largest", "Largest error", format="sig:3"),
         doc.column("unit", "Unit"),
         doc.column("at", "at", "s", format="fix:3"),
-        doc.column("delay", "Measured later by", "ms", format="fix:3"),
+        doc.column("delay", "Measured lags by", "ms", format="fix:3"),
     ]
     rows = [
         {
@@ -119,9 +161,8 @@ def comparison_table(result: CorrelationResult) -> dict[str, Any]:
         for s in result.signals
     ]
     note = (
-        "Relative error: norm of the difference over norm of the measured. Fit: 100 % less the same over "
-        "the norm about "
-        "the mean."
+        "Relative error: norm of the difference over the norm of the measured signal. Fit: 100 % minus the "
+        "norm of the difference over that of the measured signal without its mean (normalised rms fit)."
     )
     return doc.table(f"{result.design} against {result.record}", columns, rows, note)
 

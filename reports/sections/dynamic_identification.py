@@ -8,12 +8,18 @@ import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
-from reports.sections.identification_inputs import finding_table, input_table, verdict_block
+from reports.numbers import show
+from reports.sections.identification_inputs import (
+    finding_table,
+    input_table,
+    verdict_block,
+    verdict_words,
+)
 
 if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
     from analyses.identification.electrical import ElectricalFit
-    from analyses.identification.inverse import JointModel
+    from analyses.identification.joint_model import JointModel
 
 LABELS = {
     "inertia": ("Inertia, all at the motor", "kg m²", "Mass", "kg"),
@@ -52,8 +58,26 @@ def section(result: BenchResult, axis: str) -> dict[str, Any]:
     blocks.append(_figure(result.model, axis))
     status = "pass" if result.passed else "fail"
     return doc.section(
-        "dynamic-identification", "Dynamic identification", blocks, intro=_intro(result), status=status
-    )
+        "dynamic-identification", "Dynamic identification", blocks,
+        result=_result(result, axis), intro=_intro(result), status=status,
+    )  # fmt: skip
+
+
+def _result(result: BenchResult, axis: str) -> str:
+    """The values that matter with their standard errors, and how the written design meets its records."""
+    model = result.model
+    main = [n for n in model.names if n.partition("_")[0] in ("inertia", "dry", "viscous") or n == "map_0"]
+    parts = []
+    for name in main[:3]:
+        label, unit = _label(name, axis)
+        std = float(np.sqrt(model.covariance[model.names.index(name), model.names.index(name)]))
+        value = f"{show(model[name], 'sig:4')} ± {show(std, 'sig:2')} {unit}"
+        parts.append(f"{label.partition(',')[0].lower()} {value}")
+    worst = max(result.resimulated, key=lambda one: one.relative_error)
+    met = "The written design meets "
+    met += "its records" if len(result.resimulated) > 1 else worst.record
+    words = f"{', '.join(parts)}. {met} within {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    return verdict_words(result.items, words[0].upper() + words[1:])
 
 
 def _intro(result: BenchResult) -> str:
@@ -86,8 +110,8 @@ def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
     columns = [
         doc.column("name", "Parameter"),
         doc.column("value", "Value", format="sig:7"),
-        doc.column("white", "Standard error, white", format="sig:4"),
-        doc.column("std", "as it is", format="sig:3"),
+        doc.column("white", "Standard error, white residuals", format="sig:4"),
+        doc.column("std", "Standard error", format="sig:3"),
         doc.column("unit", "Unit"),
     ]
     rows: list[dict[str, Any]] = []
@@ -103,8 +127,9 @@ def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
             }
         )
     note = (
-        "White: as if the residuals were white, as is usually published. As it is: with their correlation in "
-        "time, and with the scatter between records where there are several; this one goes into the design."
+        "White residuals: ordinary least squares, as is usually published. Standard error: with the "
+        "autocorrelation of the residuals, and the scatter between records where there are several; this one "
+        "goes into the design."
     )
     return doc.table("Identified parameters", columns, rows, note)
 
@@ -161,8 +186,8 @@ def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
         doc.column("breaks", f"Break points, {unit}"),
         doc.column("parameters", "Parameters", format="short:3"),
         doc.column("residual", "Relative residual", "%", format="sig:4"),
-        doc.column("criterion", "Criterion", format="fix:1"),
-        doc.column("taken", "Taken"),
+        doc.column("criterion", "BIC difference", format="fix:1"),
+        doc.column("taken", "Chosen"),
     ]
     rows = [
         {
@@ -176,8 +201,8 @@ def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
         for law in result.laws
     ]
     note = (
-        "Criterion: n ln(mean square of the residual) + p ln n (Bayesian information criterion), n the rows "
-        "worth one independent one, less that of the plain law. A map is taken where it is below -6."
+        "BIC (Bayesian information criterion): n ln(mean square residual) + p ln n, n the effective number "
+        "of independent rows; the difference is to the plain law. A map is chosen where it is below -6."
     )
     return doc.table("Friction laws", columns, rows, note)
 
@@ -187,16 +212,16 @@ def fixed_blocks(model: JointModel, axis: str) -> list[dict[str, Any]]:
     if not model.fixed:
         return []
     columns = [
-        doc.column("name", "Not fitted"),
-        doc.column("value", "Held at", format="sig:5"),
+        doc.column("name", "Parameter"),
+        doc.column("value", "Fixed at", format="sig:5"),
         doc.column("unit", "Unit"),
-        doc.column("why", "Why"),
+        doc.column("why", "Reason"),
     ]
     rows = []
     for name, one in model.fixed.items():
         label, unit = _label(name, axis)
         rows.append({"name": label, "value": one.value, "unit": unit, "why": one.reason})
-    return [doc.table("Parameters that were held", columns, rows)]
+    return [doc.table("Fixed parameters", columns, rows)]
 
 
 def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
@@ -214,10 +239,10 @@ def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
         own = {f"r{k}": value for k, value in enumerate(model.singles.get(name, ())[:6])}
         rows.append({"name": label, "between": model.between[name], "unit": unit, **own})
     note = (
-        "Standard deviation of one record beyond its own error. What a record does not tell alone is held at "
-        "the joint value there."
+        "Scatter: standard deviation between records beyond the error of each. A parameter that one record "
+        "does not determine is fixed at its joint value there."
     )
-    return doc.table("Records alone", columns, rows, note)
+    return doc.table("Fits of single records", columns, rows, note)
 
 
 def _figure(model: JointModel, axis: str) -> dict[str, Any]:

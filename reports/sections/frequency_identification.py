@@ -8,7 +8,13 @@ import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
-from reports.sections.identification_inputs import finding_table, input_table, verdict_block
+from reports.numbers import show
+from reports.sections.identification_inputs import (
+    finding_table,
+    input_table,
+    verdict_block,
+    verdict_words,
+)
 
 if TYPE_CHECKING:
     from analyses.identification.frequency_bench import FrequencyResult
@@ -35,7 +41,20 @@ def section(result: FrequencyResult) -> dict[str, Any]:
         f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
     )
     status = "pass" if result.passed else "fail"
-    return doc.section("frequency-identification", "Two-mass drive", blocks, intro=intro, status=status)
+    words = _result(result)
+    return doc.section(
+        "frequency-identification", "Two-mass drive", blocks, result=words, intro=intro, status=status
+    )
+
+
+def _result(result: FrequencyResult) -> str:
+    fit = result.fit
+    low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
+    stiffness = f"{show(fit['stiffness'], 'sig:4')} ± {show(fit.std('stiffness'), 'sig:2')} N m/rad"
+    words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {stiffness}"
+    if result.play is not None:
+        words += f", play {2e3 * result.play.half_rad:.3g} mrad"
+    return verdict_words(result.items, f"{words}.")
 
 
 def parameter_table(result: FrequencyResult) -> dict[str, Any]:
@@ -59,7 +78,7 @@ def parameter_table(result: FrequencyResult) -> dict[str, Any]:
         }
         for label, unit, value, std in values_of(result)
     ]
-    note = "A value without an error was held: as asked, or at zero, being within twice its error of it."
+    note = "A value without an error was fixed: as asked, or at zero where it was within twice its error."
     return doc.table("Identified two-mass drive", columns, rows, note)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
+from reports.numbers import show
 from reports.sections.identification_figures import (
     NAMES,
     region_figure,
@@ -16,7 +17,7 @@ from reports.sections.identification_figures import (
     surface_figure,
     window_figures,
 )
-from reports.sections.identification_inputs import campaign_table, verdict_block
+from reports.sections.identification_inputs import campaign_table, verdict_block, verdict_words
 
 if TYPE_CHECKING:
     from analyses.campaign_design import CampaignSuggestion
@@ -58,7 +59,20 @@ def section(
     blocks += [*account_blocks(result), campaign_table(result)]
     blocks.append(doc.details("Every run", [run_table(result)]))
     status = "fail" if any(item.passed is False for item in items) else "info"
-    return doc.section("identification", "Identified friction", blocks, intro=_intro(result), status=status)
+    words = verdict_words(items, _result(fit))
+    return doc.section(
+        "identification", "Identified friction", blocks, result=words, intro=_intro(result), status=status
+    )
+
+
+def _result(fit: SurfaceFit) -> str:
+    parts = []
+    for k, (unit, scale) in enumerate(SHOWN):
+        value = show(float(fit.values[k]) * scale, "sig:4")
+        std = show(float(fit.standard_errors[k]) * scale, "sig:2")
+        told = f"{value} {unit} (fixed)" if NAMES[k] in fit.held else f"{value} ± {std} {unit}"
+        parts.append(f"{NAMES[k]} = {told}")
+    return f"{', '.join(parts)}, from {len(fit.points)} runs."
 
 
 def _intro(result: CampaignResult) -> str:
@@ -82,7 +96,7 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
         doc.column("low", "95 % from", format="sig:5"),
         doc.column("high", "to", format="sig:5"),
         doc.column("unit", "Unit"),
-        doc.column("scatter", "of it scatter", "%", format="fix:0"),
+        doc.column("scatter", "Share of scatter", "%", format="fix:0"),
         doc.column("c0", "r with C0", format="fix:2"),
         doc.column("cv", "r with Cv", format="fix:2"),
     ]
@@ -134,7 +148,7 @@ def contribution_table(shares: Sequence[Contribution], load_Nm: float, speed_rad
 
 def shared_table(fit: SurfaceFit) -> dict[str, Any]:
     """What the bound of each shared error does to each coefficient."""
-    columns = [doc.column("name", "Shared error, at its bound")]
+    columns = [doc.column("name", "Systematic error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
     rows = [
         {"name": name, **{n: 100.0 * s / v for n, s, v in zip(NAMES, shift, fit.values, strict=True) if v}}
@@ -144,7 +158,7 @@ def shared_table(fit: SurfaceFit) -> dict[str, Any]:
         f"Scatter between runs beyond their own noise: {1e6 * fit.run_scatter_Nm:.2g} µN m; "
         f"Birge ratio without it {fit.birge_ratio:.2f} (1: the noise explains the residuals)."
     )
-    return doc.table("Errors that all runs share", columns, rows, note)
+    return doc.table("Systematic errors", columns, rows, note)
 
 
 def law_table(laws: RicherLaws) -> dict[str, Any]:
@@ -182,7 +196,7 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
         doc.column("order", "Run"),
         doc.column("speed", "Speed", "rad/s", format="fix:1"),
         doc.column("load", "Load", "N m", format="fix:2"),
-        doc.column("remaining", "Random variance left", "%", format="fix:1"),
+        doc.column("remaining", "Random variance remaining", "%", format="fix:1"),
     ]
     rows = _grouped(suggestion)
     note = ""
@@ -196,7 +210,7 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
         doc.column("label", "Margin"),
         doc.column("value", "Value", format="sig:4"),
         doc.column("std", "Standard deviation", format="sig:2"),
-        doc.column("floor", "of it shared errors", format="sig:2"),
+        doc.column("floor", "Systematic part", format="sig:2"),
         doc.column("unit", "Unit"),
     ]
     spread = [

@@ -127,6 +127,17 @@ def finding_table(record: str, findings: Sequence[Finding]) -> dict[str, Any]:
     return doc.table(f"Does {record} agree with itself and the design?", columns, rows)
 
 
+def verdict_words(items: Sequence[Item], found: str) -> str:
+    """One sentence: what was found, or which checks fail and why."""
+    wrong = [item for item in items if item.passed is False]
+    if not wrong:
+        return found
+    first = wrong[0]
+    why = f": {first.reason}" if first.reason else ""
+    more = f" ({len(wrong) - 1} more of {len(items)} checks fail)" if len(wrong) > 1 else ""
+    return f"{first.label} fails{why}{more}. {found}"
+
+
 def verdict_block(items: Sequence[Item]) -> dict[str, Any]:
     """The verdict, item by item; shares in per cent."""
     made = []

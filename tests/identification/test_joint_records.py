@@ -87,7 +87,7 @@ def test_a_value_can_be_held(files: dict[str, str], capsys: pytest.CaptureFixtur
     status, out, _ = _run(capsys, *common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
     found = json.loads(out)
     assert status == 0
-    assert found["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked"}
+    assert found["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}}
     assert found["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
     for wrong, reason in (
         ("friction.load_coefficient", "KEY=VALUE is wanted"),
@@ -105,7 +105,8 @@ def test_one_direction_says_what_it_cannot_tell_apart(
     status, out, _ = _run(capsys, "identify", files["one way"], "--design", "ilr33-amber", "--json")
     found = json.loads(out)
     assert status == 0
-    assert found["fixed"]["offset"]["reason"] == "cannot be told from dry: the design's value kept"
+    told = "cannot be told from dry: the design's value kept; an error of it moves dry by -1 times it"
+    assert found["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
         value, std = (found["parameters"][name][key] for key in ("value", "standard_error_correlated"))
         assert value == pytest.approx(truth, rel=0.03)

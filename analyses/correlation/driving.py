@@ -1,0 +1,254 @@
+"""What drives the model over a record: the command and its stage, the load, the supply, the first state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Command as CommandShape
+from actuator_lti.design.model import Controller, Design
+from actuator_lti.errors import InputError
+from analyses.records.record import Record
+
+if TYPE_CHECKING:
+    from nonlinear import State
+    from nonlinear.commands import Command
+    from nonlinear.loads import LoadMoment
+
+FloatArray = NDArray[np.float64]
+
+LOADS = {"rotary": "torque", "linear": "load_force"}
+STAGES = ("position", "velocity", "current", "voltage")
+COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("rotary", "position"): ("reference",),
+    ("linear", "position"): ("position_reference",),
+    ("rotary", "velocity"): ("speed_reference",),
+    ("linear", "velocity"): ("velocity_reference",),
+    ("rotary", "current"): ("current_reference", "torque_reference"),
+    ("linear", "current"): ("current_reference", "force_reference"),
+    ("rotary", "voltage"): ("voltage_reference",),
+    ("linear", "voltage"): ("voltage_reference",),
+}
+"""The signals that command a drive, by its axis and the stage that they go into."""
+IN_MOTION = 0.02
+FIRST_ROWS = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """What a record commands: the signal, the stage it goes into, values as the simulator takes them.
+
+    ``design`` is the drive from that stage on: a record of a current command has no speed loop acting.
+    """
+
+    signal: str
+    stage: str
+    values: FloatArray
+    design: Design
+    notes: tuple[str, ...] = ()
+
+
+def command_names(design: Design) -> dict[str, str]:
+    """Every signal that may command a design's drive, and its stage; the outermost first."""
+    loops = design.controller.stages
+    stages = [stage for stage in STAGES if stage in loops or stage == "voltage"]
+    return {name: stage for stage in stages for name in COMMANDS[design.axis, stage]}
+
+
+def command_of(design: Design, record: Record, signal: str | None = None) -> Driven | None:
+    """The command of a record: the outermost one that it holds, or the ``signal`` that is asked for.
+
+    Parameters
+    ----------
+    signal : str, optional
+        A command that the record holds, or ``"voltage"``: the motor is then driven by its measured voltage.
+
+    Returns
+    -------
+    Driven or None
+        None where the record holds no command.
+
+    Raises
+    ------
+    InputError
+        For a signal that is no command of this drive, or that the record does not hold.
+    """
+    names = command_names(design)
+    if signal is not None:
+        allowed = names | {"voltage": "voltage"}
+        if signal not in allowed:
+            raise InputError(f'command "{signal}": one of {", ".join(allowed)}', where=design.name)
+        return _driven(design, record, signal, allowed[signal])
+    found = next((name for name in names if name in record.signals), None)
+    return None if found is None else _driven(design, record, found, names[found])
+
+
+def needed_command(design: Design, record: Record, signal: str | None = None) -> Driven:
+    """As `command_of`, refused where there is none."""
+    driven = command_of(design, record, signal)
+    if driven is None:
+        first, *others = command_names(design)
+        more = f" (or {', '.join(others)})" if others else ""
+        message = f'no command: the signal "{first}" is needed for a {design.axis} axis{more}'
+        raise InputError(message, where=record.name)
+    return driven
+
+
+def _driven(design: Design, record: Record, signal: str, stage: str) -> Driven:
+    outermost = design.controller.outermost
+    values, notes = record[signal], []
+    if signal == "speed_reference":
+        values = values / design.total_ratio
+    elif signal in ("torque_reference", "force_reference"):
+        constant = design.effective_motor.torque_constant_Nm_A
+        if constant is None:
+            raise InputError(f"{signal}: needs motor.torque_constant", where=design.name)
+        values = values / constant
+        notes.append(f"command: {signal.replace('_', ' ')} over kM = {constant:g}")
+    if stage != outermost:
+        notes.append(f"command: {signal.replace('_', ' ')}; the loops outside the {stage} do not act")
+        design = replace(design, controller=_from(design.controller, stage), command=CommandShape())
+    return Driven(
+        signal=signal, stage=stage, values=np.asarray(values, float), design=design, notes=tuple(notes)
+    )
+
+
+def _from(controller: Controller, stage: str) -> Controller:
+    """The cascade from a stage on."""
+    outside = STAGES[: STAGES.index(stage)]
+    return replace(controller, **dict.fromkeys(outside))  # type: ignore[arg-type]
+
+
+def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
+    """Times and values of the command at the drive's ticks.
+
+    Linear between the samples; a jump between two stretches that stand still is a step of the command, and
+    comes with the later sample.
+    """
+    period = driven.design.controller.period_s
+    ticks = np.arange(round(duration_s / period) + 1) * period
+    values = np.interp(ticks, time_s, driven.values)
+    before = np.clip(np.searchsorted(time_s, ticks + 1e-6 * period, side="right") - 1, 0, len(time_s) - 1)
+    step = steps_of(driven.values)[np.minimum(before, len(time_s) - 2)] & (before < len(time_s) - 1)
+    return ticks, np.where(step, driven.values[before], values)
+
+
+def steps_of(values: FloatArray) -> NDArray[np.bool_]:
+    """For each interval between two samples, whether the values jump there from standstill to standstill.
+
+    Examples
+    --------
+    >>> steps_of(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
+    [False, True, False, False, False, False, False]
+    """
+    moves = np.diff(values) != 0.0
+    around = np.concatenate([[False], moves, [False]])
+    return np.asarray(moves & ~around[:-2] & ~around[2:])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supplied:
+    """The bus voltage over time, and whether the controller's output is a share of it."""
+
+    voltage: Command
+    scales: bool
+    note: str
+
+
+def supply_of(driven: Driven, record: Record, time_s: FloatArray) -> Supplied | None:
+    """The recorded supply as the simulator takes it; None without one, or for an ideal source.
+
+    It limits the voltage. Where a loop sets the voltage itself (no current loop), that voltage is a duty
+    ratio of the bus, so the supply scales it too: the loop's gain is the design's at ``limits.voltage``. A
+    command in volts is taken as volts.
+    """
+    from nonlinear import commands
+
+    design = driven.design
+    if "supply" not in record.signals or design.effective_motor.source_gain_Nm_V is not None:
+        return None
+    values = record["supply"]
+    scales = bool(
+        design.controller.stages and design.controller.current is None and isfinite(design.limits.voltage_V)
+    )
+    part = " and scales the loop's voltage" if scales else ""
+    note = f"supply: {values.min():.4g} to {values.max():.4g} V over time, limits the voltage{part}"
+    series = commands.sampled(time_s, values, where=record.name)
+    return Supplied(voltage=series, scales=scales, note=note)
+
+
+def load_of(
+    design: Design, record: Record, time_s: FloatArray, notes: list[str]
+) -> tuple[Design, LoadMoment]:
+    """The recorded load, which holds all of it; without one, the design's own slope and gravity act."""
+    from nonlinear import loads
+
+    name, own = LOADS[design.axis], []
+    if design.load.moment_slope_Nm_rad:
+        own.append("load.moment_slope")
+    if design.load.gravity is not None:
+        own.append("load.gravity")
+    if name not in record.signals:
+        notes.extend(f"load: the design's {key} acts" for key in own)
+        return design, loads.constant(0.0)
+    notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
+    bare = replace(design, load=replace(design.load, gravity=None, moment_slope_Nm_rad=0.0))
+    return bare, loads.series(time_s, record[name], where=record.name)
+
+
+def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArray]) -> tuple[State, State]:
+    """The state at the record's first sample: at rest there, or in the motion that the first samples show.
+
+    In motion, or with a current, the controllers are settled: their integrals hold what is needed for it.
+    """
+    from nonlinear import State
+
+    design = driven.design
+    ratio, motor = design.total_ratio, design.effective_motor
+    place = 0.0
+    for name in ("angle", "output_angle", "position"):
+        if name in measured:
+            place = float(measured[name][0]) * (1.0 if name == "angle" else ratio)
+            break
+    rest, speed = State(motor_angle_rad=place), _first_speed(design, measured)
+    current = float(np.median(record["current"][:FIRST_ROWS])) if "current" in record.signals else 0.0
+    if motor.source_gain_Nm_V is not None or (speed == 0.0 and not _holds(record)):
+        current = 0.0
+    if speed == 0.0 and current == 0.0:
+        return rest, rest
+    volts = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * speed
+    cascaded = design.controller.current is not None
+    first = float(driven.values[0])
+    return rest, State(
+        motor_angle_rad=place,
+        motor_speed_rad_s=speed,
+        current_A=current,
+        current_integral_V=volts if cascaded else 0.0,
+        velocity_integral=current if cascaded else volts,
+        speed_command_rad_s=ratio * first if driven.stage == "velocity" else speed,
+        current_command_A=first if driven.stage == "current" else current,
+        voltage_V=first if driven.stage == "voltage" else volts,
+    )
+
+
+def _first_speed(design: Design, measured: Mapping[str, FloatArray]) -> float:
+    """Motor speed of the first rows, 0 where the record begins at rest."""
+    for name, factor in (("speed", 1.0), ("velocity", design.total_ratio)):
+        if name in measured:
+            values = measured[name]
+            first = float(np.median(values[:FIRST_ROWS]))
+            return factor * first if abs(first) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
+    return 0.0
+
+
+def _holds(record: Record) -> bool:
+    """Whether a current flows in the first rows: above a tenth of the largest."""
+    if "current" not in record.signals:
+        return False
+    values = np.abs(record["current"])
+    return bool(np.median(values[:FIRST_ROWS]) > 0.1 * float(np.max(values)))

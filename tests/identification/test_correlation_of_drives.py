@@ -1,0 +1,167 @@
+"""Records of every kind of drive against the design that made them, and against one that did not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design
+from actuator_lti.design.model import Coupling, Design, FrictionPoint, Gravity, LoadFriction, PositionLoop
+from actuator_lti.errors import InputError
+from analyses.correlation import correlate_record
+from analyses.correlation.driving import command_of
+from analyses.records import open_record
+from nonlinear import Trajectory, commands, loads, simulate
+from nonlinear.commands import Command
+
+ROTARY = {
+    "angle [rad]": "motor_angle_rad",
+    "output_angle [rad]": "output_angle_rad",
+    "speed [rad/s]": "motor_speed_rad_s",
+    "current [A]": "current_A",
+    "voltage [V]": "voltage_V",
+}
+SIGNALS = {"angle", "output_angle", "speed", "current", "voltage"}
+
+
+def _from(design: Design, **outside: None) -> Design:
+    return replace(design, controller=replace(design.controller, **outside))
+
+
+BASE = load_design("ilr33-amber")
+SPEED = _from(BASE, position=None)
+TORQUE = _from(SPEED, velocity=None)
+VOLTAGE = _from(TORQUE, current=None)
+WIDE = replace(
+    BASE,
+    coupling=Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.05, play_rad=1e-3),
+    load=replace(BASE.load, path="back-drivable", friction=LoadFriction(dry_torque_Nm=0.1)),
+)
+MAPPED = replace(
+    BASE,
+    friction=replace(
+        BASE.friction,
+        points=tuple(
+            FrictionPoint(speed_rad_s=w, torque_Nm=t) for w, t in ((0.0, 0.02), (40.0, 0.012), (400.0, 0.02))
+        ),
+    ),
+)
+DIRECT = replace(
+    _from(BASE, velocity=None, current=None),
+    controller=replace(
+        BASE.controller, current=None, velocity=None, position=PositionLoop(gain=0.05), computing_delay_s=0.0
+    ),
+)
+
+
+def _record(path: Path, run: Trajectory, columns: dict[str, str], **more: np.ndarray) -> Path:
+    table = {"time_s": run.time_s, **{name: getattr(run, key) for name, key in columns.items()}, **more}
+    np.savetxt(path, np.column_stack(list(table.values())), delimiter=",", header=",".join(table),
+               comments="", fmt="%.17g")  # fmt: skip
+    return path
+
+
+def _swing(peak: float, hz: float = 3.0) -> Command:
+    return commands.sine(peak, hz)
+
+
+@pytest.mark.parametrize(
+    ("design", "column", "command", "factor"),
+    [
+        (BASE, "reference [rad]", _swing(0.03), 1.0),
+        (SPEED, "speed_reference [rad/s]", _swing(0.8), SPEED.total_ratio),
+        (TORQUE, "current_reference [A]", _swing(6.0), 1.0),
+        (TORQUE, "torque_reference [Nm]", _swing(6.0), BASE.effective_motor.torque_constant_Nm_A or 0.0),
+        (VOLTAGE, "voltage_reference [V]", _swing(6.0), 1.0),
+        (WIDE, "reference [rad]", _swing(0.03), 1.0),
+        (MAPPED, "reference [rad]", _swing(0.03), 1.0),
+        (DIRECT, "reference [rad]", _swing(0.03), 1.0),
+    ],
+    ids=["position", "speed", "current", "torque", "voltage", "two masses", "friction map", "voltage servo"],
+)
+def test_a_record_meets_the_drive_that_made_it(
+    design: Design, column: str, command: Command, factor: float, tmp_path: Path
+) -> None:
+    """Every signal to rounding, as the command is recorded at each tick; another friction is seen."""
+    run = simulate(design, command, 0.5)
+    _record(tmp_path / "r.csv", run, ROTARY, **{column: factor * run.reference_rad})
+    record = open_record(tmp_path / "r.csv")
+    result = correlate_record(design, record)
+    assert {signal.name for signal in result.signals} == SIGNALS
+    for signal in result.signals:
+        assert signal.relative_error < 1e-7, signal.name
+    viscous = design.friction.viscous_Nms_rad + 1e-4
+    other = replace(design, friction=replace(design.friction, viscous_Nms_rad=viscous, points=()))
+    assert max(signal.relative_error for signal in correlate_record(other, record).signals) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("column", "key", "stage"),
+    [
+        ("speed_reference [rad/s]", "speed_command_rad_s", "velocity"),
+        ("current_reference [A]", "current_command_A", "current"),
+        ("voltage_reference [V]", "voltage_V", "voltage"),
+    ],
+)
+def test_an_inner_command_drives_the_loops_inside_it(
+    column: str, key: str, stage: str, tmp_path: Path
+) -> None:
+    """A whole cascade, of which the record holds the command of an inner stage only."""
+    run = simulate(BASE, _swing(0.03), 0.5)
+    _record(tmp_path / "r.csv", run, ROTARY, **{column: getattr(run, key)})
+    record = open_record(tmp_path / "r.csv")
+    driven = command_of(BASE, record)
+    assert driven is not None
+    assert driven.stage == driven.design.controller.outermost == stage
+    result = correlate_record(BASE, record)
+    for signal in result.signals:
+        assert signal.relative_error < 1e-6, signal.name
+    assert any("do not act" in note for note in result.notes)
+
+
+def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path: Path) -> None:
+    run = simulate(BASE, _swing(0.03), 0.5)
+    record = open_record(_record(tmp_path / "r.csv", run, ROTARY))
+    with pytest.raises(InputError, match='no command: the signal "reference" is needed'):
+        correlate_record(BASE, record)
+    result = correlate_record(BASE, record, command="voltage")
+    assert "voltage" not in {signal.name for signal in result.signals}
+    assert result["speed"].relative_error < 1e-6
+    with pytest.raises(InputError, match=r'command "speed": one of reference, speed_reference'):
+        correlate_record(BASE, record, command="speed")
+
+
+@pytest.mark.parametrize(("design", "scales"), [(BASE, False), (DIRECT, True)], ids=["cascade", "duty ratio"])
+def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_path: Path) -> None:
+    """The bus sags to a third: with its median instead, the model would be off by more than 5 %."""
+    time = np.arange(0.0, 0.6, 1e-4)
+    bus = 12.0 - 8.0 * np.clip(np.sin(15.0 * time), 0.0, 1.0)
+    supply = commands.sampled(time, bus)
+    run = simulate(design, _swing(0.06, 5.0), 0.5, supply=supply, supply_scales=scales)
+    more = {"reference [rad]": run.reference_rad, "supply [V]": np.interp(run.time_s, time, bus)}
+    record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more))
+    result = correlate_record(design, record)
+    for signal in result.signals:
+        assert signal.relative_error < 1e-6, signal.name
+    flat = dict(record.signals) | {"supply": np.full(len(record), np.median(record["supply"]))}
+    assert correlate_record(design, replace(record, signals=flat))["voltage"].relative_error > 0.05
+
+
+def test_a_pendulum_that_begins_in_motion_under_a_speed_loop(tmp_path: Path) -> None:
+    """The record starts late in a run: the state at its first row is found from it, the integral too."""
+    load = replace(BASE.load, path="back-drivable", gravity=Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.0))
+    design = replace(SPEED, load=load)
+    run = simulate(design, commands.ramp(0.6), 0.8, loads.constant(0.5))
+    more = {
+        "speed_reference [rad/s]": design.total_ratio * run.reference_rad,
+        "torque [Nm]": 0.5 + 2.0 * 9.80665 * 0.1 * np.sin(run.output_angle_rad),
+    }
+    record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more)).slice(4000, 8000)
+    result = correlate_record(design, record)
+    for signal in result.signals:
+        assert signal.relative_error < 5e-3, signal.name
+    assert result["speed"].modelled[0] == pytest.approx(record["speed"][0], rel=1e-3)
+    assert result["current"].modelled[0] == pytest.approx(record["current"][0], rel=1e-3)
