@@ -23,6 +23,7 @@ from ._response import (
 )
 
 LISTED = 6  # crossovers of each kind that are kept
+HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's, which an inner loop does not see
 # Columns of a row of figures; crossover lists follow at FIRST_GAIN and FIRST_PHASE (pairs x, value).
 (
     STABLE,

@@ -12,6 +12,7 @@ from ._figures import (
     DC_GAIN,
     FINAL,
     GAIN_CROSSOVERS,
+    HIDDEN,
     PHASE_CROSSOVERS,
     RADIUS,
     STABLE,
@@ -29,7 +30,6 @@ TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated 
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
 POINTS = 600  # angles to start from
 SMOOTH = 0.05
-HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's
 LOG_10 = 2.302585092994046
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from ._compiled import kernel
-from ._figures import FINAL, OVERSHOOT, RADIUS, RISE, SETTLING
+from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
 
 LONGEST = 4_000_000  # ticks
 FOLLOWED = 14.0  # time constants of the slowest pole
@@ -85,7 +85,7 @@ def _ticks_until_alone(n, poles, radius):
         size = math.hypot(poles[2 * n + i], poles[3 * n + i])
         if size == radius and slowest < 0:
             slowest = i
-        else:
+        elif math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) > HIDDEN:
             second = max(second, size)
     if slowest < 0 or poles[3 * n + slowest] != 0.0 or poles[2 * n + slowest] <= 0.0 or second <= 0.0:
         return math.inf
