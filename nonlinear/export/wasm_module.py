@@ -28,7 +28,7 @@ from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
 MOST_BYTES = 100_000
 _NAME, _RECORD = "drive.wasm", "drive.wasm.json"
-_FLAGS = ("-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sections")
+_FLAGS = ("-Os", "-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sections")
 
 
 _ROW: Kind = "row"
