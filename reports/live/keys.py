@@ -24,7 +24,7 @@ UNUSED = "has no influence on the loops or the run that this page follows"
 WHOLE = "a whole number: change it in the design file"
 ZERO = "0 in this design: change it in the design file"
 UNFOLLOWED = "enters through a function that this page does not have: change it in the design file"
-SHARE = 2.0  # a key that is 0 and may not be much more than 1 is a share, and has a slider
+LONGEST = 20.0  # control periods: the range of a time that is 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ def _reason(design: Design, path: str) -> str:
     if field.kind == "integer":
         return WHOLE
     value = parameter_value(design, path)
-    if value <= 0.0 and not (value == 0.0 and field.low == 0.0 and field.high <= SHARE):
+    if value < 0.0 or (value == 0.0 and not _top(design, path)):
         return ZERO
     traced = Traced(Tape(rounding=True), "k", value)
     try:
@@ -77,6 +77,15 @@ def _reason(design: Design, path: str) -> str:
     except TypeError:
         return UNFOLLOWED
     return "" if any(isinstance(row[n], Traced) for n in np.arange(at.SIZE)) else UNUSED
+
+
+def _top(design: Design, path: str) -> float:
+    """Give the upper end of the slider of a key that is 0: a share, or a time; 0 for anything else."""
+    field, _ = located(design, path)
+    unit = field.unit(Structure.of(design))
+    if field.low < 0.0 or unit not in ("1", "s"):
+        return 0.0
+    return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
 
 
 def _named(design: Design, path: str) -> dict[str, Any]:
@@ -110,7 +119,7 @@ def _slider(design: Design, path: str) -> dict[str, Any]:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
     made, value = _named(design, path), parameter_value(design, path)
-    low, high = (0.0, field.high) if value == 0.0 else (value / REACH, min(value * REACH, field.high))
+    low, high = (0.0, _top(design, path)) if value == 0.0 else (value / REACH, min(value * REACH, field.high))
     known = design.parameters.get(path)
     return {
         **made,
