@@ -34,6 +34,8 @@ def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     """
     whole = np.floor(delay_s / period_s + 1e-9)
     rest = delay_s - whole * period_s
+    if hasattr(rest, "zero_below"):  # a key that is followed into the row
+        return whole, rest.zero_below(1e-9 * period_s)
     return whole[()], np.where(np.abs(rest) < 1e-9 * period_s, 0.0, rest)[()]
 
 

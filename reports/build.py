@@ -48,6 +48,7 @@ def design_report(
     """
     from actuator_lti.design import design_hash, warnings_of
     from analyses.isolation import attempt, isolated
+    from reports.live import live_model
     from reports.provenance import provenance
     from reports.sections import answer
 
@@ -67,13 +68,15 @@ def design_report(
         answered = attempt("first screen", lambda: answer.section(figures, items, sections), None)
     first_screen = [answered] if answered and figures else []
     sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
-    return doc.document(
+    made = doc.document(
         title=design.title or design.name,
         subtitle=design.description,
         design=head,
         provenance=origin,
         sections=sections,
     )
+    live = attempt("sliders", lambda: live_model(design), None)
+    return {**made, "live": live} if live and figures else made
 
 
 def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, LoopFigures], list[doc.Section]]:

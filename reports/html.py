@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import itertools
+import json
 from collections.abc import Mapping
 from functools import cache
 from typing import Any
@@ -49,19 +50,40 @@ def page(
         return Markup(drawings[id(block)])
 
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
-    return render(template, doc=made, drawn=drawn, kicker=kicker)
+    return render(template, doc=made, drawn=drawn, kicker=kicker, **_live(made))
+
+
+def _live(made: Mapping[str, Any]) -> dict[str, Any]:
+    """Give what the sliders of a page need: data, module, empty figures; nothing where it has none."""
+    known = made.get("live")
+    if not known or known.get("refused"):
+        return {}
+    from nonlinear.export.wasm_module import kept_wasm
+    from reports.live.charts import live_charts
+
+    # within a script element only "<" could end it; JSON may write it otherwise
+    data = json.dumps(known, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return {
+        "live": Markup(data),
+        "module": base64.b64encode(kept_wasm()).decode(),
+        "live_charts": {name: Markup(drawn) for name, drawn in live_charts().items()},
+    }
 
 
 def render(template: str, **context: Any) -> str:
-    """Fill a template that extends ``base.html``; every page gets the same style, script and policy."""
+    """Fill a template that extends ``base.html``; every page gets the same style, script and policy.
+
+    A page with sliders (``live`` is given) has one script more, and may compile WebAssembly.
+    """
     counter = itertools.count(1)
+    code = script(live="live" in context)
     return (
         environment()
         .get_template(template)
         .render(
             stylesheet=Markup(asset("style.css")),
-            script=Markup(script()),
-            security_policy=security_policy(script()),
+            script=Markup(code),
+            security_policy=security_policy(code, wasm="live" in context),
             verdict_lines=verdict_lines,
             LONG_TABLE=LONG_TABLE,
             unique=lambda letter: f"{letter}{next(counter)}",
@@ -93,14 +115,15 @@ def asset(name: str) -> str:
 
 
 @cache
-def script() -> str:
-    """Give the one script of every page: folds and printing, then the live figures."""
-    return asset("page.js") + asset("live.js")
+def script(*, live: bool = False) -> str:
+    """Give the one script of a page: folds and printing, the live figures, and sliders where it has any."""
+    return asset("page.js") + asset("live.js") + (asset("hands.js") if live else "")
 
 
-def security_policy(*scripts: str) -> str:
+def security_policy(*scripts: str, wasm: bool = False) -> str:
     """Give the page's content security policy: no request at all, and only these scripts run."""
     hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
+    hashes += " 'wasm-unsafe-eval'" if wasm else ""
     return (
         f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {hashes}; base-uri 'none'"
     )

@@ -3,9 +3,10 @@
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from ._compiled import kernel
+from ._complex import distance_at, over, size_at
 from ._response import (
     BANDWIDTH,
     GAIN,
@@ -17,10 +18,12 @@ from ._response import (
     closed_loop,
     evaluate,
     quantity,
+    quantity_at,
     root,
 )
 
 LISTED = 6  # crossovers of each kind that are kept
+HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's, which an inner loop does not see
 # Columns of a row of figures; crossover lists follow at FIRST_GAIN and FIRST_PHASE (pairs x, value).
 (
     STABLE,
@@ -51,27 +54,24 @@ def _list(row, counter, first, x, value):
     if k < LISTED:
         row[first + 2 * k] = x
         row[first + 2 * k + 1] = value
-    row[counter] = k + 1
+    row[counter] = float(k + 1)
 
 
 @kernel
-def _phase_margin(response):
-    return np.arctan2(-response.imag, -response.real)
+def _slope_at(mode, k, xs, rs, ss):
+    """Derivative of the gain's logarithm, or of the sine of the phase, at a scanned point."""
+    gain, turn = over(ss[2 * k], ss[2 * k + 1], rs[2 * k], rs[2 * k + 1])
+    return gain if mode == GAIN else turn * rs[2 * k] / size_at(rs, k)
 
 
 @kernel
 def _hidden(mode, k, xs, rs, ss):
     """Whether the cubic through both ends, of one sign, comes near zero between them."""
-    f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
-    f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
+    f1 = quantity_at(mode, k, xs, rs, ss, 1.0, 0.0)
+    f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
     width = xs[k + 1] - xs[k]
-    d1 = (ss[k] / rs[k]) * width
-    d2 = (ss[k + 1] / rs[k + 1]) * width
-    if mode == GAIN:
-        s1, s2 = d1.real, d2.real
-    else:
-        s1 = d1.imag * rs[k].real / abs(rs[k])
-        s2 = d2.imag * rs[k + 1].real / abs(rs[k + 1])
+    s1 = width * _slope_at(mode, k, xs, rs, ss)
+    s2 = width * _slope_at(mode, k + 1, xs, rs, ss)
     sign = 1.0 if f1 > 0.0 else -1.0
     if not (s1 * sign < 0.0 and s2 * sign > 0.0):
         return False
@@ -79,11 +79,18 @@ def _hidden(mode, k, xs, rs, ss):
     for i in range(1, 16):
         t = i / 16.0
         cubic = (
-            f1 * (1 + 2 * t) * (1 - t) ** 2 + s1 * t * (1 - t) ** 2
-            + f2 * t * t * (3 - 2 * t) + s2 * t * t * (t - 1)
+            f1 * (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t) + s1 * t * (1.0 - t) * (1.0 - t)
+            + f2 * t * t * (3.0 - 2.0 * t) + s2 * t * t * (t - 1.0)
         )  # fmt: skip
         lowest = min(lowest, cubic * sign)
     return lowest < 0.1
+
+
+@kernel
+def _value(mode, x, n, h, b, c, work, state, exchanged):
+    """The quantity of a mode at an angle."""
+    rr, ri, sr, si = evaluate(n, h, b, c, x, work, state, exchanged)
+    return quantity(mode, rr, ri, sr, si, 1.0, 0.0, 0.0)
 
 
 @kernel
@@ -91,25 +98,28 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     """The angle between two scanned points where the quantity of a mode is extreme, by golden section."""
     shrink = 0.6180339887498949
     low, high = xs[k], xs[k + 1]
-    f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
-    sign = 1.0 if f1 > 0.0 else -1.0
+    sign = 1.0 if quantity_at(mode, k, xs, rs, ss, 1.0, 0.0) > 0.0 else -1.0
     left = high - shrink * (high - low)
     right = low + shrink * (high - low)
-    r, s = evaluate(n, h, b, c, left, work, state, exchanged)
-    f_left = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
-    r, s = evaluate(n, h, b, c, right, work, state, exchanged)
-    f_right = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
-    for _ in range(40):
+    f_left = _value(mode, left, n, h, b, c, work, state, exchanged)
+    f_left *= sign
+    f_right = _value(mode, right, n, h, b, c, work, state, exchanged)
+    f_right *= sign
+    for _round in range(40):
         if f_left < f_right:
-            high, right, f_right = right, left, f_left
+            high = right
+            right = left
+            f_right = f_left
             left = high - shrink * (high - low)
-            r, s = evaluate(n, h, b, c, left, work, state, exchanged)
-            f_left = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
+            f_left = _value(mode, left, n, h, b, c, work, state, exchanged)
+            f_left *= sign
         else:
-            low, left, f_left = left, right, f_right
+            low = left
+            left = right
+            f_left = f_right
             right = low + shrink * (high - low)
-            r, s = evaluate(n, h, b, c, right, work, state, exchanged)
-            f_right = sign * quantity(mode, r, s, 1.0, 0.0, 0.0)
+            f_right = _value(mode, right, n, h, b, c, work, state, exchanged)
+            f_right *= sign
         if min(f_left, f_right) < 0.0:
             break
     return left if f_left < f_right else right
@@ -118,30 +128,30 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
 @kernel
 def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
     """Refine one bracketed gain or phase crossover and list it."""
-    x, response = root(mode, 1.0, 0.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
+    x, rr, ri = root(mode, 1.0, 0.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
     if mode == GAIN:
-        _list(row, GAIN_CROSSOVERS, FIRST_GAIN, x, _phase_margin(response))
-    elif response.real < 0.0:
-        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / response.real)
+        _list(row, GAIN_CROSSOVERS, FIRST_GAIN, x, math.atan2(-ri, -rr))
+    elif rr < 0.0:
+        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / rr)
 
 
 @kernel
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
     for k in range(count - 1):
-        if ss[k + 1] == 0.0:  # lost in rounding
+        if ss[2 * k + 2] == 0.0 and ss[2 * k + 3] == 0.0:  # lost in rounding
             continue
-        f1 = quantity(mode, rs[k], ss[k], 1.0, xs[k], 0.0)
-        f2 = quantity(mode, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
-        if (f1 > 0.0) != (f2 > 0.0):
-            if mode == PHASE and rs[k].real > 0.0 and rs[k + 1].real > 0.0:
+        f1 = quantity_at(mode, k, xs, rs, ss, 1.0, 0.0)
+        f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
+        above, after = f1 > 0.0, f2 > 0.0
+        if (above and not after) or (after and not above):
+            if mode == PHASE and rs[2 * k] > 0.0 and rs[2 * k + 2] > 0.0:
                 continue
             _crossing(mode, xs[k], f1, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
-        elif (mode == GAIN or rs[k].real < 0.0) and _hidden(mode, k, xs, rs, ss):
+        elif (mode == GAIN or rs[2 * k] < 0.0) and _hidden(mode, k, xs, rs, ss):
             x = _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged)
-            r, s = evaluate(n, h, b, c, x, work, state, exchanged)
-            f = quantity(mode, r, s, 1.0, 0.0, 0.0)
-            if (f > 0.0) != (f1 > 0.0):
+            f = _value(mode, x, n, h, b, c, work, state, exchanged)
+            if (f > 0.0 and not above) or (above and not f > 0.0):
                 _crossing(mode, xs[k], f1, x, f, row, n, h, b, c, work, state, exchanged)
                 _crossing(mode, x, f, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
 
@@ -155,36 +165,53 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
     size = 0.0
     for k in range(count):
         if xs[k] > 0.3:
-            size = max(size, abs(rs[k]))
-    if np.isfinite(response_dc) and response_dc < 0.0:
+            size = max(size, size_at(rs, k))
+    if math.isfinite(response_dc) and response_dc < 0.0:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, 0.0, -1.0 / response_dc)
     if response_nyquist < -LOST * size:
-        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, np.pi, -1.0 / response_nyquist)
+        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, math.pi, -1.0 / response_nyquist)
 
 
 @kernel
-def modulus(count, xs, rs, ss, nyquist, row, n, h, b, c, work, state, exchanged):
+def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, state, exchanged):
     """The smallest |1 + L| and where."""
     best = 0
     for k in range(count):
-        if abs(1.0 + rs[k]) < abs(1.0 + rs[best]):
+        if distance_at(rs, k) < distance_at(rs, best):
             best = k
-    row[MODULUS] = abs(1.0 + rs[best])
+    row[MODULUS] = distance_at(rs, best)
     row[MODULUS_X] = xs[best]
-    if abs(1.0 + nyquist) < row[MODULUS]:
-        row[MODULUS] = abs(1.0 + nyquist)
-        row[MODULUS_X] = np.pi
+    at_end = math.hypot(1.0 + nyquist_r, nyquist_i)
+    if at_end < row[MODULUS]:
+        row[MODULUS] = at_end
+        row[MODULUS_X] = math.pi
     limit = 1.3 * row[MODULUS]
     for k in range(count - 1):
-        if min(abs(1.0 + rs[k]), abs(1.0 + rs[k + 1])) > limit:
+        if min(distance_at(rs, k), distance_at(rs, k + 1)) > limit:
             continue
-        f1 = quantity(SENSITIVITY, rs[k], ss[k], 1.0, xs[k], 0.0)
-        f2 = quantity(SENSITIVITY, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], 0.0)
+        f1 = quantity_at(SENSITIVITY, k, xs, rs, ss, 1.0, 0.0)
+        f2 = quantity_at(SENSITIVITY, k + 1, xs, rs, ss, 1.0, 0.0)
         if f1 < 0.0 and f2 >= 0.0:
-            x, r = root(SENSITIVITY, 1.0, 0.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
-            if abs(1.0 + r) < row[MODULUS]:
-                row[MODULUS] = abs(1.0 + r)
+            x, rr, ri = root(
+                SENSITIVITY, 1.0, 0.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
+            )
+            size = math.hypot(1.0 + rr, ri)
+            if size < row[MODULUS]:
+                row[MODULUS] = size
                 row[MODULUS_X] = x
+
+
+@kernel
+def closed_size(rr, ri, x, lead):
+    """|T| of a response."""
+    closed_r, closed_i = closed_loop(rr, ri, x, lead)
+    return math.hypot(closed_r, closed_i)
+
+
+@kernel
+def _closed_at(k, xs, rs, lead):
+    """|T| at a scanned point."""
+    return closed_size(rs[2 * k], rs[2 * k + 1], xs[k], lead)
 
 
 @kernel
@@ -192,21 +219,22 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
     best = 0.0
     for k in range(count):
-        size = abs(closed_loop(rs[k], xs[k], lead))
+        size = _closed_at(k, xs, rs, lead)
         if size > best:
             best = size
             row[PEAK_T_X] = xs[k]
     row[PEAK_T] = best
     for k in range(count - 1):
-        f1 = quantity(RESONANCE, rs[k], ss[k], 1.0, xs[k], lead)
-        f2 = quantity(RESONANCE, rs[k + 1], ss[k + 1], 1.0, xs[k + 1], lead)
+        f1 = quantity_at(RESONANCE, k, xs, rs, ss, 1.0, lead)
+        f2 = quantity_at(RESONANCE, k + 1, xs, rs, ss, 1.0, lead)
         if not (f1 > 0.0 and f2 <= 0.0):
             continue
-        here = abs(closed_loop(rs[k], xs[k], lead))
-        if max(here, abs(closed_loop(rs[k + 1], xs[k + 1], lead))) < 0.7 * best:
+        if max(_closed_at(k, xs, rs, lead), _closed_at(k + 1, xs, rs, lead)) < 0.7 * best:
             continue
-        x, r = root(RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
-        size = abs(closed_loop(r, x, lead))
+        x, rr, ri = root(
+            RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
+        )
+        size = closed_size(rr, ri, x, lead)
         if size > row[PEAK_T]:
             row[PEAK_T] = size
             row[PEAK_T_X] = x
@@ -216,22 +244,26 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
 def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchanged):
     """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
     level = abs(dc)
-    row[BANDWIDTH_X] = np.nan
-    row[QUARTER_X] = np.nan
+    row[BANDWIDTH_X] = math.nan
+    row[QUARTER_X] = math.nan
     if not (level > 0.0):
         return
     for k in range(count - 1):
-        f1 = quantity(BANDWIDTH, rs[k], ss[k], level, xs[k], lead)
-        f2 = quantity(BANDWIDTH, rs[k + 1], ss[k + 1], level, xs[k + 1], lead)
+        f1 = quantity_at(BANDWIDTH, k, xs, rs, ss, level, lead)
+        f2 = quantity_at(BANDWIDTH, k + 1, xs, rs, ss, level, lead)
         if f1 > 0.0 and f2 <= 0.0:
-            x, _ = root(BANDWIDTH, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+            x, _r, _i = root(
+                BANDWIDTH, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
+            )
             row[BANDWIDTH_X] = x
             break
     for k in range(count - 1):
-        f1 = quantity(QUARTER, rs[k], ss[k], level, xs[k], lead)
-        f2 = quantity(QUARTER, rs[k + 1], ss[k + 1], level, xs[k + 1], lead)
-        closed = closed_loop(rs[k], xs[k], lead)
-        if f1 > 0.0 and f2 <= 0.0 and closed.imag < 0.0:
-            x, _ = root(QUARTER, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+        f1 = quantity_at(QUARTER, k, xs, rs, ss, level, lead)
+        f2 = quantity_at(QUARTER, k + 1, xs, rs, ss, level, lead)
+        _closed, side = closed_loop(rs[2 * k], rs[2 * k + 1], xs[k], lead)
+        if f1 > 0.0 and f2 <= 0.0 and side < 0.0:
+            x, _r, _i = root(
+                QUARTER, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
+            )
             row[QUARTER_X] = x
             break

@@ -2,126 +2,192 @@
 
 A loop is ``L(z) = c (z I - A)^-1 b`` with A in upper Hessenberg form; h is A - I, so that near z = 1
 nothing cancels: ``z - 1 = -2 sin(x/2)^2 + j sin x`` at the angle x = w T.  Derivatives are exact.
+Rows are flat; complex numbers are pairs (real part, imaginary part), in rows one after the other.
 """
 
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from ._compiled import kernel
+from ._complex import over, times
 
 GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE = range(6)
 LOST = 1e-12  # of the largest |L| above 0.3 rad: less is rounding, as of a zero at Nyquist
 HALF_LOG_2 = 0.34657359027997264
+CAPACITY = 1200  # points of a scanned response
+DEEPEST = 48  # halvings on the way to one point
+
+
+@kernel
+def _shifted(n, h, b, x, work, state, exchanged):
+    """Write z I - A and b; returns z - 1."""
+    sine = math.sin(0.5 * x)
+    delta_r, delta_i = -2.0 * sine * sine, math.sin(x)
+    for i in range(n):
+        for j in range(max(i - 1, 0), n):
+            work[2 * (i * n + j)] = -h[i * n + j]
+            work[2 * (i * n + j) + 1] = 0.0
+        work[2 * (i * n + i)] += delta_r
+        work[2 * (i * n + i) + 1] = delta_i
+        state[2 * i], state[2 * i + 1] = b[i], 0.0
+        exchanged[i] = 0.0
+    return delta_r, delta_i
+
+
+@kernel
+def _eliminated(n, k, work, state, exchanged):
+    """One step of the elimination, rows k and k + 1 exchanged where that is better."""
+    upper, lower = 2 * (k * n + k), 2 * ((k + 1) * n + k)
+    pivot_r, pivot_i = work[upper], work[upper + 1]
+    below_r, below_i = work[lower], work[lower + 1]
+    factor_r, factor_i = 0.0, 0.0
+    if abs(below_r) + abs(below_i) > abs(pivot_r) + abs(pivot_i):
+        for j in range(2 * (n - k)):
+            kept = work[upper + j]
+            work[upper + j] = work[lower + j]
+            work[lower + j] = kept
+        for j in range(2):
+            kept = state[2 * k + j]
+            state[2 * k + j] = state[2 * k + 2 + j]
+            state[2 * k + 2 + j] = kept
+        factor_r, factor_i = over(pivot_r, pivot_i, below_r, below_i)
+        exchanged[k] = 1.0
+    elif pivot_r != 0.0 or pivot_i != 0.0:
+        factor_r, factor_i = over(below_r, below_i, pivot_r, pivot_i)
+    work[lower], work[lower + 1] = factor_r, factor_i
+    if factor_r == 0.0 and factor_i == 0.0:
+        return
+    for j in range(1, n - k):
+        up_r, up_i = work[upper + 2 * j], work[upper + 2 * j + 1]
+        work[lower + 2 * j] -= factor_r * up_r - factor_i * up_i
+        work[lower + 2 * j + 1] -= factor_r * up_i + factor_i * up_r
+    up_r, up_i = state[2 * k], state[2 * k + 1]
+    state[2 * k + 2] -= factor_r * up_r - factor_i * up_i
+    state[2 * k + 3] -= factor_r * up_i + factor_i * up_r
+
+
+@kernel
+def _substituted(n, c, work, state):
+    """Back substitution in place; returns c times the solution."""
+    response_r, response_i = 0.0, 0.0
+    i = n - 1
+    while i >= 0:
+        total_r, total_i = state[2 * i], state[2 * i + 1]
+        for j in range(i + 1, n):
+            left_r, left_i = work[2 * (i * n + j)], work[2 * (i * n + j) + 1]
+            right_r, right_i = state[2 * j], state[2 * j + 1]
+            total_r -= left_r * right_r - left_i * right_i
+            total_i -= left_r * right_i + left_i * right_r
+        total_r, total_i = over(total_r, total_i, work[2 * (i * n + i)], work[2 * (i * n + i) + 1])
+        state[2 * i], state[2 * i + 1] = total_r, total_i
+        response_r += c[i] * total_r
+        response_i += c[i] * total_i
+        i -= 1
+    return response_r, response_i
+
+
+@kernel
+def _again(n, c, work, state, exchanged):
+    """c (z I - A)^-1 state with the factors that the elimination left behind."""
+    carry_r, carry_i = state[0], state[1]
+    for k in range(n - 1):
+        after_r, after_i = state[2 * k + 2], state[2 * k + 3]
+        if exchanged[k] > 0.5:
+            kept_r, kept_i = carry_r, carry_i
+            carry_r, carry_i = after_r, after_i
+            after_r, after_i = kept_r, kept_i
+        state[2 * k], state[2 * k + 1] = carry_r, carry_i
+        factor_r, factor_i = work[2 * ((k + 1) * n + k)], work[2 * ((k + 1) * n + k) + 1]
+        next_r = after_r - (factor_r * carry_r - factor_i * carry_i)
+        carry_i = after_i - (factor_r * carry_i + factor_i * carry_r)
+        carry_r = next_r
+    state[2 * n - 2], state[2 * n - 1] = carry_r, carry_i
+    total_r, total_i = _substituted(n, c, work, state)
+    return total_r, total_i
 
 
 @kernel
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
-    sine = np.sin(0.5 * x)
-    delta = complex(-2.0 * sine * sine, np.sin(x))
-    for i in range(n):
-        for j in range(max(i - 1, 0), n):
-            work[i, j] = -h[i, j]
-        work[i, i] += delta
-        state[i] = b[i]
-        exchanged[i] = 0.0
+    delta_r, delta_i = _shifted(n, h, b, x, work, state, exchanged)
     for k in range(n - 1):
-        below = work[k + 1, k]
-        pivot = work[k, k]
-        if abs(below.real) + abs(below.imag) > abs(pivot.real) + abs(pivot.imag):
-            for j in range(k, n):
-                work[k, j], work[k + 1, j] = work[k + 1, j], work[k, j]
-            state[k], state[k + 1] = state[k + 1], state[k]
-            work[k + 1, k] = pivot / below
-
-            exchanged[k] = 1.0
-        else:
-            work[k + 1, k] = below / pivot if pivot != 0.0 else 0.0
-        factor = work[k + 1, k]
-        if factor != 0.0:
-            for j in range(k + 1, n):
-                work[k + 1, j] -= factor * work[k, j]
-            state[k + 1] -= factor * state[k]
-    response = 0.0j
-    for i in range(n - 1, -1, -1):
-        total = state[i]
-        for j in range(i + 1, n):
-            total -= work[i, j] * state[j]
-        state[i] = total / work[i, i]
-        response += c[i] * state[i]
-    return response, complex(1.0 + delta.real, delta.imag) * 1j * -_again(n, c, work, state, exchanged)
+        _eliminated(n, k, work, state, exchanged)
+    response_r, response_i = _substituted(n, c, work, state)
+    again_r, again_i = _again(n, c, work, state, exchanged)
+    slope_r, slope_i = times(1.0 + delta_r, delta_i, again_i, -again_r)
+    return response_r, response_i, slope_r, slope_i
 
 
 @kernel
-def _again(n, c, work, state, exchanged):
-    """c (z I - A)^-1 state with the factors that evaluate left behind."""
-    carry = state[0]
-    for k in range(n - 1):
-        after = state[k + 1]
-        if exchanged[k] > 0.5:
-            carry, after = after, carry
-        state[k] = carry
-        carry = after - work[k + 1, k] * carry
-    state[n - 1] = carry
-    total_response = 0.0j
-    for i in range(n - 1, -1, -1):
-        total = state[i]
-        for j in range(i + 1, n):
-            total -= work[i, j] * state[j]
-        state[i] = total / work[i, i]
-        total_response += c[i] * state[i]
-    return total_response
-
-
-@kernel
-def closed_loop(response, x, lead):
+def closed_loop(response_r, response_i, x, lead):
     """T = L/(1 + L) with the feed-forward in front, ``1 + lead (1 - 1/z)``; lead NaN: the response itself."""
-    if np.isnan(lead):
-        return response
-    closed = response / (1.0 + response)
+    if math.isnan(lead):
+        return response_r, response_i
+    closed_r, closed_i = over(response_r, response_i, 1.0 + response_r, response_i)
     if lead != 0.0:
-        closed *= 1.0 + lead * (1.0 - complex(np.cos(x), -np.sin(x)))
-    return closed
+        closed_r, closed_i = times(
+            closed_r, closed_i, 1.0 + lead * (1.0 - math.cos(x)), lead * math.sin(x)
+        )
+    return closed_r, closed_i
 
 
 @kernel
-def quantity(mode, response, slope, level, x, lead):
+def _resonance(response_r, response_i, slope_r, slope_i, x, lead):
+    """d ln|T| / dx."""
+    if math.isnan(lead):
+        value, _unused = over(slope_r, slope_i, response_r, response_i)
+        return value
+    below_r, below_i = times(response_r, response_i, 1.0 + response_r, response_i)
+    value, _unused = over(slope_r, slope_i, below_r, below_i)
+    if lead != 0.0:
+        back_r, back_i = math.cos(x), -math.sin(x)
+        more, _unused = over(
+            -lead * back_i, lead * back_r, 1.0 + lead * (1.0 - back_r), -lead * back_i
+        )
+        value += more
+    return value
+
+
+@kernel
+def quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead):
     """The function whose zero is looked for, from L and dL/dx at x."""
     if mode == GAIN:
-        return np.log(abs(response))
+        return math.log(math.hypot(response_r, response_i))
     if mode == PHASE:
-        return response.imag / abs(response)
+        return response_i / math.hypot(response_r, response_i)
     if mode == SENSITIVITY:
-        return (slope / (1.0 + response)).real
-    if mode == RESONANCE:  # d ln|T| / dx
-        if np.isnan(lead):
-            return (slope / response).real
-        value = (slope / (response * (1.0 + response))).real
-        if lead != 0.0:
-            back = complex(np.cos(x), -np.sin(x))
-            value += (lead * 1j * back / (1.0 + lead * (1.0 - back))).real
+        value, _unused = over(slope_r, slope_i, 1.0 + response_r, response_i)
         return value
-    closed = closed_loop(response, x, lead)
+    if mode == RESONANCE:
+        return _resonance(response_r, response_i, slope_r, slope_i, x, lead)
+    closed_r, closed_i = closed_loop(response_r, response_i, x, lead)
+    size = math.hypot(closed_r, closed_i)
     if mode == BANDWIDTH:
-        return np.log(abs(closed) / level) + HALF_LOG_2
-    return closed.real / abs(closed)  # QUARTER
+        return math.log(size / level) + HALF_LOG_2
+    return closed_r / size  # QUARTER
 
 
 @kernel
-def root(mode, level, lead, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
-    """The zero between x1 and x2 (signs differ), to rounding (Chandrupatla 1997), and L there."""
+def quantity_at(mode, k, xs, rs, ss, level, lead):
+    """The same at a scanned point."""
+    return quantity(mode, rs[2 * k], rs[2 * k + 1], ss[2 * k], ss[2 * k + 1], level, xs[k], lead)
+
+
+@kernel
+def root(mode, level, lead, begin_x, begin_f, end_x, end_f, n, h, b, c, work, state, exchanged):
+    """The zero between two angles (signs differ), to rounding (Chandrupatla 1997), and L there."""
+    x1, f1, x2, f2 = begin_x, begin_f, end_x, end_f
+    x3, f3 = begin_x, begin_f
     t = 0.5
-    x3 = x1
-    f3 = f1
-    response = 0.0j
-    x = x1
-    for _ in range(80):
+    response_r, response_i = 0.0, 0.0
+    x = begin_x
+    for _round in range(80):
         x = x1 + t * (x2 - x1)
-        response, derivative = evaluate(n, h, b, c, x, work, state, exchanged)
-        f = quantity(mode, response, derivative, level, x, lead)
-        if (f > 0.0) == (f1 > 0.0):
+        response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
+        f = quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead)
+        if (f > 0.0 and f1 > 0.0) or (not f > 0.0 and not f1 > 0.0):
             x3, f3 = x1, f1
         else:
             x3, f3 = x2, f2
@@ -139,15 +205,29 @@ def root(mode, level, lead, x1, f1, x2, f2, n, h, b, c, work, state, exchanged):
         else:
             t = 0.5
         t = min(max(t, share), 1.0 - share)
-    return x, response
+    return x, response_r, response_i
 
 
 @kernel
-def _keep(count, x, response, slope, xs, rs, ss):
-    xs[count] = x
-    rs[count] = response
-    ss[count] = slope
-    return count + 1
+def _keep(k, x, response_r, response_i, slope_r, slope_i, xs, rs, ss):
+    xs[k] = x
+    rs[2 * k], rs[2 * k + 1] = response_r, response_i
+    ss[2 * k], ss[2 * k + 1] = slope_r, slope_i
+
+
+@kernel
+def _smooth(left, x, response_r, response_i, slope_r, slope_i, xs, rs, ss, tolerance):
+    """Whether log L is a cubic between the kept point ``left`` and x."""
+    width = x - xs[left]
+    before_r, before_i = rs[2 * left], rs[2 * left + 1]
+    ratio_r, ratio_i = over(response_r, response_i, before_r, before_i)
+    here_r, here_i = over(slope_r, slope_i, response_r, response_i)
+    there_r, there_i = over(ss[2 * left], ss[2 * left + 1], before_r, before_i)
+    predicted_r, predicted_i = 0.5 * width * (here_r + there_r), 0.5 * width * (here_i + there_i)
+    gain_error = math.log(math.hypot(ratio_r, ratio_i)) - predicted_r
+    turn = math.atan2(ratio_i, ratio_r) - predicted_i
+    turn -= 2.0 * math.pi * float(math.floor(turn / (2.0 * math.pi) + 0.5))
+    return abs(gain_error) + abs(turn) < tolerance and abs(predicted_i) < 1.0
 
 
 @kernel
@@ -158,33 +238,32 @@ def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, ex
     derivative to ``tolerance`` (nepers and radians), so that no half turn or resonance hides inside. Where L
     is lost in rounding (next to a multiple zero at Nyquist) nothing is refined, its slope is put down as 0.
     """
-    capacity = xs.size
-    response, derivative = evaluate(n, h, b, c, grid[0], work, state, exchanged)
-    count = _keep(0, grid[0], response, derivative, xs, rs, ss)
+    response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, grid[0], work, state, exchanged)
+    _keep(0, grid[0], response_r, response_i, slope_r, slope_i, xs, rs, ss)
+    count = 1
     largest = 0.0
     for g in range(1, points):
         stack[0] = grid[g]
         depth = 1
         while depth > 0:
             x = stack[depth - 1]
-            response, derivative = evaluate(n, h, b, c, x, work, state, exchanged)
+            response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
+            size = math.hypot(response_r, response_i)
             if x > 0.3:
-                largest = max(largest, abs(response))
-            if abs(response) < LOST * largest:
-                derivative = 0.0j
+                largest = max(largest, size)
+            lost = size < LOST * largest
+            if lost:
+                slope_r, slope_i = 0.0, 0.0
             left = count - 1
             width = x - xs[left]
-            ratio = response / rs[left]
-            predicted = 0.5 * width * (derivative / response + ss[left] / rs[left])
-            gain_error = np.log(abs(ratio)) - predicted.real
-            turn = np.arctan2(ratio.imag, ratio.real) - predicted.imag
-            turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
-            smooth = abs(gain_error) + abs(turn) < tolerance and abs(predicted.imag) < 1.0
-            room = depth < stack.size and count + depth + points - g < capacity - 2
-            if smooth or derivative == 0.0 or not room or width < 1e-12 * x:
-                count = _keep(count, x, response, derivative, xs, rs, ss)
+            smooth = _smooth(left, x, response_r, response_i, slope_r, slope_i, xs, rs, ss, tolerance)
+            room = depth < DEEPEST and count + depth + points - g < CAPACITY - 2
+            still = slope_r == 0.0 and slope_i == 0.0
+            if smooth or still or not room or width < 1e-12 * x:
+                _keep(count, x, response_r, response_i, slope_r, slope_i, xs, rs, ss)
+                count += 1
                 depth -= 1
             else:
-                stack[depth] = xs[left] + 0.5 * width if x < 3.0 * xs[left] else np.sqrt(xs[left] * x)
+                stack[depth] = xs[left] + 0.5 * width if x < 3.0 * xs[left] else math.sqrt(xs[left] * x)
                 depth += 1
     return count

@@ -1,7 +1,9 @@
-"""All figures of many loops of one structure: the loop over designs, compiled."""
+"""All figures of one loop, and of many loops of one structure, compiled."""
 
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from ._figures import (
     DC_GAIN,
     FINAL,
     GAIN_CROSSOVERS,
+    HIDDEN,
     PHASE_CROSSOVERS,
     RADIUS,
     STABLE,
@@ -20,168 +23,198 @@ from ._figures import (
     resonance,
 )
 from ._linalg import balance, hessenberg
-from ._response import GAIN, PHASE, closed_loop, evaluate, scan
+from ._response import CAPACITY, DEEPEST, GAIN, PHASE, closed_loop, evaluate, scan
 from ._step import step_figures
 
-TOP = np.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
+TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
-CAPACITY = 1200
+POINTS = 600  # angles to start from
 SMOOTH = 0.05
-HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's
+LOG_10 = 2.302585092994046
 
 
 @kernel
-def _grid(n, wr, wi, open_wr, open_wi, points):
-    """Angles to start from: seven a decade, linear above, and around every lightly damped pole."""
-    low = LOWEST
-    for i in range(n):
-        slow = np.hypot(open_wr[i] - 1.0, open_wi[i])
-        if slow > 1e-11:
-            low = min(low, 0.01 * slow)
-    count = int(np.ceil(7.0 * np.log10(0.3 / low)))
-    for i in range(count):
-        points[i] = low * (0.3 / low) ** (i / count)
-    for i in range(16):
-        points[count] = 0.3 + (TOP - 0.3) * i / 15.0
-        count += 1
+def _around_poles(n, poles, low, points, first):
+    """Three angles around every lightly damped pole, of the open loop and of the closed one."""
+    count = first
     for which in range(2):
         for i in range(n):
-            re = open_wr[i] if which == 0 else wr[i]
-            im = open_wi[i] if which == 0 else wi[i]
-            size = np.hypot(re, im)
-            angle = abs(np.arctan2(im, re))
-            width = abs(1.0 - size)
-            if im <= 0.0 or width > 0.3 * angle or angle > 0.99 * np.pi:
+            real, imaginary = poles[2 * which * n + i], poles[(2 * which + 1) * n + i]
+            angle = abs(math.atan2(imaginary, real))
+            width = abs(1.0 - math.hypot(real, imaginary))
+            if imaginary <= 0.0 or width > 0.3 * angle or angle > 0.99 * math.pi:
                 continue
-            for side in range(-1, 2):
-                x = angle + side * width
-                if low < x < TOP and count < points.size:
+            for side in range(3):
+                x = angle + (side - 1.0) * width
+                if x > low and x < TOP and count < POINTS:
                     points[count] = x
                     count += 1
-    ordered = np.sort(points[:count])
-    kept = 1
-    points[0] = ordered[0]
+    return count
+
+
+@kernel
+def _sorted(points, count):
+    """Sort a short row in place (insertion), then drop what is the same but for rounding."""
     for i in range(1, count):
-        if ordered[i] > points[kept - 1] * (1.0 + 1e-9):
-            points[kept] = ordered[i]
+        value = points[i]
+        j = i
+        while j > 0 and points[max(j - 1, 0)] > value:
+            points[j] = points[j - 1]
+            j -= 1
+        points[j] = value
+    kept = 1
+    for i in range(1, count):
+        if points[i] > points[kept - 1] * (1.0 + 1e-9):
+            points[kept] = points[i]
             kept += 1
     return kept
 
 
 @kernel
-def _closed_dc(n, h, b, c, closed):
+def _grid(n, poles, points):
+    """Angles to start from: seven a decade, linear above, and around every lightly damped pole."""
+    low = LOWEST
+    for i in range(n):
+        slow = math.hypot(poles[i] - 1.0, poles[n + i])
+        if slow > 1e-11:
+            low = min(low, 0.01 * slow)
+    decades = math.log(0.3 / low) / LOG_10
+    count = int(math.ceil(7.0 * decades))
+    for i in range(count):
+        points[i] = low * math.exp(LOG_10 * decades * (i / count))
+    for i in range(16):
+        points[count] = 0.3 + (TOP - 0.3) * i / 15.0
+        count += 1
+    count = _around_poles(n, poles, low, points, count)
+    kept = _sorted(points, count)
+    return kept
+
+
+@kernel
+def _pivoted(n, k, system, right):
+    """Exchange rows so that the largest pivot stands in row k; 0 where there is none."""
+    best = k
+    for i in range(k + 1, n):
+        if abs(system[i * n + k]) > abs(system[best * n + k]):
+            best = i
+    if system[best * n + k] == 0.0:
+        return 0
+    kept = right[k]
+    right[k] = right[best]
+    right[best] = kept
+    for j in range(k, n):
+        kept = system[k * n + j]
+        system[k * n + j] = system[best * n + j]
+        system[best * n + j] = kept
+    return 1
+
+
+@kernel
+def _closed_dc(n, h, b, c, closed, system, right):
     """T at DC: c (I - A + closed b c)^-1 b (h is A - I); nan where that is singular."""
-    system = np.empty((n, n))
-    right = np.empty(n)
     for i in range(n):
         right[i] = b[i]
         for j in range(n):
-            system[i, j] = -h[i, j] + closed * b[i] * c[j]
+            system[i * n + j] = -h[i * n + j] + closed * b[i] * c[j]
     for k in range(n):
-        best = k
+        there = _pivoted(n, k, system, right)
+        if there == 0:
+            return math.nan
         for i in range(k + 1, n):
-            if abs(system[i, k]) > abs(system[best, k]):
-                best = i
-        if system[best, k] == 0.0:
-            return np.nan
-        right[k], right[best] = right[best], right[k]
-        for j in range(k, n):
-            system[k, j], system[best, j] = system[best, j], system[k, j]
-        for i in range(k + 1, n):
-            factor = system[i, k] / system[k, k]
+            factor = system[i * n + k] / system[k * n + k]
             right[i] -= factor * right[k]
             for j in range(k, n):
-                system[i, j] -= factor * system[k, j]
+                system[i * n + j] -= factor * system[k * n + j]
     total = 0.0
-    for i in range(n - 1, -1, -1):
+    i = n - 1
+    while i >= 0:
         for j in range(i + 1, n):
-            right[i] -= system[i, j] * right[j]
-        right[i] /= system[i, i]
+            right[i] -= system[i * n + j] * right[j]
+        right[i] /= system[i * n + i]
         total += c[i] * right[i]
+        i -= 1
     return total
 
 
 @kernel
-def _scanned(n, a, b, c, poles, scratch, arrays):
-    """The scanned response of a loop; a becomes a - I in Hessenberg form. The count of points."""
-    points, stack = scratch
-    xs, rs, ss, work, state, exchanged = arrays
-    balance(n, a, b, c)
-    hessenberg(n, a, b, c, np.empty(n))
-    for i in range(n):
-        a[i, i] -= 1.0
-    kept = _grid(n, poles[2], poles[3], poles[0], poles[1], points)
-    return scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
-
-
-@kernel
-def _closed_figures(count, n, a, b, c, lead, poles, arrays, row):
+def _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged):
     """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
-    xs, rs, ss, work, state, exchanged = arrays
-    dc = _closed_dc(n, a, b, c, 0.0 if np.isnan(lead) else 1.0)
-    for i in range(n):
-        if np.hypot(poles[2, i] - 1.0, poles[3, i]) <= HIDDEN:
-            dc = closed_loop(rs[0], xs[0], np.nan if np.isnan(lead) else 0.0).real
     row[DC_GAIN] = dc
-    row[FINAL] = dc
+    for i in range(n):
+        if math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) <= HIDDEN:
+            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], math.nan if math.isnan(lead) else 0.0)
+            row[DC_GAIN] = real
+    row[FINAL] = row[DC_GAIN]
     resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
-    bandwidths(count, xs, rs, ss, dc, lead, row, n, a, b, c, work, state, exchanged)
+    bandwidths(count, xs, rs, ss, row[DC_GAIN], lead, row, n, a, b, c, work, state, exchanged)
 
 
 @kernel
-def _one_loop(count, n, a, b, c, arrays, row):
+def _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged):
     """Crossovers and modulus margin of an open loop whose response is scanned."""
-    xs, rs, ss, work, state, exchanged = arrays
-    for k in (GAIN_CROSSOVERS, PHASE_CROSSOVERS):
-        row[k] = 0.0
+    row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
     dc = row[DC_GAIN]
-    open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else np.inf
-    nyquist, _ = evaluate(n, a, b, c, np.pi, work, state, exchanged)
+    open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else math.inf
+    at_r, at_i, _slope_r, _slope_i = evaluate(n, a, b, c, math.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    ends(open_dc, nyquist.real, count, xs, rs, row)
-    modulus(count, xs, rs, ss, nyquist, row, n, a, b, c, work, state, exchanged)
+    ends(open_dc, at_r, count, xs, rs, row)
+    modulus(count, xs, rs, ss, at_r, at_i, row, n, a, b, c, work, state, exchanged)
 
 
 @kernel
-def _radius(n, wr, wi):
+def _radius(n, poles):
     """Largest modulus but of an eigenvalue at 1: the motor angle, which an inner loop does not see."""
     radius = 0.0
     for i in range(n):
-        if np.hypot(wr[i] - 1.0, wi[i]) > HIDDEN:
-            radius = max(radius, np.hypot(wr[i], wi[i]))
+        real, imaginary = poles[2 * n + i], poles[3 * n + i]
+        if math.hypot(real - 1.0, imaginary) > HIDDEN:
+            radius = max(radius, math.hypot(real, imaginary))
     return radius
 
 
 @kernel
-def many_loops(A, B, C, poles, lead, time_figures, out):
-    """Fill out[k] for every open loop A[k], B[k], C[k] (overwritten); every design by itself.
+def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, ss, work, state, exchanged):
+    """Fill the figures of one open loop; a becomes A - I in Hessenberg form (A itself with time figures).
 
-    poles[k] holds real and imaginary parts of the open loop's, then of the closed loop's. lead is k_ff/(Kv
-    T) of a feed-forward in front. Where it is NaN, A, B, C are a closed loop's response itself: then only
-    its figures are written.
+    poles holds real and imaginary parts of the open loop's, then of the closed loop's. lead is k_ff/(Kv T) of
+    a feed-forward in front. Where it is NaN, a, b, c are a closed loop's response itself: then only its
+    figures are written. The other rows lend their space: see `many_loops`.
     """
+    balance(n, a, b, c)
+    hessenberg(n, a, b, c, state)
+    for i in range(n):
+        a[i * n + i] -= 1.0
+    kept = _grid(n, poles, points)
+    count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
+    row[RADIUS] = _radius(n, poles)
+    row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
+    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
+    _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged)
+    if not math.isnan(lead):
+        _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged)
+    if time_figures:
+        for i in range(n):
+            a[i * n + i] += 1.0
+        step_figures(n, a, b, c, lead, poles, row, state, work)
+    return count
+
+
+@kernel
+def many_loops(A, B, C, poles, lead, time_figures, out):
+    """Fill out[k] for every open loop A[k], B[k], C[k] by `one_loop`; each by itself."""
     n = A.shape[1]
-    scratch = (np.empty(600), np.empty(48))
-    arrays = (
-        np.empty(CAPACITY),
-        np.empty(CAPACITY, dtype=np.complex128),
-        np.empty(CAPACITY, dtype=np.complex128),
-        np.zeros((n, n), dtype=np.complex128),
-        np.zeros(n, dtype=np.complex128),
-        np.zeros(n),
-    )
+    points, stack = np.empty(POINTS), np.empty(DEEPEST)
+    xs, rs, ss = np.empty(CAPACITY), np.empty(2 * CAPACITY), np.empty(2 * CAPACITY)
+    work, state, exchanged = np.zeros(2 * n * n + 2 * n), np.zeros(2 * n), np.zeros(n)
     for k in range(A.shape[0]):
-        a, b, c, row = A[k], B[k], C[k], out[k]
         if np.isnan(poles[k, 0, 0]):
             continue
-        count = _scanned(n, a, b, c, poles[k], scratch, arrays)
-        row[RADIUS] = _radius(n, poles[k, 2], poles[k, 3])
-        row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
-        _closed_figures(count, n, a, b, c, lead[k], poles[k], arrays, row)
-        if not np.isnan(lead[k]):
-            _one_loop(count, n, a, b, c, arrays, row)
-        if time_figures:
-            for i in range(n):
-                a[i, i] += 1.0
-            step_figures(n, a, b, c, lead[k], poles[k, 2], poles[k, 3], row)
+        a, b, c = np.empty(n * n), B[k].copy(), C[k].copy()
+        for i in range(n):
+            for j in range(n):
+                a[i * n + j] = A[k, i, j]
+        one_loop(
+            n, a, b, c, poles[k].copy().reshape(-1), lead[k], time_figures, out[k],
+            points, stack, xs, rs, ss, work, state, exchanged,
+        )  # fmt: skip

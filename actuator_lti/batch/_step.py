@@ -3,10 +3,10 @@
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from ._compiled import kernel
-from ._figures import FINAL, OVERSHOOT, RADIUS, RISE, SETTLING
+from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
 
 LONGEST = 4_000_000  # ticks
 FOLLOWED = 14.0  # time constants of the slowest pole
@@ -14,7 +14,7 @@ FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no
 
 
 @kernel
-def step_figures(n, a, b, c, lead, wr, wi, row):
+def step_figures(n, a, b, c, lead, poles, row, state, after):
     """Rise 10-90 % and settling 2 % in ticks, overshoot in percent, of the closed loop a - b c.
 
     Where lead is NaN, of a, b, c as they are.
@@ -26,14 +26,14 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
     final = row[FINAL]
     if not (radius < 1.0) or not (abs(final) > 0.0):
         return
-    ticks = int(min(LONGEST, max(-FOLLOWED / np.log(radius), n + 2.0)))
-    alone = _ticks_until_alone(n, wr, wi, radius)
+    ticks = int(min(float(LONGEST), max(-FOLLOWED / math.log(radius), n + 2.0)))
+    alone = _ticks_until_alone(n, poles, radius)
     tail = alone < 0.7 * ticks
     if tail:
         ticks = int(alone)
-    fed_back = 0.0 if np.isnan(lead) else 1.0
-    state = np.zeros(n)
-    after = np.zeros(n)
+    fed_back = 0.0 if math.isnan(lead) else 1.0
+    for i in range(n):
+        state[i] = 0.0
     ten = -1
     ninety = -1
     highest = 0.0
@@ -49,7 +49,7 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
         for i in range(n):
             value = b[i] * error
             for j in range(n):
-                value += a[i, j] * state[j]
+                value += a[i * n + j] * state[j]
             after[i] = value
         y = 0.0
         for j in range(n):
@@ -71,25 +71,25 @@ def step_figures(n, a, b, c, lead, wr, wi, row):
             ninety = ticks + _ticks_to(rest, 0.1, radius)
         if abs(rest) > 0.02:
             outside = ticks + _ticks_to(rest, 0.02, radius) - 1
-    row[RISE] = ninety - ten if ninety >= 0 else np.nan
+    row[RISE] = float(ninety - ten) if ninety >= 0 else math.nan
     row[OVERSHOOT] = 100.0 * (highest - 1.0) if highest > 1.0 + 1e-9 else 0.0
     row[SETTLING] = outside + 1.0
 
 
 @kernel
-def _ticks_until_alone(n, wr, wi, radius):
+def _ticks_until_alone(n, poles, radius):
     """Ticks until only the slowest pole is left; infinity where that is no single positive real one."""
     second = 0.0
     slowest = -1
     for i in range(n):
-        size = np.hypot(wr[i], wi[i])
+        size = math.hypot(poles[2 * n + i], poles[3 * n + i])
         if size == radius and slowest < 0:
             slowest = i
-        else:
+        elif math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) > HIDDEN:
             second = max(second, size)
-    if slowest < 0 or wi[slowest] != 0.0 or wr[slowest] <= 0.0 or second <= 0.0:
-        return np.inf
-    return np.ceil(-FORGOTTEN / np.log(second)) + n + 2.0
+    if slowest < 0 or poles[3 * n + slowest] != 0.0 or poles[2 * n + slowest] <= 0.0 or second <= 0.0:
+        return math.inf
+    return float(math.ceil(-FORGOTTEN / math.log(second))) + n + 2.0
 
 
 @kernel
@@ -97,4 +97,4 @@ def _ticks_to(rest, level, radius):
     """Ticks until the tail ``|rest| radius^k`` has fallen to a level."""
     if abs(rest) <= level:
         return 0
-    return int(np.ceil(np.log(level / abs(rest)) / np.log(radius)))
+    return int(math.ceil(math.log(level / abs(rest)) / math.log(radius)))

@@ -166,6 +166,15 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     return design_from_tree(tree, design.origin or design.name)
 
 
+def overridden_text(design: Design, path: str, value: Any) -> str:
+    """The design file with one key changed as `with_overrides` does, without a look at the value."""
+    import tomli_w
+
+    tree = design_tree(design)
+    _override(tree, path, value, design)
+    return tomli_w.dumps(tree)
+
+
 def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
     structure = Structure.of(design)

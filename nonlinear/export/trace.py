@@ -29,8 +29,13 @@ class NotTraceable(TypeError):
 
 @dataclass
 class Tape:
-    """Statements in the order in which they were made."""
+    """Statements in the order in which they were made.
 
+    With ``rounding`` the whole number below a value is a value too (an interpreter of the statements may
+    change it); without, it is a condition.
+    """
+
+    rounding: bool = False
     lines: list[str] = field(default_factory=list)
     count: int = 0
 
@@ -88,6 +93,8 @@ def _function(name: str) -> Any:
 def _rounded(name: str) -> Any:
     def rounded(self: Traced) -> Any:
         found = np.float64(getattr(math, name)(self.number))
+        if self.tape.rounding:
+            return self.tape.value(f"{name}({self.name})", float(found))
         self.tape.condition(f"{name}({self.name}) == {c_number(float(found))}", True)
         return found
 
@@ -112,6 +119,13 @@ class Traced:
     floor, ceil = _rounded("floor"), _rounded("ceil")  # numpy asks by these names
     __floor__, __ceil__ = floor, ceil
     tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
+
+    def zero_below(self, least: Any) -> Traced:
+        """The value, or 0 where its size is less."""
+        if not self.tape.rounding:
+            return self if abs(self) >= least else self.tape.value("0.0", 0.0)
+        kept = self.number if abs(self.number) >= _number(least) else 0.0
+        return self.tape.value(f"zero_below({self.name}, {_text(least)})", kept)
 
     def __pow__(self, power: Any) -> Traced:
         return self.tape.value(f"pow({self.name}, {_text(power)})", self.number ** _number(power))

@@ -1,30 +1,91 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
-The module is a wasi reactor without imports.  It exports ``memory``, ``p_at``, ``s_at``, ``io_at`` (where
-the rows lie), ``p_most``, ``s_most``, ``io_length``, ``start``, ``retune``, ``tick`` and ``run``.  A host
-writes the row of a run (`nonlinear.parameters.design_row`) at ``p_at()``, calls ``start()``, and then
-``tick()`` with inputs and outputs at ``io_at()``; the places are those of ``nonlinear._kernels.layout``.
+The module is a wasi reactor without imports: the tick of the drive, its loops found by running that tick
+(`nonlinear.export.linear`), and the figures of a loop by the kernels of `actuator_lti.batch`.  Rows lie in
+its memory; functions that end in ``_at`` say where.  A host writes the row of a run
+(`nonlinear.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs and
+outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
+its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
+(`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
+``step_of(stage, count)`` its step response, both at ``y_at()``.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.batch import _figures, _quoted, _response, _run
 from nonlinear.export.build import compile_files
-from nonlinear.export.program import header_text, source_text, template
+from nonlinear.emit import Program, emit_c
+from nonlinear.emit.kinds import Kind
+from nonlinear.export import linear
+from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
 MOST_BYTES = 100_000
 _NAME, _RECORD = "drive.wasm", "drive.wasm.json"
-_FLAGS = ("-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sections")
+_FLAGS = ("-Os", "-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sections")
+
+
+_ROW: Kind = "row"
+_LINEAR: dict[Any, tuple[Kind, ...]] = {
+    linear.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 5),
+    linear.interval: (_ROW, "int"),
+    linear.lead_of: (_ROW,),
+    linear.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
+    linear.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
+    linear.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
+    _quoted.quoted: (_ROW, "float", _ROW),
+}
+_SIZES = {
+    "MOST": linear.MOST,
+    "STAGES": linear.AT_VOLTAGE + 1,
+    "POSITION": linear.POSITION,
+    "COMMAND": linear.COMMAND,
+    "COLUMNS": _figures.COLUMNS,
+    "FIRST_CLOSED": _figures.PEAK_T,
+    "LAST_CLOSED": _figures.FINAL,
+    "QUOTED": _quoted.QUOTED,
+    "POINTS": _run.POINTS,
+    "DEEPEST": _response.DEEPEST,
+    "CAPACITY": _response.CAPACITY,
+}
+
+
+@cache
+def program() -> Program:
+    """Tick, loops and figures as one program."""
+    return emit_c({**ENTRIES, **_LINEAR})
+
+
+def _linear_header() -> str:
+    """Prototypes and lengths beyond those of ``drive.h``."""
+    known = {function.py_func.__name__ for function in _LINEAR}
+    heads = [text for name, text in program().declarations.items() if name in known]
+    return "\n".join([*(f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()), *heads, ""])
+
+
+def _source() -> str:
+    """The program behind its prototypes."""
+    emitted = program()
+    head = '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n'
+    return "\n".join(
+        [head, emitted.constants_text(), *helpers_of(emitted.functions), emitted.types, emitted.functions]
+    )
 
 
 def sources() -> dict[str, str]:
     """The C files of the module."""
-    return {"drive.h": header_text(), "drive.c": source_text(), "wasm.c": template("wasm.c")}
+    return {
+        "drive.h": header_text(),
+        "linear.h": _linear_header(),
+        "drive.c": _source(),
+        "wasm.c": template("wasm.c"),
+    }
 
 
 def sources_hash() -> str:

@@ -127,7 +127,7 @@
     ticks() {
       const xt = this.group.querySelector(".xt"), yt = this.group.querySelector(".yt"), grid = this.group.querySelector(".grid");
       const edge = this.group.querySelector(".edge");
-      if (this.whole) {
+      if (this.whole && !this.scaled) {
         xt.replaceChildren(...this.first.xt);
         yt.replaceChildren(...this.first.yt);
         grid.setAttribute("d", this.first.grid);
@@ -245,6 +245,7 @@
       this.plots.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
       this.plots.addEventListener("blur", () => this.hide());
       root.addEventListener("chart:redraw", (event) => this.redraw(event.detail));
+      root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
     }
     legend() {
       for (const item of this.root.querySelectorAll(".keys li")) {
@@ -478,8 +479,20 @@
         if (p.x.log && p.x.unit === "Hz") p.cursor(p.x.px(hertz), "crossing");
       }
     }
-    // gives a curve new values, in the units of its axes: {panel, curve (its label), x, y}
-    redraw({ panel, curve, x, y }) {
+    // gives the axes of a panel new ends: {panel, x: [low, high], y: [low, high], words}; curves are redrawn after it
+    rescale({ panel, x, y, words }) {
+      const p = this.panels[panel];
+      for (const [axis, ends] of [[p.x, x], [p.y, y]]) if (ends) [axis.low, axis.high] = ends;
+      p.scaled = true;
+      p.update();
+      if (words) {
+        p.x.unit = words;
+        const label = [...p.group.querySelectorAll("text")].find((node) => node.textContent.startsWith(p.x.name + ", "));
+        if (label) label.textContent = `${p.x.name}, ${words}`;
+      }
+    }
+    // gives a curve new values, in the units of its axes: {panel, curve (its label), x, y, parameter}
+    redraw({ panel, curve, x, y, parameter }) {
       const p = this.panels[panel];
       const key = Object.keys(this.labels).find((k) => this.labels[k] === curve);
       const known = p.curves.find((c) => !c.dots && (key === undefined ? p.curves.length === 1 || c.node.dataset.id === curve : c.key === key));
@@ -492,6 +505,7 @@
       }
       known.node.setAttribute("d", d);
       known.points = p.curve(known.node).points;
+      if (parameter) known.parameter = parameter.filter((_, k) => Number.isFinite(x[k]) && Number.isFinite(y[k]));
       this.hide();
     }
   }

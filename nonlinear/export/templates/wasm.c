@@ -1,7 +1,11 @@
 /*
  * The drive as a WebAssembly reactor: rows lie in the module's memory, the host reads and writes them there.
+ * A loop is found by running a second drive, so that the first one goes on undisturbed.
  */
 #include "drive.h"
+#include "linear.h"
+
+#include <math.h>
 
 enum { P_MOST = 131072, S_MOST = 65536 };
 
@@ -61,4 +65,124 @@ EXPORT("run") int run(int ticks, double command, double moment)
         done += 1;
     }
     return done;
+}
+
+enum { MOST_OUT = 16384 };
+
+/* A loop: its states (0: there is none), period, matrices, feed-forward in front, figures. */
+typedef struct {
+    int n;
+    double period;
+    double lead;
+    double a[MOST * MOST];
+    double b[MOST];
+    double c[MOST];
+    double row[COLUMNS];
+    double quoted[QUOTED];
+} loop_t;
+
+static loop_t loops[STAGES];
+static double q[P_MOST];
+static double other_s[S_MOST];
+static double other_io[DRIVE_IO_LENGTH];
+static double places[MOST];
+static double column[2 * MOST];
+static double poles[4 * MOST];
+static double points[POINTS];
+static double stack[DEEPEST];
+static double xs[CAPACITY];
+static double rs[2 * CAPACITY];
+static double ss[2 * CAPACITY];
+static double work[2 * MOST * MOST + 2 * MOST];
+static double state[2 * MOST];
+static double exchanged[MOST];
+static double real[MOST];
+static double imaginary[MOST];
+static double x[MOST_OUT];
+static double y[2 * MOST_OUT];
+
+EXPORT("x_at") double *x_at(void) { return x; }
+EXPORT("y_at") double *y_at(void) { return y; }
+EXPORT("out_most") int out_most(void) { return MOST_OUT; }
+EXPORT("figures_at") double *figures_at(int stage) { return loops[stage].quoted; }
+EXPORT("row_at") double *row_at(int stage) { return loops[stage].row; }
+EXPORT("period_of") double period_of(int stage) { return loops[stage].period; }
+EXPORT("lead_of") double lead_of(int stage) { return loops[stage].lead; }
+
+/* Matrices and figures of one loop; its states, or why there are none. */
+static int one(int stage, double lead, int timed)
+{
+    loop_t *const it = &loops[stage];
+
+    it->n = 0;
+    for (int k = 0; k < COLUMNS; k += 1) {
+        it->row[k] = NAN;
+    }
+    const int n = drive_assembled(p, q, other_s, other_io, stage, it->a, it->b, it->c, places, column);
+    if (n <= 0) {
+        return n;
+    }
+    it->lead = lead;
+    it->period = drive_interval(q, stage) * q[DRIVE_PERIOD];
+    if (drive_figures(n, it->a, it->b, it->c, lead, timed, it->row, poles, points, stack, xs, rs, ss, work, state,
+            exchanged, real, imaginary) == 0) {
+        return 0;
+    }
+    if (timed != 0) {
+        for (int k = 0; k < n; k += 1) {
+            it->a[k * n + k] -= 1.0;
+        }
+    }
+    drive_quoted(it->row, it->period, it->quoted);
+    it->n = n;
+    return n;
+}
+
+/*
+ * A loop and its figures; its states, 0 where the drive has no such loop, less where it cannot be had. Figures of
+ * a closed position loop are from command to output, as in actuator_lti.batch.
+ */
+EXPORT("loop") int loop(int stage, int timed)
+{
+    const double lead = (stage == POSITION) ? drive_lead_of(p) : 0.0;
+    const int n = isnan(lead) ? one(stage, 0.0, 0) : one(stage, lead, timed);
+
+    if (n > 0 && isnan(lead)) {
+        loop_t *const own = &loops[POSITION];
+        loop_t *const whole = &loops[COMMAND];
+
+        if (one(COMMAND, NAN, timed) <= 0) {
+            return 0;
+        }
+        for (int k = FIRST_CLOSED; k <= LAST_CLOSED; k += 1) {
+            own->row[k] = whole->row[k];
+        }
+        drive_quoted(own->row, own->period, own->quoted);
+        own->lead = NAN;
+    }
+    return n;
+}
+
+/* Response of a loop that was computed, at count angles per sample in x, as pairs in y. */
+EXPORT("respond") int respond(int stage, int count)
+{
+    const loop_t *const it = &loops[stage];
+
+    if (it->n <= 0 || count > MOST_OUT) {
+        return 0;
+    }
+    drive_responded(it->n, it->a, it->b, it->c, count, x, y, work, state, exchanged);
+    return count;
+}
+
+/* Step response of the closed loop at count samples, in y. */
+EXPORT("step_of") int step_of(int stage, int count)
+{
+    const loop_t *const it = &loops[stage];
+
+    if (it->n <= 0 || count > MOST_OUT) {
+        return 0;
+    }
+    drive_stepped(it->n, it->a, it->b, it->c, it->lead, count, y, state, work);
+    return count;
 }

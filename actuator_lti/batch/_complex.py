@@ -1,0 +1,38 @@
+"""Complex numbers as pairs of floats, so that the same text runs in Python and, emitted, in C."""
+
+# mypy: disallow-untyped-defs=False
+from __future__ import annotations
+
+import math
+
+from ._compiled import kernel
+
+
+@kernel
+def times(ar, ai, br, bi):
+    """Product of two complex numbers."""
+    return ar * br - ai * bi, ar * bi + ai * br
+
+
+@kernel
+def over(ar, ai, br, bi):
+    """Quotient a/b (Smith 1962: no overflow on the way)."""
+    if abs(br) >= abs(bi):
+        ratio = bi / br
+        below = br + bi * ratio
+        return (ar + ai * ratio) / below, (ai - ar * ratio) / below
+    ratio = br / bi
+    below = br * ratio + bi
+    return (ar * ratio + ai) / below, (ai * ratio - ar) / below
+
+
+@kernel
+def size_at(row, k):
+    """Modulus of the k-th number of a row of pairs."""
+    return math.hypot(row[2 * k], row[2 * k + 1])
+
+
+@kernel
+def distance_at(row, k):
+    """|1 + z| of the k-th number of a row of pairs."""
+    return math.hypot(1.0 + row[2 * k], row[2 * k + 1])

@@ -1,0 +1,71 @@
+"""The margins to quote from a row of figures: the same as `LinearFigures.quantity`, emitted only."""
+
+# mypy: disallow-untyped-defs=False
+from __future__ import annotations
+
+import math
+
+from ._compiled import kernel
+from ._figures import (
+    BANDWIDTH_X,
+    DC_GAIN,
+    FIRST_GAIN,
+    FIRST_PHASE,
+    GAIN_CROSSOVERS,
+    LISTED,
+    MODULUS,
+    OVERSHOOT,
+    PEAK_T,
+    PHASE_CROSSOVERS,
+    QUARTER_X,
+    RISE,
+    SETTLING,
+    STABLE,
+)
+
+LOG_10 = 2.302585092994046
+(
+    GAIN_MARGIN, PHASE_MARGIN, DELAY_MARGIN, MODULUS_MARGIN, SENSITIVITY_PEAK, BANDWIDTH_HZ, BANDWIDTH_90DEG,
+    RESONANCE_PEAK, OVERSHOOT_PERCENT, RISE_TIME, SETTLING_TIME, IS_STABLE,
+) = range(12)  # fmt: skip
+QUOTED = 12
+
+
+@kernel
+def _decibel(ratio):
+    return 20.0 * math.log(ratio) / LOG_10
+
+
+@kernel
+def _margins(row, period, out):
+    """Gain and phase margin nearest to zero, and the delay margin."""
+    out[GAIN_MARGIN], out[PHASE_MARGIN], out[DELAY_MARGIN] = math.inf, math.inf, math.inf
+    for k in range(min(int(row[GAIN_CROSSOVERS]), LISTED)):
+        x, margin = row[FIRST_GAIN + 2 * k], row[FIRST_GAIN + 2 * k + 1]
+        if abs(margin * 180.0 / math.pi) < abs(out[PHASE_MARGIN]):
+            out[PHASE_MARGIN] = margin * 180.0 / math.pi
+        turn = margin if margin > 0.0 else margin + 2.0 * math.pi
+        out[DELAY_MARGIN] = min(out[DELAY_MARGIN], turn / x * period)
+    for k in range(min(int(row[PHASE_CROSSOVERS]), LISTED)):
+        margin = _decibel(row[FIRST_PHASE + 2 * k + 1])
+        if abs(margin) < abs(out[GAIN_MARGIN]):
+            out[GAIN_MARGIN] = margin
+    if row[STABLE] != 1.0:
+        out[DELAY_MARGIN] = 0.0
+
+
+@kernel
+def quoted(row, period, out):
+    """Write the figures to quote, in dB, deg, s, Hz and percent, in the order of `LOOP_QUANTITIES`."""
+    _margins(row, period, out)
+    out[MODULUS_MARGIN] = row[MODULUS]
+    out[SENSITIVITY_PEAK] = -_decibel(row[MODULUS])
+    out[RESONANCE_PEAK] = max(_decibel(row[PEAK_T] / abs(row[DC_GAIN])), 0.0)
+    out[BANDWIDTH_HZ] = row[BANDWIDTH_X] / period / (2.0 * math.pi)
+    out[BANDWIDTH_90DEG] = row[QUARTER_X] / period / (2.0 * math.pi)
+    out[RISE_TIME], out[OVERSHOOT_PERCENT] = row[RISE] * period, row[OVERSHOOT]
+    out[SETTLING_TIME] = row[SETTLING] * period
+    out[IS_STABLE] = row[STABLE]
+    if row[STABLE] != 1.0:
+        for k in range(BANDWIDTH_HZ, IS_STABLE):
+            out[k] = math.nan

@@ -1,0 +1,101 @@
+"""The empty figures of the live page: axes and curves that the page's script fills."""
+
+from __future__ import annotations
+
+import math
+
+from reports.charts.svg import page_svg
+from reports.figures import style
+from reports.figures.style import Chart, Panel
+
+NOW = {"colour": style.BLUE, "width": 2.0}
+BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
+REACH = 1.6
+
+
+def live_charts() -> dict[str, str]:
+    """Give each figure's SVG by its name."""
+    drawn = {"bode": _bode(), "nyquist": _nyquist(), "sensitivity": _sensitivity(), "step": _step(), "run": _run()}
+    words = {
+        "bode": "Open loop: magnitude and phase, as designed and as changed.",
+        "nyquist": "Nyquist curve near -1, as designed and as changed.",
+        "sensitivity": "Sensitivity S and closed loop T, as designed and as changed.",
+        "step": "Step response of the linear loop, as designed and as changed.",
+        "run": "Step with limits and friction, as designed and as changed, and a measured record.",
+    }
+    return {name: page_svg(chart, f"live{k}", words[name]) for k, (name, chart) in enumerate(drawn.items())}
+
+
+def _both(panel: Panel, ends: tuple[float, float] = (0.0, 1.0)) -> None:
+    """Put in a curve as designed and one as changed."""
+    panel.curve(ends, (0.0, 0.0), "as designed", **BEFORE)
+    panel.curve(ends, (0.0, 0.0), "as changed", **NOW)
+
+
+def _bode() -> Chart:
+    chart = Chart(width=style.HALF, height=370.0)
+    top, bottom = chart.column(1.15, 1.0)
+    for panel in (top, bottom):
+        _both(panel, (1.0, 1000.0))
+    style.frequency(bottom, (1.0, 1000.0))
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    top.y.limits(-60.0, 40.0)
+    bottom.y.limits(-360.0, 0.0)
+    top.rule_y(0.0, colour=style.INK)
+    return chart
+
+
+def _nyquist() -> Chart:
+    chart = Chart(width=style.HALF, height=370.0)
+    panel = chart.panel()
+    panel.equal = panel.by_point = True
+    panel.rule_y(0.0)
+    panel.rule_x(0.0)
+    angles = [2.0 * math.pi * k / 72 for k in range(73)]
+    panel.curve(
+        [math.cos(a) for a in angles], [math.sin(a) for a in angles], colour=style.MUTED, dash=2, width=1.0, read=False
+    )
+    _both(panel)
+    panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
+    panel.note("−1", (-1.0, 0.0))
+    panel.x.limits(-1.0 - REACH, REACH - 0.35)
+    panel.y.limits(-REACH, REACH)
+    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
+    return chart
+
+
+def _sensitivity() -> Chart:
+    chart = Chart(width=style.HALF, height=250.0)
+    panel = chart.panel()
+    ends = (1.0, 1000.0)
+    for name, colour in (("S", style.ORANGE), ("T", style.GREEN)):
+        panel.curve(ends, (0.0, 0.0), f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
+        panel.curve(ends, (0.0, 0.0), f"{name} as changed", colour=colour, width=2.0)
+    style.frequency(panel, ends)
+    panel.y.label = "magnitude, dB"
+    panel.y.limits(-40.0, 15.0)
+    return chart
+
+
+def _step() -> Chart:
+    chart = Chart(width=style.HALF, height=250.0)
+    panel = chart.panel()
+    panel.rule_y(1.0)
+    _both(panel)
+    panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
+    panel.x.limits(0.0, 1.0)
+    panel.y.limits(-0.1, 1.5)
+    return chart
+
+
+def _run() -> Chart:
+    chart = Chart(width=style.WIDE, height=290.0)
+    panel = chart.panel()
+    panel.rule_y(1.0)
+    _both(panel)
+    panel.curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
+    panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=1.6)
+    panel.x.label, panel.y.label = "time, ms", "share of the largest command"
+    panel.x.limits(0.0, 1.0)
+    panel.y.limits(-0.1, 1.3)
+    return chart

@@ -1,0 +1,137 @@
+"""The keys of a design as sliders: value, unit, range, tolerance; those that stay fixed, and why.
+
+How the row of the simulator follows from the keys is found by `nonlinear.export.trace` on `design_row`, as
+for an export in C: the page interprets the same statements.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.access import located, parameter_value, paths_of, stacked
+from actuator_lti.design.field import Structure
+from actuator_lti.design.model import Design, Parameter, Tolerance
+from nonlinear._kernels import layout as at
+from nonlinear.export.trace import Tape, Traced
+from nonlinear.parameters import design_row
+
+REACH = 5.0  # a slider goes from a fifth of the value to five times it
+UNUSED = "has no influence on the loops or the run that this page follows"
+WHOLE = "a whole number: change it in the design file"
+ZERO = "0 in this design: change it in the design file"
+UNFOLLOWED = "enters through a function that this page does not have: change it in the design file"
+LONGEST = 20.0  # control periods: the range of a time that is 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """Keys with a slider, keys without, and the statements from keys to the row.
+
+    Attributes
+    ----------
+    free, fixed : list of dict
+        As they stand in the page's data.
+    lines : list of str
+        Statements in the C of `nonlinear.export.trace`: ``k[n]`` is the n-th free key.
+    """
+
+    free: list[dict[str, Any]]
+    fixed: list[dict[str, Any]]
+    lines: list[str]
+
+
+def followed(design: Design) -> Followed:
+    """Follow every numeric key of a design into its row."""
+    free: list[dict[str, Any]] = []
+    fixed: list[dict[str, Any]] = []
+    for path in paths_of(design):
+        if path.startswith("validation."):
+            continue
+        reason = _reason(design, path)
+        if reason:
+            fixed.append({**_named(design, path), "why": reason})
+        else:
+            free.append(_slider(design, path))
+    tape = Tape(rounding=True)
+    values = {key["path"]: Traced(tape, f"k[{n}]", key["value"]) for n, key in enumerate(free)}
+    row = design_row(stacked(design, values), kind=object)
+    stored = [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
+    return Followed(free=free, fixed=fixed, lines=[*tape.lines, *stored])
+
+
+def _reason(design: Design, path: str) -> str:
+    """Say why a key has no slider; empty where it has one."""
+    field, _ = located(design, path)
+    if field.kind == "integer":
+        return WHOLE
+    value = parameter_value(design, path)
+    if value < 0.0 or (value == 0.0 and not _top(design, path)):
+        return ZERO
+    traced = Traced(Tape(rounding=True), "k", value)
+    try:
+        row: Any = design_row(stacked(design, {path: traced}), kind=object)
+    except TypeError:
+        return UNFOLLOWED
+    return "" if any(isinstance(row[n], Traced) for n in np.arange(at.SIZE)) else UNUSED
+
+
+def _top(design: Design, path: str) -> float:
+    """Give the upper end of the slider of a key that is 0: a share, or a time; 0 for anything else."""
+    field, _ = located(design, path)
+    unit = field.unit(Structure.of(design))
+    if field.low < 0.0 or unit not in ("1", "s"):
+        return 0.0
+    return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
+
+
+def _named(design: Design, path: str) -> dict[str, Any]:
+    """Give path, value and unit as the design file writes them."""
+    field, _ = located(design, path)
+    value, known = parameter_value(design, path), design.parameters.get(path)
+    unit = field.unit(Structure.of(design))
+    shown, factor = _written(known, value, unit)
+    return {
+        "path": path,
+        "about": field.description,
+        "value": value,
+        "unit": "" if shown == "1" else shown,
+        "factor": factor,
+    }
+
+
+def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, float]:
+    """Give the unit in which a value is written, and SI over it."""
+    number, _, own = (known.text if known is not None else "").partition(" ")
+    try:
+        said = float(number)
+    except ValueError:
+        return unit, 1.0
+    if known is None or not own or said == 0.0 or value == 0.0 or known.value != value:
+        return unit, 1.0
+    return own, value / said
+
+
+def _slider(design: Design, path: str) -> dict[str, Any]:
+    """Give a key with the range of its slider and the band of its tolerance."""
+    field, _ = located(design, path)
+    made, value = _named(design, path), parameter_value(design, path)
+    low, high = (0.0, _top(design, path)) if value == 0.0 else (value / REACH, min(value * REACH, field.high))
+    known = design.parameters.get(path)
+    return {
+        **made,
+        "low": max(low, field.low),
+        "high": high,
+        "band": None if known is None or known.tolerance is None else _band(value, known.tolerance),
+    }
+
+
+def _band(value: float, tolerance: Tolerance) -> list[float] | None:
+    """Give the ends of a tolerance: its bounds, or two standard deviations."""
+    width = tolerance.half_width if tolerance.kind == "uniform" else 2.0 * (tolerance.std or 0.0)
+    if width is None or not math.isfinite(width):
+        return None
+    return [max(value - width, tolerance.lower), min(value + width, tolerance.upper)]

@@ -1,0 +1,90 @@
+"""The data of the live page: plain JSON, made once with the report."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from nonlinear._kernels import layout as at
+from nonlinear.export import linear
+from nonlinear.export.c_files import exported
+from reports.live.keys import followed
+from reports.live.text import patches
+
+ELASTIC = "The drive train is elastic, or its friction is a map; the sliders follow rigid drives only."
+OPEN = "The drive has no loop."
+PLACES = {
+    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
+    "current": at.IO_CURRENT, "period": at.PERIOD, "ratio": at.RATIO,
+}  # fmt: skip
+POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
+
+
+def live_model(design: Design) -> dict[str, Any]:
+    """Give the page's data, or why there is none under ``refused``."""
+    if not design.controller.stages:
+        return {"refused": OPEN}
+    try:
+        row = exported(design).row
+    except InputError:
+        return {"refused": ELASTIC}
+    if row[at.ELASTIC_DRIVE] > 0.0:
+        return {"refused": ELASTIC}
+    found = followed(design)
+    text, places = patches(design, found.free)
+    return {
+        "name": design.name,
+        "axis": design.axis,
+        "keys": found.free,
+        "fixed": found.fixed,
+        "lines": found.lines,
+        "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
+        "places": PLACES,
+        "loops": [name for name in LOOPS if name in design.controller.stages],
+        "stages": {name: k for k, name in enumerate(LOOPS)},
+        "points": POINTS,
+        "quantities": list(LOOP_QUANTITIES),
+        "requirements": _requirements(design),
+        "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
+        "step": _step(design),
+        "text": text,
+        "patches": places,
+    }
+
+
+def _requirements(design: Design) -> list[dict[str, Any]]:
+    """Give the requirements on loops, one for each loop that it holds for."""
+    stages = tuple(name for name in LOOPS if name in design.controller.stages)
+    return [
+        {
+            "id": item.id,
+            "loop": loop,
+            "quantity": item.quantity,
+            "words": QUANTITIES[item.quantity].words,
+            "absolute": QUANTITIES[item.quantity].absolute,
+            "unit": "" if item.unit == "1" else item.unit,
+            "minimum": item.minimum,
+            "maximum": item.maximum,
+        }
+        for item in design.requirements
+        if item.quantity in LOOP_QUANTITIES
+        for loop in judged_loops(item.loop, stages)
+        if loop in stages
+    ]
+
+
+def _step(design: Design) -> dict[str, Any]:
+    """Give the largest command of the step, and what it is a step of."""
+    outermost, linear_axis = design.controller.outermost, design.axis == "linear"
+    if outermost == "position":
+        size, unit = design.validation.full_deflection_rad, "mm" if linear_axis else "deg"
+        return {"size": size, "unit": unit, "factor": 1e-3 if linear_axis else math.pi / 180.0, "of": "output"}
+    if outermost == "velocity":
+        speed = design.limits.speed_rad_s
+        size = (speed if math.isfinite(speed) else 100.0) / design.total_ratio
+        return {"size": size, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
+    peak = design.limits.peak_current_A
+    return {"size": peak if math.isfinite(peak) else 1.0, "unit": "A", "factor": 1.0, "of": "current"}
