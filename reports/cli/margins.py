@@ -29,7 +29,7 @@ def margins(
     load: LoadOption = 0.0,
     as_json: JsonOption = False,
 ) -> None:
-    """Print margins, bandwidths and verdicts of every loop.
+    """Print margins, bandwidths and verdicts of every loop; the margins are certified.
 
     Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
     """
@@ -50,7 +50,7 @@ def margins(
         operating_point=operating_point,  # type: ignore[arg-type]
         load_Nm=load,
     )
-    figures = all_loop_figures(loops, step=form != "continuous")
+    figures = all_loop_figures(loops, step=form != "continuous", certify=True)
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
     where: dict[str, Any] = {
@@ -95,7 +95,7 @@ def _print_tables(
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
     from analyses.requirements import all_pass
-    from reports.sections.margins import crossing_table, margin_table, response_table
+    from reports.sections.margins import crossing_table, evidence_notes, margin_table, response_table
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
     from reports.terminal import print_blocks, print_verdict, side_by_side
@@ -114,5 +114,5 @@ def _print_tables(
         len(found.margins.gain_margins) + len(found.margins.phase_margins) > 2 for found in figures.values()
     ):
         blocks.append(crossing_table(named))
-    notes = [note for found in figures.values() for note in (*found.margins.notes, *found.notes)]
+    notes = [*evidence_notes(named), *(n for f in figures.values() for n in (*f.margins.notes, *f.notes))]
     print_blocks([*blocks, *made["blocks"]], notes)
