@@ -51,7 +51,12 @@ class LoopFigures:
 
 
 def loop_figures(
-    loop: Loop, response: Any = None, *, bandwidth: bool = True, step: bool = True
+    loop: Loop,
+    response: Any = None,
+    *,
+    bandwidth: bool = True,
+    step: bool = True,
+    certify: bool = False,
 ) -> LoopFigures:
     """Compute all figures of a loop.
 
@@ -62,6 +67,8 @@ def loop_figures(
         Taken instead of the closed loop for bandwidth and step.
     bandwidth, step : bool
         Whether these are wanted; the step of a continuous loop with delays takes its time.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic, see `stability_margins`.
 
     Raises
     ------
@@ -73,7 +80,7 @@ def loop_figures(
     from actuator_lti.step import step_figures
 
     response = loop.closed_loop if response is None else response
-    margins = stability_margins(loop.open_loop)
+    margins = stability_margins(loop.open_loop, certify=certify)
     if margins.stable is not True:
         return LoopFigures(loop, response, margins, None, None, None)
     notes: list[str] = []
@@ -98,7 +105,7 @@ def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
 
 
 def all_loop_figures(
-    loops: Loops, *, step: bool = True, refused: list[str] | None = None
+    loops: Loops, *, step: bool = True, refused: list[str] | None = None, certify: bool = False
 ) -> dict[str, LoopFigures]:
     """Compute the figures of every loop that the design has, innermost first, by name.
 
@@ -109,6 +116,8 @@ def all_loop_figures(
         Whether step figures are wanted.
     refused : list of str, optional
         Where given, a loop whose margins cannot be found is left out and the reason added here.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic.
 
     Raises
     ------
@@ -119,7 +128,7 @@ def all_loop_figures(
     for name, loop in loops.present.items():
         response = loops.reference_to_output if name == "position" else None
         try:
-            found[name] = loop_figures(loop, response, step=step)
+            found[name] = loop_figures(loop, response, step=step, certify=certify)
         except (InputError, NumericalError) as error:
             if refused is None:
                 raise

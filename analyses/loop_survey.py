@@ -110,6 +110,8 @@ class LoopSurvey:
 def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
+    All margins are certified, see `stability_margins`.
+
     Parameters
     ----------
     design : Design
@@ -130,7 +132,7 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
 
     loops = assemble_loops(design)
     refused: list[str] = []
-    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops)}
+    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops, certify=True)}
     others = attempt("continuous and ideal forms", lambda: _other_forms(design, refused), {})
     forms.update(others)
     step(1)
@@ -154,7 +156,7 @@ def _other_forms(design: Design, refused: list[str]) -> dict[str, Mapping[str, L
     from actuator_lti.loops import assemble_loops
 
     return {
-        form: all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused)
+        form: all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
         for form in FORMS[1:]
     }
 
@@ -164,7 +166,7 @@ def _locked(design: Design, loops: Loops) -> LoopFigures | None:
     from actuator_lti.loops import assemble_loops
 
     fixed = assemble_loops(design, rotor="locked").current if loops.current is not None else None
-    return None if fixed is None else loop_figures(fixed)
+    return None if fixed is None else loop_figures(fixed, certify=True)
 
 
 def _break_points(loops: Loops) -> dict[str, BreakPoint]:
@@ -179,7 +181,7 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
     loop = loops.break_points[name]
     exact = exact_margins(loops, name) if loop.periodic else None
     try:
-        return BreakPoint(loop_figures(loop, bandwidth=False, step=False), exact)
+        return BreakPoint(loop_figures(loop, bandwidth=False, step=False, certify=True), exact)
     except (InputError, NumericalError) as error:
         return BreakPoint(None, exact, str(error))
 
@@ -195,7 +197,8 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         moment = load or 0.0
         slope = friction_slope(design, kind, moment, speed, 1)
         found = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
-        return OperatingPointFigures(label, load, slope, all_loop_figures(found, step=False, refused=refused))
+        figures = all_loop_figures(found, step=False, refused=refused, certify=True)
+        return OperatingPointFigures(label, load, slope, figures)
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:

@@ -91,7 +91,7 @@ class Compared(Found):
         from analyses.loop_figures import all_loop_figures
 
         assert self.variant.design is not None
-        return all_loop_figures(assemble_loops(self.variant.design))
+        return all_loop_figures(assemble_loops(self.variant.design), certify=True)
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 
     assert variant.design is not None
     loops = assemble_loops(variant.design)
-    found = all_loop_figures(loops)
+    found = all_loop_figures(loops, certify=True)
     figures = {**small_signal(variant.design, found), **plan.figures(variant.design, loops)}
     ledger, untested = _ledger(variant.design) if tested else ((), "")
     verdicts = evaluate_requirements(variant.design, found)

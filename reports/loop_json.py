@@ -13,6 +13,8 @@ def loop_json(found: LoopFigures) -> dict[str, Any]:
     return {
         "stable": m.stable,
         "verdict": m.verdict,
+        "evidence": m.evidence,
+        "evidence_reason": m.evidence_reason,
         "gain_margin_db": m.gain_margin_db,
         "phase_margin_deg": m.phase_margin_deg,
         "delay_margin_s": m.delay_margin_s,

@@ -10,8 +10,10 @@ from typing import Any
 from flint import acb, arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.root_isolation import NotIsolated, isolated_roots, square_free
 
 _MOST_BITS = 1 << 15
+_HIGH = 60  # degree above which simultaneous iteration takes less time than the library
 _SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
 V = fmpz_poly([0, 1])
 
@@ -59,8 +61,18 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
         p = p.right_shift(1)
     if p.degree() < 1:
         return []
-    found: Any = (p // p.content()).complex_roots()
+    p = p // p.content()
+    if p.degree() > _HIGH:
+        try:
+            return [(root, n) for factor, n in square_free(p) for root in _roots_of_factor(factor)]
+        except NotIsolated:
+            pass  # the library parts any roots, in its time
+    found: Any = p.complex_roots()
     return [(acb(root), times) for root, times in found]
+
+
+def _roots_of_factor(p: fmpz_poly) -> list[acb]:
+    return isolated_roots(p) if p.degree() > _HIGH else [acb(root) for root, _ in p.complex_roots()]
 
 
 def sign_changes(p: fmpz_poly) -> int:

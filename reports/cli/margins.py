@@ -45,7 +45,7 @@ def margins(
     around: AroundOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Print margins, bandwidths and verdicts of every loop.
+    """Print margins, bandwidths and verdicts of every loop; the margins are certified.
 
     Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
     """
@@ -67,7 +67,7 @@ def margins(
         load_Nm=load,
     )
     outer = _outer_figures(loops, around, step=form != "continuous")
-    figures = all_loop_figures(loops, step=form != "continuous")
+    figures = all_loop_figures(loops, step=form != "continuous", certify=True)
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
     where: dict[str, Any] = {
@@ -94,7 +94,7 @@ def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str
     from analyses.outer_loop_file import read_outer_loop
 
     outer = read_outer_loop(around)
-    return {outer.name: loop_figures(loop_around(loops, outer), step=step)}
+    return {outer.name: loop_figures(loop_around(loops, outer), step=step, certify=True)}
 
 
 def _print_json(
@@ -133,7 +133,7 @@ def _print_tables(
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
     from analyses.requirements import all_pass
-    from reports.sections.margins import crossing_table, margin_table, response_table
+    from reports.sections.margins import crossing_table, evidence_notes, margin_table, response_table
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
     from reports.terminal import print_blocks, print_verdict, side_by_side
@@ -151,10 +151,6 @@ def _print_tables(
     counts = [len(found.margins.gain_margins) + len(found.margins.phase_margins) for found in named.values()]
     if max(counts, default=0) > 2:
         blocks.append(crossing_table(named))
-    notes = [note for found in named.values() for note in (*found.margins.notes, *found.notes)]
-    notes += [
-        f"{name}: broken at the command of the drive; margins {found.margins.evidence}: "
-        f"{found.margins.evidence_reason}"
-        for name, found in outer.items()
-    ]
+    notes = [*evidence_notes(named), *(n for f in named.values() for n in (*f.margins.notes, *f.notes))]
+    notes += [f"{name}: broken at the command of the drive" for name in outer]
     print_blocks([*blocks, *made["blocks"]], notes)

@@ -8,7 +8,7 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import BreakPoint
 from reports import document as doc
-from reports.sections.margins import MARGIN_COLUMNS, finite, margin_row, times, worst_status
+from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, finite, margin_row, times, worst_status
 from reports.sections.names import POINTS
 
 COLUMNS = [
@@ -35,6 +35,12 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
         reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
     note = "The outermost loop has no other loop outside it, so its two lines agree."
     blocks = [doc.table("Break-point matrix", COLUMNS, rows, note)]
+    reasons += [
+        line
+        for name, point in points.items()
+        if point.figures is not None
+        for line in evidence_notes({POINTS.get(name, name): point.figures})
+    ]
     blocks += [doc.text(reason) for reason in reasons]
     exact = [_exact_row(name, point) for name, point in points.items() if point.exact is not None]
     if exact:

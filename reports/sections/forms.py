@@ -10,7 +10,7 @@ from analyses.responses import curve, frequency_grid
 from reports import document as doc
 from reports.numbers import to_minus
 from reports.sections.loop import bode_data, nyquist_hz
-from reports.sections.margins import margin_row, response_row
+from reports.sections.margins import evidence_notes, margin_row, response_row
 from reports.sections.names import FORMS, LOOPS
 
 COLUMNS = [
@@ -39,9 +39,14 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay, the model of the paper. No form uses a Padé approximation."
     )
+    certified = [f.margins.evidence == "certified" for found in forms.values() for f in found.values()]
+    note += " All margins are certified." if all(certified) else ""
+    named = {f"{FORMS[form]}, {name}": f for form, found in forms.items() for name, f in found.items()}
+    reasons = evidence_notes(named)
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The forms differ by sampling, hold and computing delay."
     blocks = [_overlay(forms), table, *(doc.text(f"Not found: {reason}.") for reason in refused)]
+    blocks += [doc.text(reason) for reason in reasons]
     return doc.section("forms", "Sampled, continuous, ideal", blocks, result=_result(rows), intro=intro)
 
 

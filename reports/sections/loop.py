@@ -15,7 +15,14 @@ from reports import document as doc
 from reports.document import rounded
 from reports.numbers import fixed, seconds, to_minus
 from reports.numbers import hertz as hertz_words
-from reports.sections.margins import finite, margin_row, response_row, worst_status
+from reports.sections.margins import (
+    MEANING,
+    evidence_notes,
+    finite,
+    margin_row,
+    response_row,
+    worst_status,
+)
 from reports.sections.names import LOOPS, hertz
 
 REACH = 1.6
@@ -36,7 +43,8 @@ def section(
         blocks.append(sensitivity(title, design, name, found, grid))
     if found.step is not None:
         blocks.append(step(title, found, locked, name=name))
-    blocks += [doc.text(note) for note in (*found.margins.notes, *found.notes)]
+    notes = [*evidence_notes({title: found}), *found.margins.notes, *found.notes]
+    blocks += [doc.text(note) for note in notes]
     return doc.section(
         f"loop-{name}", title, blocks, result=result(found), intro=_intro(name, found), status=status
     )
@@ -56,7 +64,7 @@ def result(found: LoopFigures) -> str:
     ]
     if row["minus3db_hz"] is not None:
         words.append(f"bandwidth {hertz_words(row['minus3db_hz'])}")
-    verdict = found.margins.verdict.capitalize()
+    verdict = f"{found.margins.verdict.capitalize()} ({found.margins.evidence})"
     return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
 
@@ -65,7 +73,7 @@ def _intro(name: str, found: LoopFigures) -> str:
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
     words = f"Cut at its error ({found.loop.unit_in}){rate}, with {inner}."
-    return f"{words} Stability is found from the poles and from the Nyquist count, or by exact arithmetic."
+    return f"{words} The margins are {found.margins.evidence}: {MEANING[found.margins.evidence]}."
 
 
 def _facts(found: LoopFigures) -> dict[str, Any]:

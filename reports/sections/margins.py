@@ -12,9 +12,18 @@ from reports.numbers import to_minus
 from reports.sections.names import LOOPS, hertz
 
 STATUS = {True: "pass", False: "fail", None: "warn"}
+EVIDENCE_STATUS = {"certified": "pass", "checked": "info", "withheld": "warn"}
+MEANING = {
+    "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
+    "interval, and the same answer for numbers 8 units in the last place away",
+    "checked": "double precision; poles and Nyquist count agree, no pole lies within its own error of the "
+    "border",
+    "withheld": "the numbers of the loop do not determine the answer",
+}
 MARGIN_COLUMNS = [
     doc.column("loop", "Loop"),
     doc.column("stable", "Closed loop"),
+    doc.column("evidence", "Margins are"),
     doc.column("gain_margin_db", "Gain margin", "dB", format="fix:2"),
     doc.column("gain_margin_hz", "at", "Hz", format="sig:4"),
     doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
@@ -59,11 +68,12 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
         margin_table(named),
         response_table(named),
         doc.details("Every crossing of every loop", [crossing_table(named)]),
+        *(doc.text(note) for note in evidence_notes(named)),
     ]
     intro = (
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
-        "Sampled form: exact hold and computing delay, no approximation; sliding friction."
-    )
+        "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
+    ) + evidence_meaning(named)
     status = worst_status([found.margins.stable for found in figures.values()])
     return doc.section(
         "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status
@@ -86,7 +96,33 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
             name = min(known, key=lambda n: known[n])
             words.append(f"the smallest {what} is {rows[name][key]:.1f} {unit} ({name})")
     count = "The loop is" if len(rows) == 1 else f"All {len(rows)} loops are"
-    return to_minus(f"{count} stable; {' and '.join(words)}." if words else f"{count} stable.")
+    count = f"{count} stable, {evidence_words(figures)}"
+    return to_minus(f"{count}; {' and '.join(words)}." if words else f"{count}.")
+
+
+def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
+    """Say how the margins of some loops are known: "certified", or which of them are not."""
+    others: dict[str, list[str]] = {}
+    for name, found in figures.items():
+        others.setdefault(found.margins.evidence, []).append(LOOPS.get(name, name).lower())
+    if len(others) == 1:
+        return next(iter(others))
+    return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
+
+
+def evidence_meaning(figures: Mapping[str, LoopFigures]) -> str:
+    """Say what each kind of evidence that occurs means."""
+    kinds = {found.margins.evidence for found in figures.values()}
+    return " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
+
+
+def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
+    """Give the reason of every loop whose margins are not certified."""
+    return [
+        f"{name}, {found.margins.evidence}: {found.margins.evidence_reason}."
+        for name, found in named.items()
+        if found.margins.evidence != "certified"
+    ]
 
 
 def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
@@ -122,6 +158,7 @@ def margin_row(found: LoopFigures) -> dict[str, Any]:
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
     return {
         "stable": {"text": m.verdict, "status": STATUS[m.stable]},
+        "evidence": {"text": m.evidence, "status": EVIDENCE_STATUS[m.evidence]},
         "gain_margin_db": finite(m.gain_margin_db),
         "gain_margin_hz": hertz(gain.frequency_rad_s) if gain else None,
         "phase_margin_deg": finite(m.phase_margin_deg),

@@ -34,7 +34,15 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> dict[str
         "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
         "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
     )
+    margins = [(point, name, f.margins) for point in points for name, f in point.figures.items()]
+    reasons = [
+        f"{point.label}, {name} loop, {m.evidence}: {m.evidence_reason}."
+        for point, name, m in margins
+        if m.evidence != "certified"
+    ]
+    note += " All margins are certified" + (" but those named below." if reasons else ".")
     blocks = [doc.table("PM: phase margin, GM: gain margin, −3 dB: closed loop", columns, rows, note)]
+    blocks += [doc.text(reason) for reason in dict.fromkeys(reasons)]
     intro = "The effect of friction on small motions depends on speed and load."
     return doc.section("operating-points", "Operating points", blocks, result=_result(points), intro=intro)
 
@@ -46,6 +54,12 @@ def _result(points: Sequence[OperatingPointFigures]) -> str:
     ]
     if unstable:
         return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
+    unknown = [
+        point.label for point in points if any(f.margins.stable is None for f in point.figures.values())
+    ]
+    if unknown:
+        count = f"{len(unknown)} of {len(points)} operating points"
+        return f"Stability is not known at {count}: {'; '.join(unknown)}."
     found = [
         (row["phase_margin_deg"], name, point.label)
         for point in points

@@ -1,0 +1,75 @@
+"""A report's margins are certified, its page says so, and what is withheld gives its reason."""
+
+import json
+
+import control
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design
+from actuator_lti.loops import assemble_loops
+from actuator_lti.margins import stability_margins
+from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.loop_survey import survey_loops
+from reports.cli.main import main
+from reports.loop_json import loop_json
+from reports.sections import loop as loop_section
+from reports.sections import margins
+
+
+@pytest.fixture(scope="module")
+def survey():
+    return survey_loops(load_design("ilr33-amber-multirate"))
+
+
+def test_every_margin_of_a_report_is_certified(survey):
+    figures = [f for found in survey.forms.values() for f in found.values()]
+    figures += [f for point in survey.operating_points for f in point.figures.values()]
+    figures += [point.figures for point in survey.break_points.values()]
+    figures.append(survey.locked)
+    assert len(figures) > 20
+    assert {f.margins.evidence for f in figures} == {"certified"}
+
+
+def test_the_page_says_so(survey):
+    made = margins.section(survey.figures, survey.locked)
+    assert made["result"].startswith("All 3 loops are stable, certified; ")
+    assert "exact arithmetic on the numbers of the loop" in made["intro"]
+    rows = made["blocks"][0]["rows"]
+    assert [row["evidence"] for row in rows] == [{"text": "certified", "status": "pass"}] * 4
+    one = loop_section.section("velocity", survey.design, survey.figures["velocity"])
+    assert one["result"].startswith("Stable (certified): gain margin ")
+
+
+def test_a_withheld_margin_gives_its_reason(survey):
+    """Four poles 1e-4 from z = 1: rounding of the coefficients scatters them over the border."""
+    undetermined = control.tf([1e-14], np.poly([1.0 - 1e-4] * 4), 1e-4)
+    loop = survey.figures["velocity"].loop
+    found = LoopFigures(loop, None, stability_margins(undetermined, certify=True), None, None, None)
+    assert found.margins.evidence == "withheld"
+    figures = {**survey.figures, "velocity": found}
+    made = margins.section(figures)
+    assert made["status"] == "warn"
+    texts = [block["text"] for block in made["blocks"] if block["kind"] == "text"]
+    assert any(text.startswith("Velocity loop, withheld: ") for text in texts)
+    assert (
+        margins.evidence_words(figures) == "current loop and position loop certified, velocity loop withheld"
+    )
+    assert loop_json(found)["evidence"] == "withheld"
+    assert loop_json(found)["evidence_reason"]
+
+
+def test_without_being_asked_a_loop_takes_the_quick_way():
+    """Tuning and sampling ask for thousands of loops: they get what two ways in double precision agree on."""
+    loops = assemble_loops(load_design("ilr33-amber"))
+    assert loop_figures(loops.velocity).margins.evidence == "checked"
+    assert all_loop_figures(loops, certify=True)["velocity"].margins.evidence == "certified"
+
+
+def test_the_terminal_prints_the_evidence(capsys):
+    assert main(["margins", "ilr33-amber", "--json"]) == 0
+    loops = json.loads(capsys.readouterr().out)["loops"]
+    assert {found["evidence"] for found in loops.values()} == {"certified"}
+    assert main(["margins", "ilr33-amber"]) == 0
+    line = next(line for line in capsys.readouterr().out.splitlines() if "Margins are" in line)
+    assert line.split() == ["Margins", "are", "certified", "certified", "certified"]
