@@ -16,10 +16,11 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, FilterPlace
 from actuator_lti.errors import InputError
-from analyses.validation.riding import Ride, ride
+from analyses.validation.riding import Ride, bent_about_rest, ride, standing
 from nonlinear import Rows
+from nonlinear.filters import section
 from nonlinear.probe import Probe
 
 Floats = npt.NDArray[np.float64]
@@ -129,29 +130,51 @@ class Rig:
 
     def _start(self, row: Rows) -> None:
         """Write the steady state, from the motor outwards."""
+        row["load"] = self.ride.load_Nm
         row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
+        row["twist_start"] = self.ride.twist_rad
+        row["load_speed_start"] = self.ride.speed_rad_s / self.design.ratio_to_coupling
         wanted, point = self.ride.voltage_V, "u"
         row["voltage_start"] = wanted
         for stage in self._running:
             if stage == "position":
-                row["angle_start"] = -wanted / row.value("position_gain")
+                self._position(row, wanted)
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
-                self._command(row)
                 return
-            integral, step, kp = INTEGRALS[stage]
-            base = self.ride.current_A if stage == "current" else self.ride.speed_rad_s
-            if row.value(step) != 0.0:
-                row[integral], wanted = wanted, base
-            else:
-                wanted = base + wanted / row.value(kp)
+            wanted = self._current(row, wanted) if stage == "current" else self._velocity(row, wanted)
             point = "i_ref" if stage == "current" else "w_ref"
             if point == "i_ref":
                 row["current_command_start"] = wanted
         self._constant(row, point, wanted)
 
-    def _command(self, row: Rows) -> None:
-        """Let the command run with the motor."""
+    def _current(self, row: Rows, voltage_V: float) -> float:
+        """The current controller in its steady state; returns the current command."""
+        i, share = self.ride.current_A, row.value("resistance_feedforward")
+        left = voltage_V - row.value("back_emf_feedforward") * self.ride.speed_rad_s
+        if row.value("current_integral") != 0.0:
+            row["current_integrator_start"] = left - share * i
+            return i
+        kp = row.value("current_gain")
+        return (left + kp * i) / (kp + share)
+
+    def _velocity(self, row: Rows, wanted: float) -> float:
+        """The velocity controller in its steady state; returns the speed command."""
+        w = self.ride.speed_rad_s
+        before = wanted / steady_gain(self.design, "torque")
+        row["current_command_start"] = before  # what the torque filters begin with
+        seen = w * steady_gain(self.design, "speed")
+        if row.value("velocity_integral") != 0.0:
+            row["velocity_integrator_start"] = before
+            return seen
+        return seen + before / row.value("velocity_gain")
+
+    def _position(self, row: Rows, wanted: float) -> None:
+        """Let the command run with the drive, the motor behind it by what the controller needs."""
+        behind = wanted / row.value("position_gain")
+        if self.design.controller.position_loop.sensor == "output":
+            behind -= self.design.ratio_to_coupling * self.ride.twist_rad
+        row["angle_start"] = -behind
         row.ramp("bias", self.ride.speed_rad_s / self.design.total_ratio)
 
     @staticmethod
@@ -163,8 +186,8 @@ class Rig:
     def room(self) -> dict[str, float]:
         """How far each signal may move from its steady value: to its limit, and the speed to zero."""
         row, limits = self.row(), self.design.limits
-        moving = abs(self.ride.speed_rad_s)
-        room = {"motor_speed_rad_s": 0.7 * moving if moving else inf}
+        moving = self.ride.speed_rad_s != 0.0
+        room = {"motor_speed_rad_s": self.ride.room_rad_s if moving else inf}
         room["voltage_V"] = limits.voltage_V - abs(row.value("voltage_start"))
         room["current_command_A"] = limits.peak_current_A - abs(row.value("current_command_start"))
         room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.ride.speed_rad_s)
@@ -172,11 +195,6 @@ class Rig:
             room = {name: value if name == "motor_speed_rad_s" else inf for name, value in room.items()}
         return room
 
-
-INTEGRALS = {
-    "current": ("current_integrator_start", "current_integral", "current_gain"),
-    "velocity": ("velocity_integrator_start", "velocity_integral", "velocity_gain"),
-}
 
 GAINS = {
     "current": ("current_gain", "current_integral"),
@@ -188,6 +206,9 @@ GAINS = {
 def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
     """Set a drive up for one loop, riding on a constant speed that the code chooses.
 
+    A position controller with an integral or a derivative part cannot be started in the steady state of a
+    ramp: then the drive stands, where it has no slope of its own about rest.
+
     Raises
     ------
     InputError
@@ -196,7 +217,10 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     known = (*stages_of(design), *points_of(design))
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    return Rig(design, loop, ride(design), limits_on, held)
+    found = Rig(design, loop, ride(design), limits_on, held)
+    if found.outer == "position" and remembers(design) and not bent_about_rest(design):
+        return Rig(design, loop, standing(design), limits_on, held)
+    return found
 
 
 def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
@@ -207,10 +231,27 @@ def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
     their own about rest.
     """
     found = rig(design, loop, limits_on=False, held=held)
-    friction, play = design.friction, design.coupling is not None and design.coupling.play_rad > 0.0
-    if play or friction.points or friction.viscous(1) != friction.viscous(-1):
+    if bent_about_rest(design):
         return found
-    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False, held=held)
+    return Rig(design, loop, standing(design), limits_on=False, held=held)
+
+
+def remembers(design: Design) -> bool:
+    """Whether the position controller has a state that a ramp sets."""
+    place = design.controller.position
+    return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
+
+
+def steady_gain(design: Design, place: FilterPlace) -> float:
+    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return 1.0
+    found, period_s = 1.0, velocity.every * design.controller.period_s
+    for item in velocity.filters_on(place):
+        b0, b1, b2, a1, a2 = section(item, period_s)
+        found *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return found
 
 
 def stages_of(design: Design) -> tuple[str, ...]:
@@ -229,7 +270,8 @@ def target(design: Design, stage: str) -> str:
 
 def points_of(design: Design) -> tuple[str, ...]:
     """Break points that exist, from the motor outwards."""
-    return (*(target(design, stage) for stage in stages_of(design)), "output")
+    output = () if design.controller.position is None else ("output",)
+    return (*(target(design, stage) for stage in stages_of(design)), *output)
 
 
 def producer(design: Design, point: str) -> str:

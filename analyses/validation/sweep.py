@@ -162,6 +162,7 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
         moved = np.maximum(high - result.mean(name), result.mean(name) - low)
         most = np.minimum(most, room * faint / np.maximum(moved, 1e-300))
     most = np.minimum(most, _acceleration_room(setup, window, result, faint))
+    most = np.minimum(most, _contact_room(setup, window, result, faint))
     return np.where(np.isfinite(most), USED_ROOM * most, faint)
 
 
@@ -175,6 +176,18 @@ def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint:
     low, high = result.span(signal)
     change = (high - low) * np.abs(np.sin(np.pi * window.frequency_hz * T))
     return limit * T * faint / np.maximum(change, 1e-300)
+
+
+def _contact_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
+    """Amplitude at which the coupling's torque would change its sign, by what moves the load."""
+    design = setup.design
+    if not setup.ride.friction_on or setup.ride.coupling_Nm == 0.0:
+        return np.full(faint.size, inf)
+    friction, omega = design.load.friction, 2.0 * np.pi * window.frequency_hz
+    viscous = 0.0 if friction is None else friction.viscous_Nms_rad
+    moved = np.abs(phasor(setup, result, "output_angle_rad")) * design.ratio_behind_coupling * omega
+    swing = moved * np.abs(1j * omega * design.load_side_inertia_kgm2 + viscous)
+    return abs(setup.ride.coupling_Nm) * faint / np.maximum(swing, 1e-300)
 
 
 def _run(

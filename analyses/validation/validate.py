@@ -50,7 +50,7 @@ HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
-NO_POSITION = "the bench is made for drives with a position loop"
+NO_POSITION = "a drive without a position loop: its loops are judged, motion from rest to an angle is not"
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
 PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
@@ -137,17 +137,17 @@ class _Work:
         stable = all(found.stable for found in self.figures.values())
         if not stable:
             self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
-        whole = stable and self.design.controller.position is not None
-        if stable and not whole:
-            self.notes.append(f"not judged: {NO_POSITION}")
+        placed = self.design.controller.position is not None
+        whole = stable and placed
+        if not placed:
+            self.notes.append(NO_POSITION)
         with self.timed("frequency response"):
             share = 0.6 / max(len(self.loops.present), 1)
             loops = {name: self._loop(name, loop, share) for name, loop in self._stage_loops().items()}
         with self.timed("margins in time"):
-            bench = self.design.controller.position is not None
-            confirmed = () if not bench else self._within(0.5, "margins in time", self._confirm, ())
+            confirmed = self._within(0.5, "margins in time", self._confirm, ())
         with self.timed("break points"):
-            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if whole else {}
+            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -217,9 +217,10 @@ class _Work:
         """The linear loops, their figures, and the rigs to test them on."""
         from actuator_lti.loops import assemble_loops
 
-        ride(self.linear)  # a drive that has no steady motion cannot be tested
+        point = ride(self.linear).operating(self.linear)  # a drive without steady motion cannot be tested
+        at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
         model = on_the_bench(self.model)
-        loops = assemble_loops(replace(model, command=self.model.command))
+        loops = assemble_loops(replace(model, command=self.model.command), **at)  # type: ignore[arg-type]
         self.held = None
         if "current" in loops.present:
             self.held = assemble_loops(model, rotor="locked").current
@@ -238,9 +239,7 @@ class _Work:
         """Sweep one loop and read its figures; where that cannot be done, say why."""
         figures, nothing = self.figures[name], np.empty(0, complex)
         reason = "the linear loop is not stable: there is nothing to measure"
-        if name in self.settle and self.design.controller.position is None:
-            reason = NO_POSITION
-        elif name in self.settle:
+        if name in self.settle:
             try:
                 with self.budget.part(share):
                     return self._measured(name, loop)
@@ -303,7 +302,7 @@ class _Work:
             questions += stage_questions(
                 small_rig(self.linear, name, held=name == "current"), loop, margins, settle
             )
-        if len(self.settle) == len(self.figures):
+        if self.settle and len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
         return confirm_margins(questions)
