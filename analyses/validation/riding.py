@@ -7,16 +7,21 @@ changes with the angle cannot ride: it stands, without dry friction, and a const
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cosh, inf, isfinite
 
-from actuator_lti.design.model import Design, Friction, LoadFriction
+import numpy as np
+
+from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
+from nonlinear import Rows
+from nonlinear.filters import section
 
 SHARE = 0.4  # of each limit that riding may take
 FASTEST_RAD_S = 1e6
 SLOWEST = 1e-9  # of that
+COMMANDED = 0.7  # of a limit that a command may take
 ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
 PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
 FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
@@ -38,6 +43,8 @@ class Ride:
         Constant moment at the output.
     twist_rad, coupling_Nm : float
         Of the coupling, at its own shaft; 0 where the drive train is rigid.
+    extra_Nm : float
+        Constant torque at the motor shaft, which holds what presses the coupling of a drive that stands.
     room_rad_s : float
         How far the motor speed may move before the friction is another.
     """
@@ -50,11 +57,24 @@ class Ride:
     twist_rad: float = 0.0
     coupling_Nm: float = 0.0
     room_rad_s: float = inf
+    extra_Nm: float = 0.0
+
+    def load(self, rows: Rows) -> None:
+        """Write the constant moment and torque of the ride into rows."""
+        rows["load"] = self.load_Nm
+        if self.extra_Nm:
+            rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
+
+    @property
+    def delicate(self) -> bool:
+        """Whether a reversal or a parting of the coupling would change what is tested."""
+        return self.friction_on or self.coupling_Nm != 0.0
 
     def operating(self, design: Design) -> Operating:
         """Where the linear loops have to be taken to be those of this ride."""
-        point = "driving" if design.coupling is not None and self.friction_on else "sliding"
-        return Operating(point=point, speed_rad_s=self.speed_rad_s)
+        if design.coupling is not None and self.friction_on:
+            return Operating(point="driving", speed_rad_s=self.speed_rad_s)
+        return Operating(speed_rad_s=self.speed_rad_s)
 
 
 def ride(design: Design, load_Nm: float = 0.0) -> Ride:
@@ -66,8 +86,7 @@ def ride(design: Design, load_Nm: float = 0.0) -> Ride:
     Raises
     ------
     InputError
-        If friction holds the drive whatever it does, or a drive that has to stand has a slope of its own about
-        rest.
+        If friction holds the drive whatever it does, or takes too much of a drive that cannot stand.
 
     Examples
     --------
@@ -115,22 +134,34 @@ def bent_about_rest(design: Design) -> bool:
     return uneven or needs_press(design)
 
 
-def standing(design: Design) -> Ride:
-    """At rest at zero without dry friction, a constant moment against gravity.
+def may_stand(design: Design) -> bool:
+    """Whether the drive has one slope about rest once its dry friction is left out."""
+    return has_to_stand(design) or not bent_about_rest(design)
 
-    Raises
-    ------
-    InputError
-        If the drive has a slope of its own about rest.
+
+def on_its_stand(design: Design) -> Design:
+    """A drive that has to stand, without friction that would give it two slopes there; others as they are."""
+    if not has_to_stand(design):
+        return design
+    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    return design if friction == design.friction else replace(design, friction=friction)
+
+
+def standing(design: Design) -> Ride:
+    """At rest at zero without dry friction; a constant moment holds gravity, and presses a coupling with play.
+
+    The drive is one that `may_stand`, `on_its_stand`.
     """
-    if bent_about_rest(design):
-        message = "a load that changes with the angle, and play, friction of the coupling's torque, a friction"
-        raise InputError(
-            f"{message} map or one that differs by direction: no motion on which the drive is linear",
-            where=design.name,
-        )
-    gravity = design.load.gravity
-    return Ride(0.0, 0.0, 0.0, False, load_Nm=0.0 if gravity is None else -gravity.moment_Nm(0.0))
+    load, coupling = design.load, design.coupling
+    moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
+    if coupling is None or coupling.play_rad == 0.0:
+        return Ride(0.0, 0.0, 0.0, False, load_Nm=moment)
+    press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
+    coupling_Nm = press / design.ratio_behind_coupling
+    twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
+    passed = 1.0 if load.path == "back-drivable" else 0.0
+    held = passed * coupling_Nm / design.ratio_to_coupling
+    return Ride(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
 
 
 def full_torque_Nm(design: Design) -> float:
@@ -156,15 +187,74 @@ def _fastest(design: Design, load_Nm: float) -> Ride | None:
     while speed > SLOWEST * FASTEST_RAD_S:
         found = riding_at(design, speed, load_Nm)
         fits = found.voltage_V <= SHARE * limits.voltage_V and abs(found.current_A) <= current
-        if fits and found.room_rad_s > 0.0:
+        if fits and _commands_fit(design, found) and found.room_rad_s > 0.0:
             return found
         speed *= 0.8
     return None
 
 
+def _commands_fit(design: Design, found: Ride) -> bool:
+    """Whether commands leave room to the limits: a controller without an integral needs an error."""
+    control, limits, wanted = design.controller, design.limits, found.voltage_V
+    if control.current is not None:
+        loop = control.current
+        state = current_state(
+            found,
+            loop.gain_V_A,
+            loop.integral_time_s is not None,
+            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
+            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
+        )
+        wanted = state.command
+        if abs(wanted) > COMMANDED * limits.peak_current_A:
+            return False
+    if control.velocity is not None:
+        velocity = control.velocity
+        integral = velocity.integral_time_s is not None
+        wanted = velocity_state(design, found, wanted, velocity.gain, integral).command
+        return abs(wanted) <= COMMANDED * limits.speed_rad_s
+    return True
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A controller in its steady state: what it is commanded, its integrator, and its output before filters."""
+
+    command: float
+    integrator: float
+    output: float
+
+
+def current_state(ride: Ride, gain: float, integral: bool, back_emf: float, resistance: float) -> Steady:
+    """The current controller of a ride; the last two are shares of feed-forward in V s/rad and ohm."""
+    i, left = ride.current_A, ride.voltage_V - back_emf * ride.speed_rad_s
+    if integral:
+        return Steady(i, left - resistance * i, ride.voltage_V)
+    return Steady((left + gain * i) / (gain + resistance), 0.0, ride.voltage_V)
+
+
+def velocity_state(design: Design, ride: Ride, wanted: float, gain: float, integral: bool) -> Steady:
+    """The velocity controller of a ride whose output behind the filters is ``wanted``."""
+    before = wanted / steady_gain(design, "torque")
+    seen = ride.speed_rad_s * steady_gain(design, "speed")
+    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
+
+
+def steady_gain(design: Design, place: FilterPlace) -> float:
+    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return 1.0
+    found, period_s = 1.0, velocity.every * design.controller.period_s
+    for item in velocity.filters_on(place):
+        b0, b1, b2, a1, a2 = section(item, period_s)
+        found *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return found
+
+
 def riding_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> Ride:
     """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
-    friction, motor = design.friction, design.effective_motor
+    friction = design.friction
     passed = 1.0 if design.load.path == "back-drivable" else 0.0
     twist = coupling_Nm = 0.0
     if design.coupling is None:
@@ -178,15 +268,20 @@ def riding_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> Ride:
         torque += friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
     torque += _own(friction, speed_rad_s) + friction.offset_torque_Nm
     room = _room(friction, speed_rad_s)
+    current, voltage = _driven(design, torque, speed_rad_s)
+    return Ride(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
+
+
+def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:
+    """Current and voltage of a torque at a speed."""
+    motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
-        drive = (0.0, torque / motor.source_gain_Nm_V)
-    else:
-        assert motor.torque_constant_Nm_A is not None
-        assert motor.resistance_ohm is not None
-        assert motor.back_emf_constant_Vs_rad is not None
-        current = torque / motor.torque_constant_Nm_A
-        drive = (current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s)
-    return Ride(speed_rad_s, *drive, True, load_Nm, twist, coupling_Nm, room)
+        return 0.0, torque_Nm / motor.source_gain_Nm_V
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    assert motor.back_emf_constant_Vs_rad is not None
+    current = torque_Nm / motor.torque_constant_Nm_A
+    return current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
 
 
 def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:

@@ -16,11 +16,17 @@ from math import inf
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, FilterPlace
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.riding import Ride, bent_about_rest, ride, standing
+from analyses.validation.riding import (
+    Ride,
+    current_state,
+    may_stand,
+    ride,
+    standing,
+    velocity_state,
+)
 from nonlinear import Rows
-from nonlinear.filters import section
 from nonlinear.probe import Probe
 
 Floats = npt.NDArray[np.float64]
@@ -95,13 +101,23 @@ class Rig:
     def _running(self) -> tuple[str, ...]:
         return self.stages[: self.stages.index(self.outer) + 1]
 
+    @property
+    def condition(self) -> str:
+        """On which motion it is tested, in words."""
+        if self.held:
+            return "rotor held" + (" at a constant speed" if self.ride.speed_rad_s else "")
+        if self.ride.speed_rad_s:
+            pressed = ", coupling pressed by a constant moment" if self.ride.coupling_Nm else ""
+            return f"on a constant speed{pressed}"
+        return "standing, without dry friction"
+
     def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
         """Parameters of a run that starts in the steady state of the ride.
 
         Parameters
         ----------
         gain : float
-            Factor on the controller in front of the point, proportional and integral part: the loop gain.
+            Factor on all parts of the controller in front of the point: the loop gain.
         delay_samples : float
             Extra delay at the point, in its own samples.
         """
@@ -130,7 +146,7 @@ class Rig:
 
     def _start(self, row: Rows) -> None:
         """Write the steady state, from the motor outwards."""
-        row["load"] = self.ride.load_Nm
+        self.ride.load(row)
         row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
         row["twist_start"] = self.ride.twist_rad
         row["load_speed_start"] = self.ride.speed_rad_s / self.design.ratio_to_coupling
@@ -142,32 +158,33 @@ class Rig:
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
                 return
-            wanted = self._current(row, wanted) if stage == "current" else self._velocity(row, wanted)
+            wanted = self._current(row) if stage == "current" else self._velocity(row, wanted)
             point = "i_ref" if stage == "current" else "w_ref"
             if point == "i_ref":
                 row["current_command_start"] = wanted
+        if self.outer == "current":
+            row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         self._constant(row, point, wanted)
 
-    def _current(self, row: Rows, voltage_V: float) -> float:
+    def _current(self, row: Rows) -> float:
         """The current controller in its steady state; returns the current command."""
-        i, share = self.ride.current_A, row.value("resistance_feedforward")
-        left = voltage_V - row.value("back_emf_feedforward") * self.ride.speed_rad_s
-        if row.value("current_integral") != 0.0:
-            row["current_integrator_start"] = left - share * i
-            return i
-        kp = row.value("current_gain")
-        return (left + kp * i) / (kp + share)
+        found = current_state(
+            self.ride,
+            row.value("current_gain"),
+            row.value("current_integral") != 0.0,
+            row.value("back_emf_feedforward"),
+            row.value("resistance_feedforward"),
+        )
+        row["current_integrator_start"] = found.integrator
+        return found.command
 
     def _velocity(self, row: Rows, wanted: float) -> float:
         """The velocity controller in its steady state; returns the speed command."""
-        w = self.ride.speed_rad_s
-        before = wanted / steady_gain(self.design, "torque")
-        row["current_command_start"] = before  # what the torque filters begin with
-        seen = w * steady_gain(self.design, "speed")
-        if row.value("velocity_integral") != 0.0:
-            row["velocity_integrator_start"] = before
-            return seen
-        return seen + before / row.value("velocity_gain")
+        integral = row.value("velocity_integral") != 0.0
+        found = velocity_state(self.design, self.ride, wanted, row.value("velocity_gain"), integral)
+        row["velocity_integrator_start"] = found.integrator
+        row["current_command_start"] = found.output  # what the torque filters begin with
+        return found.command
 
     def _position(self, row: Rows, wanted: float) -> None:
         """Let the command run with the drive, the motor behind it by what the controller needs."""
@@ -197,7 +214,7 @@ class Rig:
 
 
 GAINS = {
-    "current": ("current_gain", "current_integral"),
+    "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),
     "velocity": ("velocity_gain", "velocity_integral"),
     "position": ("position_gain", "position_integral", "derivative"),
 }
@@ -218,7 +235,7 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     found = Rig(design, loop, ride(design), limits_on, held)
-    if found.outer == "position" and remembers(design) and not bent_about_rest(design):
+    if found.outer == "position" and remembers(design) and may_stand(design):
         return Rig(design, loop, standing(design), limits_on, held)
     return found
 
@@ -231,7 +248,7 @@ def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
     their own about rest.
     """
     found = rig(design, loop, limits_on=False, held=held)
-    if bent_about_rest(design):
+    if not may_stand(design):
         return found
     return Rig(design, loop, standing(design), limits_on=False, held=held)
 
@@ -240,18 +257,6 @@ def remembers(design: Design) -> bool:
     """Whether the position controller has a state that a ramp sets."""
     place = design.controller.position
     return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
-
-
-def steady_gain(design: Design, place: FilterPlace) -> float:
-    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return 1.0
-    found, period_s = 1.0, velocity.every * design.controller.period_s
-    for item in velocity.filters_on(place):
-        b0, b1, b2, a1, a2 = section(item, period_s)
-        found *= (b0 + b1 + b2) / (1.0 + a1 + a2)
-    return found
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

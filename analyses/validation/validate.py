@@ -26,13 +26,13 @@ from analyses.validation.confirm import (
     point_questions,
     stage_questions,
 )
-from analyses.validation.figures import NotMeasured, measure_figures
+from analyses.validation.figures import NotMeasured, hertz, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
 from analyses.validation.ledger import Entry, loop_entries, not_judged, point_entries
 from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.riding import ride
+from analyses.validation.riding import has_to_stand, on_its_stand, ride
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
@@ -51,6 +51,7 @@ THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
 NO_POSITION = "a drive without a position loop: its loops are judged, motion from rest to an angle is not"
+ABOUT = (0.98, 1.0, 1.02)  # frequencies about each figure, beside the grid
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
 PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
@@ -119,7 +120,7 @@ class _Work:
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
-        self.linear = on_the_bench(self.design)
+        self.linear = on_its_stand(on_the_bench(self.design))
         self._warm_up()
         self.budget = Budget(self.settings.seconds)
         if replace(self.linear, command=self.design.command) != self.design:
@@ -220,6 +221,7 @@ class _Work:
         point = ride(self.linear).operating(self.linear)  # a drive without steady motion cannot be tested
         at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
         model = on_the_bench(self.model)
+        model = on_its_stand(model) if has_to_stand(self.linear) else model
         loops = assemble_loops(replace(model, command=self.model.command), **at)  # type: ignore[arg-type]
         self.held = None
         if "current" in loops.present:
@@ -281,7 +283,23 @@ class _Work:
         top = HIGHEST / loop.period_s
         low = max(self._lowest(name), LOWEST * top)
         count = max(self.settings.frequencies, int(PER_DECADE * np.log10(top / low)))
-        return np.geomspace(low, top, count)
+        marks = np.outer(self._marks(name), ABOUT).ravel()
+        return np.unique(
+            np.concatenate([np.geomspace(low, top, count), marks[(marks > low) & (marks < top)]])
+        )
+
+    def _marks(self, name: str) -> list[float]:
+        """Where the linear loop has figures, Hz: there a grid may miss a narrow dip or peak."""
+        found = self.figures[name]
+        marks = [m.frequency_hz for m in found.margins.phase_margins]
+        if found.bandwidth is not None:
+            band = found.bandwidth
+            marks += [x for x in (band.minus3db_hz, band.minus90deg_hz, band.resonance_hz) if x]
+        if found.peaks is not None:
+            marks += [
+                hertz(x) or 0.0 for x in (found.peaks.sensitivity_rad_s, found.peaks.complementary_rad_s)
+            ]
+        return [x for x in marks if x > 0.0]
 
     def _lowest(self, name: str) -> float:
         """Where the sweep of a loop begins, Hz."""
@@ -399,7 +417,9 @@ class _Work:
                 rows.append(not_judged(name, "bandwidth", "Hz", None, None, loop.reason))
                 rows += point_entries(name, loop.confirmed)
             else:
-                rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed)
+                errors = [x for x in (loop.open_errors, loop.closed_errors) if x is not None]
+                words = rig(self.linear, name, held=name == "current").condition
+                rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed, errors, words)
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:
