@@ -165,7 +165,7 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
 
 def _torque_gain(design: Design) -> tuple[float, float]:
     """Motor torque per unit of what the speed controller sets, rotor at rest, and the resistance."""
-    motor = design.motor
+    motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V, 1.0
     assert motor.torque_constant_Nm_A is not None

@@ -100,7 +100,7 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray) -> Non
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit
     drag = design.friction.viscous(1) * limit
-    motor = design.motor
+    motor = design.effective_motor
     if motor.has_electrical_dynamics and motor.torque_constant_Nm_A:
         current = drag / motor.torque_constant_Nm_A
         voltage = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * limit

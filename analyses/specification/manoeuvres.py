@@ -157,7 +157,7 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
 
 def motor_torque_Nm(design: Design, run: Trajectory) -> np.ndarray:
     """Motor torque at the ticks: ``kM i``, or the gain times the drive signal of an ideal source."""
-    motor = design.motor
+    motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V * run.voltage_V
     assert motor.torque_constant_Nm_A is not None

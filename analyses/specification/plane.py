@@ -43,7 +43,7 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
 
     Sources: equation (1) in steady motion, ``u = R i + kE w``; equation (9).
     """
-    motor, limits = design.motor, design.limits
+    motor, limits = design.effective_motor, design.limits
     top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
     speed = np.linspace(0.0, 1.25 * top, POINTS)
     bounds = []

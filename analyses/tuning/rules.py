@@ -129,8 +129,8 @@ def rule_gains(design: Design, separation: float = SEPARATION) -> RuleGains:
     torque = _torque_gain(design)
     if design.controller.current is not None:
         small = _current(design, small, values, steps)
-        assert design.motor.torque_constant_Nm_A is not None
-        torque = design.motor.torque_constant_Nm_A
+        assert design.effective_motor.torque_constant_Nm_A is not None
+        torque = design.effective_motor.torque_constant_Nm_A
     crossover = 1.0 / (2.0 * small)
     if design.controller.velocity is not None:
         crossover = _velocity(design, small, torque, values, steps)
@@ -144,7 +144,7 @@ def rule_gains(design: Design, separation: float = SEPARATION) -> RuleGains:
 
 def _torque_gain(design: Design) -> float:
     """Torque per volt (standing) where there is no current loop."""
-    motor = design.motor
+    motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V
     assert motor.torque_constant_Nm_A is not None
@@ -154,7 +154,7 @@ def _torque_gain(design: Design) -> float:
 
 def _current(design: Design, small: float, values: dict[str, float], steps: list[str]) -> float:
     """Magnitude optimum; returns the lag that the closed loop is to the next one."""
-    motor, loop = design.motor, design.controller.current
+    motor, loop = design.effective_motor, design.controller.current
     assert loop is not None
     assert motor.resistance_ohm is not None
     assert motor.inductance_H is not None
@@ -187,7 +187,7 @@ def _velocity(design: Design, lag: float, torque: float, values: dict[str, float
 
 def _direct(design: Design, small: float, torque: float) -> float:
     """Position gain where nothing lies between: |drive| = 1 at a tenth of 1/T_sigma or at its corner."""
-    motor = design.motor
+    motor = design.effective_motor
     drag = design.friction.viscous_Nms_rad
     if motor.has_electrical_dynamics and design.controller.current is None:
         assert motor.back_emf_constant_Vs_rad is not None

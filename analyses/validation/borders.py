@@ -9,8 +9,10 @@ interval in which the verdict changes; at the end the growth rate, which is smoo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import exp, inf, log
+from itertools import pairwise
+from math import exp, inf, isfinite, log
 from typing import Literal
 
 import numpy as np
@@ -33,9 +35,14 @@ ROUNDS = 6
 CLOSE = 3e-3  # relative width at which the bracket is interpolated
 CYCLES = 20  # periods in a window
 FAINT = 1e-3  # kick, relative to the room of the signal
+FAINTEST = 3e-5  # where a reversal, or a coupling that comes free, may end a motion that would die out
 NOTHING = 1e-6  # of the kick: what is left counts as nothing
+NOTHING_RIDING = 1e-4  # the same on a ride, where rounding of the growing angle is seen in a speed estimate
 NEAR = 0.01  # relative width of the bracket from which on the frequency seen is that at the border
 OFF_FREQUENCY = 1e-2  # relative: so far off, the windows are fitted anew
+ATTEMPTS = 3  # at a border, each with more time to settle
+LONGER = 4
+DECEIVED = 3.0  # widths of the bracket that a border may move when it is measured again
 GAIN_RANGE = 1e3
 LONGEST_DELAY_SAMPLES = 2000.0
 SHORTEST_DELAY_SAMPLES = 0.02
@@ -114,16 +121,17 @@ class Search:
         room = replace(self.setup, limits_on=True).room[signal[self.setup.point]]
         if room == inf:
             room = max(abs(self.setup.ride.speed_rad_s), 1.0)
-        return FAINT * room
+        return (FAINTEST if self.setup.ride.delicate else FAINT) * room
 
     def growth(self, result: BatchResult) -> Floats:
         """Growth of the oscillation from window to window as a logarithm; +-inf where it is plain."""
         last, earlier = (self._size(result, k) for k in (0, 1))
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.log(last / earlier)
-        gone = (last <= NOTHING * self.kick) | ~np.isfinite(found)
+        nothing = NOTHING_RIDING if self.setup.ride.delicate else NOTHING
+        gone = (last <= nothing * self.kick) | ~np.isfinite(found)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
-        burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.friction_on)
+        burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.delicate)
         return np.where(burst, inf, np.where(gone, -inf, found))
 
     def _size(self, result: BatchResult, last: int) -> Floats:
@@ -166,6 +174,10 @@ class Border:
     runs : int
     unknown : str
         Why nothing is known (no time left, say): no border is then no finding.
+    error : float
+        Relative error of the value: how far a straight line and a polynomial through the growth rates next to
+        the border lie apart, what a wait of twice the time changes, and what windows that do not hold whole
+        periods leave.
     """
 
     value: float | None
@@ -173,6 +185,7 @@ class Border:
     frequency_hz: float | None
     runs: int
     unknown: str = ""
+    error: float = 0.0
 
 
 @dataclass
@@ -184,10 +197,12 @@ class _Hunt:
     low: float = 0.0
     high: float = 0.0
     growths: tuple[float, float] = (-inf, inf)
+    beside: tuple[tuple[float, float], ...] = ()
     frequency_hz: float | None = None
     runs: int = 0
     found: bool | None = None
     spoiled: str = ""
+    shift: float | None = None
 
     def take(self, result: BatchResult) -> None:
         """Keep the first interval in which decay turns into growth."""
@@ -205,6 +220,8 @@ class _Hunt:
             self.frequency_hz = float(hertz[k - 1])
         if k < growth.size:
             self.high, self.growths = float(self.values[k]), (self.growths[0], float(growth[k]))
+        near = [j for j in (k - 2, k + 1) if 0 <= j < growth.size and np.isfinite(growth[j])]
+        self.beside = tuple((log(float(self.values[j])), float(growth[j])) for j in near)
         self.values = np.geomspace(self.low, self.high, VALUES + 2)[1:-1]
         if self.frequency_hz is not None and abs(log(self.high / self.low)) < NEAR:
             off = abs(self.frequency_hz / self.search.frequency_hz - 1.0)
@@ -228,11 +245,60 @@ class _Hunt:
             return Border(None, bracket, None, self.runs, self.spoiled or CUT)
         if not self.found:
             return Border(None, bracket, None, self.runs)
-        a, b = self.growths
-        part = -a / (b - a) if np.isfinite(a) and np.isfinite(b) and b > a else 0.5
-        part = part if self.search.smooth else 0.5
-        value = exp(log(self.low) + part * log(self.high / self.low))
-        return Border(value, bracket, self.frequency_hz, self.runs)
+        width = abs(log(self.high / self.low))
+        if not self.search.smooth:
+            return Border(
+                exp(0.5 * log(self.low * self.high)), bracket, self.frequency_hz, self.runs, "", width
+            )
+        value, error = self.interpolated()
+        error += 0.125 * width if self.shift is None else abs(self.shift)
+        return Border(exp(value), bracket, self.frequency_hz, self.runs, "", error)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether a border has been found between two growth rates."""
+        return bool(self.found and self.done and self.search.smooth and np.isfinite(self.growths).all())
+
+    def again(self, result: BatchResult) -> None:
+        """Take the growth rate at the border after a longer wait: how far it says that the border lies."""
+        growth, (a, b) = float(self.search.growth(result)[0]), self.growths
+        if isfinite(growth) and b > a:
+            self.shift = growth / (b - a) * abs(log(self.high / self.low))
+            self.runs += 1
+
+    @property
+    def deceived(self) -> bool:
+        """Whether what looked like growth was something else that had not died out yet."""
+        return self.shift is not None and abs(self.shift) > DECEIVED * abs(log(self.high / self.low))
+
+    def longer(self) -> _Hunt:
+        """The same hunt with more time to settle."""
+        search = replace(self.search, settle_ticks=LONGER * self.search.settle_ticks)
+        return _Hunt(search, search.grid(), runs=self.runs)
+
+    def interpolated(self) -> tuple[float, float]:
+        """Logarithm of the value at which the growth rate is zero, and its error."""
+        ends, (a, b) = (log(self.low), log(self.high)), self.growths
+        width = abs(ends[1] - ends[0])
+        if not (np.isfinite(a) and np.isfinite(b) and b > a):
+            return 0.5 * (ends[0] + ends[1]), width
+        line = ends[0] - a / (b - a) * (ends[1] - ends[0])
+        points = sorted([(ends[0], a), (ends[1], b), *self.beside], key=lambda item: item[1])
+        off = abs((self.frequency_hz or 0.0) / self.search.frequency_hz - 1.0)
+        leak = off * width / (b - a)  # of a period that a window does not hold, over the slope of the growth
+        if len(points) < 3 or any(y[1] <= x[1] for x, y in pairwise(points)):
+            return line, 0.125 * width + leak
+        curve = _through(points)
+        return curve, abs(curve - line) + leak
+
+
+def _through(points: Sequence[tuple[float, float]]) -> float:
+    """Where the polynomial of x over growth through (x, growth) passes zero growth (Lagrange)."""
+    total = 0.0
+    for j, (x, g) in enumerate(points):
+        others = [h for k, (_, h) in enumerate(points) if k != j]
+        total += x * float(np.prod([h / (h - g) for h in others]))
+    return total
 
 
 def find_borders(
@@ -255,10 +321,21 @@ def find_borders(
     2.95
     """
     hunts = [_Hunt(search, search.grid()) for search in searches]
+    for k in range(ATTEMPTS):
+        open_ = [hunt for hunt in hunts if hunt.found is None and not hunt.spoiled]
+        if not _hunt(open_, threads, progress):
+            return [hunt.border(stopped=True) for hunt in hunts]
+        if k < ATTEMPTS - 1:
+            hunts = [hunt.longer() if hunt.deceived else hunt for hunt in hunts]
+    return [hunt.border() for hunt in hunts]
+
+
+def _hunt(hunts: list[_Hunt], threads: int | None, progress: Progress | None) -> bool:
+    """Take some hunts to their ends; whether there was time enough."""
     try:
         _control(hunts, threads)
     except OutOfTime:
-        return [hunt.border(stopped=True) for hunt in hunts]
+        return False
     for k in range(ROUNDS):
         waiting = [hunt for hunt in hunts if not hunt.done and not hunt.spoiled]
         if not waiting:
@@ -267,10 +344,25 @@ def find_borders(
             for group in _groups(waiting):
                 _advance(group, threads)
         except OutOfTime:
-            return [hunt.border(stopped=True) for hunt in hunts]
+            return False
         if progress is not None:
             progress(k + 1, ROUNDS)
-    return [hunt.border() for hunt in hunts]
+    with suppress(OutOfTime):
+        _measure_again([hunt for hunt in hunts if hunt.smooth], threads)
+    return True
+
+
+def _measure_again(hunts: list[_Hunt], threads: int | None) -> None:
+    """Run every border found once more, with twice the wait."""
+    if not hunts:
+        return
+    parts = []
+    for hunt in hunts:
+        later = replace(hunt.search, settle_ticks=2 * hunt.search.settle_ticks)
+        parts.append(later.rows(np.array([exp(hunt.interpolated()[0])])))
+    result = Rows.join(parts).run(threads=threads)
+    for k, hunt in enumerate(hunts):
+        hunt.again(result.part(slice(k, k + 1)))
 
 
 def _control(hunts: list[_Hunt], threads: int | None) -> None:
@@ -283,7 +375,7 @@ def _control(hunts: list[_Hunt], threads: int | None) -> None:
     for k, hunt in enumerate(ones):
         own = result.part(slice(k, k + 1))
         met = [f"{name} limit" for name in LIMITERS if own.limit_fraction(name)[0] > 0.0]
-        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.ride.friction_on else []
+        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.ride.delicate else []
         if not met and not hunt.search.smooth and 0.0 <= float(hunt.search.growth(own)[0]) < inf:
             hunt.spoiled = "the drive as it is has not come to rest within the time given"
         if met and bool(own.ok[0]):

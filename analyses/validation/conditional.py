@@ -23,7 +23,8 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from analyses.validation.confirm import oscillation_hz
-from analyses.validation.release import full_range, full_torque_Nm
+from analyses.validation.release import full_range
+from analyses.validation.riding import full_torque_Nm
 from analyses.validation.rig import points_of
 from nonlinear import Rows
 
@@ -175,7 +176,7 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
     limits, points = design.limits, points_of(design)
     found = [("u", limits.voltage_V, "voltage limit")]
     if "i_ref" in points:
-        short = limits.voltage_V / (design.motor.resistance_ohm or 1.0)
+        short = limits.voltage_V / (design.effective_motor.resistance_ohm or 1.0)
         name = "current limit" if limits.peak_current_A <= short else "voltage limit as a current, U/R"
         found = [("i_ref", min(limits.peak_current_A, short), name)]
     if "w_ref" in points:
@@ -197,7 +198,7 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
 
 def _to_output(design: Design, point: str, omega: float) -> float:
     """Output angle per unit behind the limit at a frequency, inner loops taken as ideal."""
-    motor, J, friction = design.motor, design.inertia_kgm2, design.friction
+    motor, J, friction = design.effective_motor, design.inertia_kgm2, design.friction
     inertia = abs(J * (1j * omega) ** 2 + friction.viscous() * 1j * omega)
     if point == "w_ref":
         return 1.0 / (omega * design.total_ratio)
@@ -246,7 +247,7 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
 
 def _standing(design: Design) -> float:
     """Error (output, rad) that dry friction can hold up against a controller without integral."""
-    control, friction, motor = design.controller, design.friction, design.motor
+    control, friction, motor = design.controller, design.friction, design.effective_motor
     gain = control.position_loop.gain * (control.velocity.gain if control.velocity else 1.0)
     if control.velocity is not None and control.velocity.integral_time_s is not None:
         gain *= 10.0  # the integral brings it on in time

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from analyses.validation.borders import CYCLES, Border, Kind, Search, find_borders
 from analyses.validation.rig import Rig
+from analyses.validation.tolerance import allowed
 from nonlinear import Rows
 from nonlinear.probe import fractional_delay
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
-TOLERANCE = 1e-3  # of the ratio or the delay
 SETTLE_CYCLES = 20
 LONGEST_SETTLE_TICKS = 5_000
 LONGEST_BLIND_TICKS = 20_000  # nobody knows what to wait for: several of the slowest time constants
@@ -49,8 +49,8 @@ class Confirmation:
     border : Border
     period_s : float
         Sampling period of the point.
-    tolerance : float
-        Relative; the instrument's own error is added to it.
+    condition : str
+        On which motion.
     """
 
     loop: str
@@ -61,7 +61,7 @@ class Confirmation:
     instrument: float | None
     border: Border
     period_s: float
-    tolerance: float = TOLERANCE
+    condition: str = ""
 
     @property
     def instrument_error(self) -> float:
@@ -69,6 +69,11 @@ class Confirmation:
         if self.instrument is None or not self.predicted:
             return 0.0
         return abs(self.instrument / self.predicted - 1.0)
+
+    @property
+    def error(self) -> float:
+        """Relative error of what was found: of the border, and of the instrument."""
+        return self.border.error + self.instrument_error
 
     @property
     def difference(self) -> float | None:
@@ -84,7 +89,7 @@ class Confirmation:
             return True
         if self.predicted is None or self.border.value is None:
             return self.predicted is None and self.border.value is None
-        return abs(self.border.value / self.predicted - 1.0) <= self.tolerance + self.instrument_error
+        return abs(self.border.value / self.predicted - 1.0) <= allowed(self.error, 1.0)
 
 
 class ComputingDelay(Search):
@@ -121,6 +126,7 @@ class Question:
             instrument=self.instrument,
             border=border,
             period_s=setup.period_s if self.kind != "computing delay" else setup.design.controller.period_s,
+            condition=setup.condition,
         )
 
 

@@ -6,16 +6,26 @@ bracket, then interpolated by a polynomial through the nearest points; no linear
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from analyses.validation.coherent import coherent
+from analyses.validation.reading import (
+    NOTHING,
+    Reading,
+    crossing,
+    distinct,
+    first_fall,
+    maximum,
+    value_at,
+)
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig, small_rig
-from analyses.validation.sweep import stepped_sine
+from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
@@ -23,9 +33,10 @@ PEAK_DB = 1e-3  # a maximum is measured again until it no longer changes by so m
 PEAK_ROUNDS = 5
 DIP = 1.0  # of the value at zero frequency: lower minima are looked at closely
 WIDE = 1.15  # ratio of two frequencies: a crossing between them is measured again
+SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
+SETTLED = 0.02  # band of the settling time
 UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
-NEAREST = 6  # points of the interpolating polynomial
-SAME = 1e-9  # of log f: points nearer to each other count as one
+ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
 HIGHEST_OF_NYQUIST = 0.4995
 STEP_PART = 0.02  # of the room of the signal
 
@@ -34,7 +45,8 @@ STEP_PART = 0.02  # of the room of the signal
 class StepMeasured:
     """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
 
-    ``reason`` is empty where neither a limit nor a reversal took part.
+    ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
+    the final value (what its last tenth still moves), the other two what it does to the times.
     """
 
     rise_time_s: float
@@ -44,39 +56,44 @@ class StepMeasured:
     time_s: Floats
     response: Floats
     reason: str
+    error: float = 0.0
+    rise_error_s: float = 0.0
+    settling_error_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Figures of one loop as measured; ``None`` where the response has no such figure in the range.
+    """Figures of one loop as measured, each with its own error; no value where the range holds none.
 
     Attributes
     ----------
-    bandwidth_hz, minus90deg_hz : float or None
-        As `actuator_lti.bandwidth.Bandwidth`, 1/sqrt(2) of the value at zero frequency.
-    resonance_db, resonance_hz : float
-        Largest T over its value at zero frequency.
-    sensitivity_peak_db, complementary_peak_db : float
-    phase_margin_deg, crossover_hz : float or None
-        The phase margin nearest to zero.
+    bandwidth, minus90deg : Reading
+        Hz, as `actuator_lti.bandwidth.Bandwidth`, 1/sqrt(2) of the value at zero frequency.
+    resonance_peak, resonance : Reading
+        Largest T over its value at zero frequency, dB, and where, Hz.
+    sensitivity_peak, complementary_peak : Reading
+        dB.
+    phase_margin, crossover : Reading
+        The phase margin nearest to zero, deg, and its crossover, Hz.
     step : StepMeasured
     sweep : Sweep
         With the points measured again.
-    peak_error_db : float
-        Change of the maxima of T and S when they were last measured again more closely.
+    point_error : ndarray, shape (K,)
+        Relative error of each point of the sweep: what two windows differ by, carried on to the end of the
+        transient.
     """
 
-    bandwidth_hz: float | None
-    minus90deg_hz: float | None
-    resonance_db: float
-    resonance_hz: float
-    sensitivity_peak_db: float
-    complementary_peak_db: float
-    phase_margin_deg: float | None
-    crossover_hz: float | None
+    bandwidth: Reading
+    minus90deg: Reading
+    resonance_peak: Reading
+    resonance: Reading
+    sensitivity_peak: Reading
+    complementary_peak: Reading
+    phase_margin: Reading
+    crossover: Reading
     step: StepMeasured
     sweep: Sweep
-    peak_error_db: float = 0.0
+    point_error: Floats
 
 
 def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int) -> Measured:
@@ -99,26 +116,49 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
     fine = refined(setup, sweep, [*_brackets(sweep, dc), *_dips(sweep, dc)], settle_ticks)
     wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
     fine = refined(setup, fine, wide, settle_ticks)
-    fine, error = _peaks_refined(setup, fine, settle_ticks)
+    fine, changed = _peaks_refined(setup, fine, settle_ticks)
     f = fine.frequency_hz
+    own = point_errors(setup, fine, step_ticks)
+    error = float(own[fine.valid].max())
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
-    crossover, margin = _phase_margin(fine)
-    peak_t, at_t = maximum(f, closed)
-    peak_s, _ = maximum(f, np.abs(fine.sensitivity))
+    crossover, margin = _phase_margin(fine, error)
+    peak, at = maximum(f, closed, error + step.error + changed / 8.7)
+    top, _ = maximum(f, np.abs(fine.closed_loop), error)
+    peak_s, _ = maximum(f, np.abs(fine.sensitivity), error)
+    low = Reading(abs(dc), abs(dc) * step.error)
+    over = (peak.value or 0.0) > 1.0
     return Measured(
-        bandwidth_hz=first_fall(f, closed, sqrt(0.5)),
-        minus90deg_hz=first_fall(f, phase, -90.0),
-        resonance_db=max(20.0 * np.log10(peak_t), 0.0),
-        resonance_hz=at_t if peak_t > 1.0 else 0.0,
-        sensitivity_peak_db=20.0 * np.log10(peak_s),
-        complementary_peak_db=20.0 * np.log10(abs(dc) * max(peak_t, 1.0)),
-        phase_margin_deg=margin,
-        crossover_hz=crossover,
+        bandwidth=first_fall(f, closed, sqrt(0.5), sqrt(0.5) * (error + step.error)),
+        minus90deg=first_fall(f, phase, -90.0, float(np.degrees(error))),
+        resonance_peak=_decibel(peak) if over else Reading(0.0, 8.7 * peak.error),
+        resonance=at if over else Reading(0.0),
+        sensitivity_peak=_decibel(peak_s, changed),
+        complementary_peak=_decibel(top if over else low, changed),
+        phase_margin=margin,
+        crossover=crossover,
         step=step,
         sweep=fine,
-        peak_error_db=error,
+        point_error=own,
     )
+
+
+def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
+    """Relative error of each point: the change between its windows, and what the transient still holds.
+
+    A transient of the time constant tau that changes by d from one window W to the next has
+    ``d/(1 - exp(-W/tau))`` to go.
+    """
+    tick_s = setup.design.controller.period_s
+    window = coherent(sweep.frequency_hz, tick_s, setup.base_ticks).ticks
+    slowest = max(step_ticks / SETTLE_TIME_CONSTANTS, 1.0)
+    return sweep.unsteadiness / -np.expm1(-window / slowest) + ROUNDING
+
+
+def _decibel(value: Reading, more_db: float = 0.0) -> Reading:
+    """A ratio in dB, with an error that is added in dB."""
+    size = max(value.value or 0.0, 1e-300)
+    return Reading(20.0 * float(np.log10(size)), 8.7 * value.error / size + more_db)
 
 
 class NotMeasured(Exception):
@@ -140,7 +180,7 @@ def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, 
     for _ in range(PEAK_ROUNDS):
         pairs = []
         for values in (np.abs(sweep.closed_loop), np.abs(sweep.sensitivity)):
-            f, v = _distinct(sweep.frequency_hz, values)
+            f, v = distinct(sweep.frequency_hz, values)
             k = int(np.argmax(np.where(np.isfinite(v), v, -np.inf)))
             pairs += [(float(f[j]), float(f[j + 1])) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
         sweep = refined(setup, sweep, list(dict.fromkeys(pairs)), settle_ticks)
@@ -153,8 +193,8 @@ def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, 
 
 def _peaks_db(sweep: Sweep) -> Floats:
     """Maxima of T and S in dB."""
-    both = (maximum(sweep.frequency_hz, np.abs(x))[0] for x in (sweep.closed_loop, sweep.sensitivity))
-    return 20.0 * np.log10(np.array(list(both)))
+    both = (maximum(sweep.frequency_hz, np.abs(x))[0].value for x in (sweep.closed_loop, sweep.sensitivity))
+    return 20.0 * np.log10(np.array(list(both), dtype=float))
 
 
 def refined(setup: Rig, sweep: Sweep, brackets: list[tuple[float, float]], settle_ticks: int) -> Sweep:
@@ -199,38 +239,26 @@ def _falls(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
 
 def _dips(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     """Around minima of T that may dip below -3 dB between two points."""
-    f, v = _distinct(sweep.frequency_hz, np.abs(sweep.closed_loop) / abs(dc))
+    f, v = distinct(sweep.frequency_hz, np.abs(sweep.closed_loop) / abs(dc))
     with np.errstate(invalid="ignore"):
         low = (v[1:-1] <= v[:-2]) & (v[1:-1] <= v[2:]) & (v[1:-1] >= sqrt(0.5)) & (v[1:-1] < DIP)
     return [(float(f[k + j]), float(f[k + j + 1])) for k in np.flatnonzero(low) for j in (0, 1)]
 
 
-def _phase_margin(sweep: Sweep) -> tuple[float | None, float | None]:
-    """Crossover (Hz) and phase margin (deg) nearest to zero."""
+def _phase_margin(sweep: Sweep, error: float) -> tuple[Reading, Reading]:
+    """Crossover (Hz) and phase margin (deg) nearest to zero; ``error`` is the relative one of the points."""
     with np.errstate(divide="ignore"):
-        f, gain = _distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
-    _, phase = _distinct(sweep.frequency_hz, _phase(sweep.open_loop))
+        f, gain = distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
+    _, phase = distinct(sweep.frequency_hz, np.degrees(_phase(sweep.open_loop)))
     found = []
     for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
         if not np.isfinite(gain[k : k + 2]).all():
             continue  # a point that could not be measured hides what lies between
-        hertz = _root(f, gain, int(k), 0.0)
-        angle = np.degrees(float(_local(f, phase, int(k))(np.log(hertz))))
-        found.append((hertz, (angle + 180.0 + 180.0) % 360.0 - 180.0))
-    return min(found, key=lambda item: abs(item[1]), default=(None, None))
-
-
-def first_fall(frequency_hz: Floats, values: Floats, level: float) -> float | None:
-    """Frequency at which values first fall below a level.
-
-    ``None`` if never in the range, or if the point before was not measured (not finite).
-    """
-    f, v = _distinct(frequency_hz, values)
-    below = v < level
-    k = int(np.argmax(below))
-    if not below[k] or k == 0 or not np.isfinite(v[k - 1]):
-        return None
-    return _root(f, v, k - 1, level)
+        hertz = crossing(f, gain, int(k), 0.0, error)
+        angle = value_at(f, phase, int(k), hertz, float(np.degrees(error)))
+        assert angle.value is not None
+        found.append((hertz, Reading((angle.value + 360.0) % 360.0 - 180.0, angle.error)))
+    return min(found, key=lambda item: abs(item[1].value or 0.0), default=(NOTHING, NOTHING))
 
 
 def _phase(response: npt.NDArray[np.complex128]) -> Floats:
@@ -240,83 +268,45 @@ def _phase(response: npt.NDArray[np.complex128]) -> Floats:
     return out
 
 
-def _distinct(frequency_hz: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Points without those that lie on the one before."""
-    apart = np.concatenate([[True], np.diff(np.log(frequency_hz)) > SAME])
-    return frequency_hz[apart], values[apart]
-
-
-def maximum(frequency_hz: Floats, values: Floats) -> tuple[float, float]:
-    """Largest value between the points, and where."""
-    from scipy.optimize import minimize_scalar
-
-    k = int(np.argmax(np.where(np.isfinite(values), values, -np.inf)))
-    inside = 0 < k < values.size - 1 and np.isfinite(values[k - 1 : k + 2]).all()
-    if not inside:
-        return float(values[k]), float(frequency_hz[k])
-    curve = _local(frequency_hz, values, k)
-    ends = (np.log(frequency_hz[k - 1]), np.log(frequency_hz[k + 1]))
-    found = minimize_scalar(
-        lambda x: -float(curve(x)), bounds=ends, method="bounded", options={"xatol": 1e-9}
-    )
-    return -float(found.fun), float(np.exp(found.x))
-
-
-def _root(frequency_hz: Floats, values: Floats, k: int, level: float) -> float:
-    """Where the curve passes a level between points k and k + 1, both measured and apart."""
-    from scipy.optimize import brentq
-
-    curve = _local(frequency_hz, values - level, k)
-    a, b = np.log(frequency_hz[k]), np.log(frequency_hz[k + 1])
-    return float(np.exp(brentq(lambda x: float(curve(x)), a, b, xtol=1e-13)))
-
-
-def _local(frequency_hz: Floats, values: Floats, k: int) -> Callable[[float], float]:
-    """Polynomial in log f through the points nearest to k; exact at the points."""
-    from scipy.interpolate import BarycentricInterpolator
-
-    x = np.log(frequency_hz)
-    good = np.flatnonzero(np.isfinite(values) & np.concatenate([[True], np.diff(x) > SAME]))
-    order = np.argsort(np.abs(x[good] - 0.5 * (x[k] + x[min(k + 1, x.size - 1)])), kind="stable")
-    near = np.sort(good[order[:NEAREST]])
-    curve = BarycentricInterpolator(x[near], values[near])
-    return lambda at_x: float(curve(at_x))
-
-
 def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
     """Step added at the rig's point: what comes back is the step response of T."""
     signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
     room = setup.room[signal]
     size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.ride.speed_rad_s), 1.0))
     for _ in range(3):
-        time_s, response, reason = _step(setup, size, settle_ticks)
-        if not reason:
+        time_s, response, reason, turned = _step(setup, size, settle_ticks)
+        bent = setup.design.load.gravity is not None and turned > SMALL_ANGLE_RAD
+        if not reason and not bent:
             break
-        size *= 0.2
+        size *= SMALL_ANGLE_RAD / turned if bent else 0.2
     found = step_figures_of(time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
-        time_s, response, reason = _step(
-            small_rig(setup.design, setup.loop, held=setup.held), size, settle_ticks
-        )
+        small = small_rig(setup.design, setup.loop, held=setup.held)
+        time_s, response, reason, _ = _step(small, size, settle_ticks)
         found = step_figures_of(time_s, response, reason)
     return found
 
 
-def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str]:
-    """Run one step; times and response at the updates of the point."""
-    row = setup.row()
-    n = setup.hold_ticks
-    row["ticks"] = settle_ticks + 4 * n
-    row.step(setup.point, size)
-    run = row.trajectory()
-    before = run.probes[setup.point].before[::n]
-    steady = before[0]
+def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
+    """Run the drive with a step and without; times and difference at the updates of the point, and what limits.
+
+    What the start leaves to settle is in both.  The last is the largest difference of the output angle.
+    """
+    n, runs = setup.hold_ticks, []
+    for height in (0.0, size):
+        row = setup.row()
+        row["ticks"] = settle_ticks + 4 * n
+        row.step(setup.point, height)
+        runs.append(row.trajectory())
+    steady, run = runs
     reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
     if run.status != "ok":
         reason = run.status
-    elif not reason and run.events and setup.ride.friction_on:
+    elif not reason and run.events and setup.ride.delicate:
         reason = "speed reversal"
-    return run.time_s[::n], (steady - before) / size, reason
+    before, without = (one.probes[setup.point].before[::n] for one in (run, steady))
+    turned = float(np.abs(run.output_angle_rad - steady.output_angle_rad).max())
+    return run.time_s[::n], (without - before) / size, reason, turned
 
 
 def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
@@ -331,11 +321,28 @@ def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepM
         reason = (
             f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
         )
-    rise = float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
-    outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
-    settled = float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0
+    error = moved + ROUNDING
+    settled = [_settled(time_s, y, SETTLED + part * error) for part in (0.0, 1.0, -1.0)]
+    rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
     over = max(100.0 * (float(y.max()) - 1.0), 0.0)
-    return StepMeasured(rise, over, settled, final, time_s, response, reason)
+    return StepMeasured(
+        rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
+    )
+
+
+def _rise(time_s: Floats, y: Floats) -> float:
+    """10 to 90 %."""
+    return float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
+
+
+def _settled(time_s: Floats, y: Floats, band: float) -> float:
+    """From when on a response stays within a band about 1."""
+    outside = np.flatnonzero(np.abs(y - 1.0) > band)
+    return float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0
+
+
+def _spread(values: list[float]) -> float:
+    return max(values) - min(values)
 
 
 def hertz(omega_rad_s: float | None) -> float | None:

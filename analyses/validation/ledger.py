@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, log10
+from math import inf, isfinite, log, log10
 
 import numpy as np
 
@@ -17,16 +17,15 @@ from analyses.loop_figures import LoopFigures
 from analyses.validation.borders import LONGEST_DELAY_SAMPLES
 from analyses.validation.confirm import Confirmation
 from analyses.validation.figures import Measured, hertz, most_frequent
+from analyses.validation.reading import Reading
+from analyses.validation.response import SweepErrors
+from analyses.validation.tolerance import PREDICTED, allowed
 
-SMALL = "feedback loop, small signal, on a constant speed"
-LOCKED = "feedback loop, small signal, rotor held at a constant speed"
-RELATIVE = 1e-3
-GAIN_DB = 0.01
-PHASE_DEG = 0.1
+SMALL = "feedback loop, small signal"
 NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
 NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
-MARGIN_DB = 20.0 * log10(1.0 + RELATIVE)
-OVERSHOOT_PERCENT = 0.05
+DECIBEL = 20.0 / log(10.0)  # dB per unit of a small relative change
+ROUND = 1e-9  # of a tolerance: the rounding of its own sum
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Entry:
     predicted, measured : float or None
         ``None``: there is no such value (no crossing, no motion).
     tolerance : float
-        Allowed difference, in the unit.
+        Allowed difference, in the unit: from the error that the measurement itself has (`tolerance`).
     passed : bool or None
         ``None``: not judged, see ``reason``.
     reason : str
@@ -70,57 +69,86 @@ class Entry:
 
 
 def entry(
-    loop: str, quantity: str, unit: str, predicted: float | None, measured: float | None, tolerance: float
+    loop: str,
+    quantity: str,
+    unit: str,
+    predicted: float | None,
+    found: Reading,
+    condition: str = SMALL,
+    least: float = 0.0,
 ) -> Entry:
-    """A prediction that is judged: agreement within the tolerance, or in that there is no such value."""
-    known = [None if x is None or not isfinite(x) else float(x) for x in (predicted, measured)]
+    """A prediction that is judged: agreement within the tolerance, or in that there is no such value.
+
+    ``least`` is the resolution of the figure: a sample of the time, say.
+    """
+    known = [None if x is None or not isfinite(x) else float(x) for x in (predicted, found.value)]
     reason = ""
+    tolerance = float(least + allowed(found.error, known[0] or 0.0))
     if known[0] is None and known[1] is None:
         passed, reason = True, "predicted and measured: there is none"
     elif known[0] is None or known[1] is None:
         passed = False
         reason = "not predicted, but measured" if known[0] is None else "predicted, but not found"
     else:
-        passed = abs(known[1] - known[0]) <= tolerance * (1.0 + 1e-9)
-    return Entry(loop, quantity, unit, SMALL, known[0], known[1], tolerance, passed, reason)
+        passed = abs(known[1] - known[0]) <= tolerance * (1.0 + ROUND)
+    return Entry(loop, quantity, unit, condition, known[0], known[1], tolerance, passed, reason)
 
 
 def loop_entries(
-    name: str, figures: LoopFigures, found: Measured, confirmed: Sequence[Confirmation]
+    name: str,
+    figures: LoopFigures,
+    found: Measured,
+    confirmed: Sequence[Confirmation],
+    errors: Sequence[SweepErrors],
+    condition: str,
 ) -> list[Entry]:
-    """Everything predicted of one loop."""
-    margins = figures.margins
+    """Everything predicted of one loop; ``errors`` are those of open and closed loop, point by point."""
+    margins, words = figures.margins, f"{SMALL}, {condition}"
     phase = None if margins.phase_margin is None else margins.phase_margin.deg
     rows = [
+        *response_entries(name, errors, found, words),
         *_band_entries(name, figures, found),
-        entry(name, "phase_margin", "deg", phase, found.phase_margin_deg, PHASE_DEG),
+        entry(name, "phase_margin", "deg", phase, found.phase_margin),
         *(_confirmed(name, item) for item in confirmed),
     ]
     if figures.peaks is not None:
         peaks = figures.peaks
-        rows.append(
-            entry(
-                name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak_db, _peak(found)
-            )
-        )
+        rows.append(entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak))
         T = peaks.complementary_db
-        rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak_db, _peak(found)))
+        rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak))
     rows = [_unless_hidden(row, figures, found) for row in rows]
     rows += _step_entries(name, figures, found)
-    if name == "current":
-        rows = [replace(row, condition=LOCKED) for row in rows]
+    return [replace(row, condition=words) if row.condition == SMALL else row for row in rows]
+
+
+RESPONSES = ("response_open", "response_closed")
+
+
+def response_entries(
+    name: str, errors: Sequence[SweepErrors], found: Measured, condition: str
+) -> list[Entry]:
+    """The worst point of each response: its distance from the linear one, over what that point may be off."""
+    rows = []
+    valid = found.sweep.valid
+    for quantity, error in zip(RESPONSES, errors, strict=False):
+        off = np.hypot(error.gain_db / DECIBEL, np.radians(error.phase_deg))[valid]
+        may = allowed(found.point_error[valid], 1.0)
+        if not off.size:
+            continue
+        k = int(np.argmax(off / may))
+        hertz = found.sweep.frequency_hz[valid][k]
+        passed = bool(off[k] <= may[k])
+        where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"
+        rows.append(Entry(name, quantity, "%", condition, 0.0, 100.0 * off[k], 100.0 * may[k], passed, where))
     return rows
-
-
-def _peak(found: Measured) -> float:
-    """Tolerance of a maximum: that of a gain, and what its own last refinement still changed."""
-    return GAIN_DB + 2.0 * found.peak_error_db
 
 
 def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
     """An entry, not judged where the frequencies that decide it could not be measured."""
     sweep = found.sweep
     if row.passed is not False or "margin_" in row.quantity or row.quantity == "delay_margin":
+        return row
+    if row.quantity in RESPONSES:
         return row
     band, peaks, margins = figures.bandwidth, figures.peaks, figures.margins
     at = {
@@ -137,6 +165,9 @@ def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
         return replace(
             row, passed=None, tolerance=inf, reason=f"below the lowest frequency measured, {f[0]:.3g} Hz"
         )
+    if at is not None and at > f[-1]:
+        why = f"above the highest frequency measured, {f[-1]:.4g} Hz"
+        return replace(row, passed=None, tolerance=inf, reason=why)
     k = int(np.searchsorted(f, at or f[-1]))
     near = bad[max(k - NEIGHBOURS, 0) : k + NEIGHBOURS]
     if not near.any():
@@ -154,22 +185,19 @@ def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     """Bandwidths and resonance."""
     band = figures.bandwidth
     if band is None:
-        return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth_hz, _why(figures))]
+        return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth.value, _why(figures))]
     if band.resonance_peak_db > NO_DC_DB:
         why = "the loop has no gain at zero frequency that bandwidth and resonance could be related to"
         return [not_judged(name, "bandwidth", "Hz", None, None, why)]
     fall, turn = hertz(band.minus3db_rad_s), hertz(band.minus90deg_rad_s)
     top = found.sweep.frequency_hz[-1]
     rows = [
-        entry(name, "bandwidth", "Hz", _within(fall, top), found.bandwidth_hz, RELATIVE * (fall or 0.0)),
-        entry(
-            name, "bandwidth_90deg", "Hz", _within(turn, top), found.minus90deg_hz, RELATIVE * (turn or 0.0)
-        ),
-        entry(name, "resonance_peak", "dB", band.resonance_peak_db, found.resonance_db, _peak(found)),
+        entry(name, "bandwidth", "Hz", _within(fall, top), found.bandwidth),
+        entry(name, "bandwidth_90deg", "Hz", _within(turn, top), found.minus90deg),
+        entry(name, "resonance_peak", "dB", band.resonance_peak_db, found.resonance_peak),
     ]
     if band.resonance_peak_db > 0.05:
-        at = band.resonance_hz
-        rows.append(entry(name, "resonance", "Hz", at, found.resonance_hz, 10.0 * RELATIVE * at))
+        rows.append(entry(name, "resonance", "Hz", band.resonance_hz, found.resonance))
     return rows
 
 
@@ -187,11 +215,26 @@ def _step_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     step, seen = figures.step, found.step
     if step is None or seen.reason:
         return [not_judged(name, "rise_time", "s", None, None, seen.reason or _why(figures))]
-    sample = 1.01 * (step.period_s or 0.0)
+    sample = step.period_s or 0.0  # both are read at samples: a level met at one may be met at the next
+    over = Reading(seen.overshoot_percent, 100.0 * seen.error)
     return [
-        entry(name, "rise_time", "s", step.rise_time_s, seen.rise_time_s, sample),
-        entry(name, "overshoot", "%", step.overshoot_percent, seen.overshoot_percent, OVERSHOOT_PERCENT),
-        entry(name, "settling_time", "s", step.settling_time_s, seen.settling_time_s, sample),
+        entry(
+            name,
+            "rise_time",
+            "s",
+            step.rise_time_s,
+            Reading(seen.rise_time_s, seen.rise_error_s),
+            least=sample,
+        ),
+        entry(name, "overshoot", "%", step.overshoot_percent, over, least=100.0 * PREDICTED),
+        entry(
+            name,
+            "settling_time",
+            "s",
+            step.settling_time_s,
+            Reading(seen.settling_time_s, seen.settling_error_s),
+            least=sample,
+        ),
     ]
 
 
@@ -206,37 +249,23 @@ QUANTITY = {
 def _confirmed(name: str, item: Confirmation) -> Entry:
     """A margin confirmed in time, in dB or s."""
     quantity, unit = QUANTITY[item.kind]
+    words = f"{SMALL}, {item.condition}"
     if item.border.unknown:
         value = _in_unit(item.predicted, item)
-        return not_judged(name, quantity, unit, value, None, item.border.unknown)
+        return not_judged(name, quantity, unit, value, None, item.border.unknown, words)
     values = [_in_unit(value, item) for value in (item.predicted, item.border.value)]
     if "delay" in item.kind and values[1] is None and (item.predicted or 0.0) > 0.9 * LONGEST_DELAY_SAMPLES:
         why = f"longer than the instrument's longest delay of {LONGEST_DELAY_SAMPLES:.0f} samples"
-        return not_judged(name, quantity, unit, values[0], None, why)
-    tolerance = MARGIN_DB
-    if unit == "s":
-        tolerance = (item.tolerance + item.instrument_error) * (values[0] or 0.0)
-    row = entry(name, quantity, unit, values[0], values[1], tolerance)
+        return not_judged(name, quantity, unit, values[0], None, why, words)
+    error = item.error * (DECIBEL if unit == "dB" else values[0] or 0.0)
+    least = DECIBEL * PREDICTED if unit == "dB" else 0.0
+    row = entry(name, quantity, unit, values[0], Reading(values[1], error), words, least)
     if row.passed and row.predicted is None:
         reach = max(item.border.bracket)
         far = max(reach, 1.0 / min(item.border.bracket)) if unit == "dB" else reach
         text = f"{20.0 * log10(far):.0f} dB" if unit == "dB" else f"{far * item.period_s:.3g} s"
-        return Entry(*_fields(row), f"predicted and found: none within {text}")
+        return replace(row, reason=f"predicted and found: none within {text}")
     return row
-
-
-def _fields(row: Entry) -> tuple[str, str, str, str, float | None, float | None, float, bool | None]:
-    """All but the reason."""
-    return (
-        row.loop,
-        row.quantity,
-        row.unit,
-        row.condition,
-        row.predicted,
-        row.measured,
-        row.tolerance,
-        row.passed,
-    )
 
 
 def _in_unit(value: float | None, item: Confirmation) -> float | None:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from analyses.validation.borders import Border, Search, find_borders
 from analyses.validation.confirm import Confirmation
-from analyses.validation.riding import Ride
+from analyses.validation.riding import Ride, full_torque_Nm
 from analyses.validation.rig import Rig
 from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
@@ -111,7 +111,7 @@ class AmplitudeMargin:
 
 def full_range(design: Design) -> dict[str, float]:
     """Full deflection (output), motor speed and motor current that a drive can reach."""
-    limits, motor = design.limits, design.motor
+    limits, motor = design.limits, design.effective_motor
     speed, current = limits.speed_rad_s, limits.peak_current_A
     if motor.resistance_ohm is not None and motor.back_emf_constant_Vs_rad is not None:
         speed = min(speed, limits.voltage_V / motor.back_emf_constant_Vs_rad)
@@ -119,18 +119,9 @@ def full_range(design: Design) -> dict[str, float]:
     elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:
         speed = min(speed, limits.voltage_V * motor.source_gain_Nm_V / design.friction.viscous())
     if not isfinite(speed):
-        speed = (
-            design.validation.full_deflection_rad * design.total_ratio * design.controller.position_loop.gain
-        )
+        place = design.controller.position
+        speed = design.validation.full_deflection_rad * design.total_ratio * (place.gain if place else 1.0)
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
-
-
-def full_torque_Nm(design: Design) -> float:
-    """Torque that the motor reaches at its limits, at standstill."""
-    motor = design.motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * design.limits.voltage_V
-    return (motor.torque_constant_Nm_A or 0.0) * full_range(design)["current"]
 
 
 def _scale(setup: Rig) -> float:

@@ -1,15 +1,30 @@
-"""Constant speed under a test: the motion on which dry friction is a constant torque (model.md section 4)."""
+"""Constant speed under a test: the motion on which dry friction is a constant torque (model.md section 4).
+
+Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
+at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive whose load
+changes with the angle cannot ride: it stands, without dry friction, and a constant moment holds gravity.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite
+from dataclasses import dataclass, replace
+from math import cosh, inf, isfinite
 
-from actuator_lti.design.model import Design
+import numpy as np
+
+from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
+from nonlinear import Rows
+from nonlinear.filters import section
 
 SHARE = 0.4  # of each limit that riding may take
 FASTEST_RAD_S = 1e6
+SLOWEST = 1e-9  # of that
+COMMANDED = 0.7  # of a limit that a command may take
+ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
+PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
+FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 
 @dataclass(frozen=True)
@@ -24,24 +39,54 @@ class Ride:
         What the motor takes (zero current for an ideal torque source).
     friction_on : bool
         Whether dry friction and offset torque take part.
+    load_Nm : float
+        Constant moment at the output.
+    twist_rad, coupling_Nm : float
+        Of the coupling, at its own shaft; 0 where the drive train is rigid.
+    extra_Nm : float
+        Constant torque at the motor shaft, which holds what presses the coupling of a drive that stands.
+    room_rad_s : float
+        How far the motor speed may move before the friction is another.
     """
 
     speed_rad_s: float
     current_A: float
     voltage_V: float
     friction_on: bool
+    load_Nm: float = 0.0
+    twist_rad: float = 0.0
+    coupling_Nm: float = 0.0
+    room_rad_s: float = inf
+    extra_Nm: float = 0.0
+
+    def load(self, rows: Rows) -> None:
+        """Write the constant moment and torque of the ride into rows."""
+        rows["load"] = self.load_Nm
+        if self.extra_Nm:
+            rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
+
+    @property
+    def delicate(self) -> bool:
+        """Whether a reversal or a parting of the coupling would change what is tested."""
+        return self.friction_on or self.coupling_Nm != 0.0
+
+    def operating(self, design: Design) -> Operating:
+        """Where the linear loops have to be taken to be those of this ride."""
+        if design.coupling is not None and self.friction_on:
+            return Operating(point="driving", speed_rad_s=self.speed_rad_s)
+        return Operating(speed_rad_s=self.speed_rad_s)
 
 
 def ride(design: Design, load_Nm: float = 0.0) -> Ride:
     """Choose a constant speed that leaves room to every limit and stays far from reversal.
 
-    The speed takes at most `SHARE` of the speed limit, the voltage and the peak current.  A drive whose
-    load torque grows with the angle cannot ride at a steady torque: it stands, without dry friction.
+    The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
+    Where friction alone takes more than that, the drive stands, without it.
 
     Raises
     ------
     InputError
-        If dry friction alone takes more than that share of the current or the voltage.
+        If friction holds the drive whatever it does, or takes too much of a drive that cannot stand.
 
     Examples
     --------
@@ -50,31 +95,224 @@ def ride(design: Design, load_Nm: float = 0.0) -> Ride:
     >>> found.speed_rad_s > 100.0, found.voltage_V < 0.5 * 12.0
     (True, True)
     """
-    if design.load.path == "back-drivable" and design.load.moment_slope_Nm_rad != 0.0:
-        return Ride(0.0, 0.0, 0.0, friction_on=False)
+    if has_to_stand(design):
+        return standing(design)
+    loads = [load_Nm]
+    if needs_press(design):
+        whole = full_torque_Nm(design) * design.total_ratio / _felt(design)
+        loads = [load_Nm - part * whole for part in PRESSED]
+    for moment in loads:
+        found = _fastest(design, moment)
+        if found is not None:
+            return found
+    least, limits = riding_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
+    stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
+    if stuck or bent_about_rest(design):
+        message = f"friction takes more than {1.0 if stuck else SHARE:.0%} of the current or voltage limit"
+        raise InputError(f"{message}: no steady motion to test on", where=design.name)
+    return standing(design)
+
+
+def needs_press(design: Design) -> bool:
+    """Whether a coupling has to be kept on one side: it has play, or its torque makes friction."""
+    coupling = design.coupling
+    return coupling is not None and (coupling.play_rad > 0.0 or design.friction.load_coefficient > 0.0)
+
+
+def has_to_stand(design: Design) -> bool:
+    """Whether the load changes with the angle, in a way that the motor feels."""
+    load = design.load
+    changes = load.moment_slope_Nm_rad != 0.0 or load.gravity is not None
+    felt = load.path == "back-drivable" or design.friction.load_coefficient > 0.0
+    return changes and (felt or design.coupling is not None)
+
+
+def bent_about_rest(design: Design) -> bool:
+    """Whether play or friction gives a drive at rest another slope than a moving one has."""
+    friction = design.friction
+    uneven = bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
+    return uneven or needs_press(design)
+
+
+def may_stand(design: Design) -> bool:
+    """Whether the drive has one slope about rest once its dry friction is left out."""
+    return has_to_stand(design) or not bent_about_rest(design)
+
+
+def on_its_stand(design: Design) -> Design:
+    """A drive that has to stand, without friction that would give it two slopes there; others as they are."""
+    if not has_to_stand(design):
+        return design
+    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    return design if friction == design.friction else replace(design, friction=friction)
+
+
+def standing(design: Design) -> Ride:
+    """At rest at zero without dry friction; a constant moment holds gravity, and presses a coupling with play.
+
+    The drive is one that `may_stand`, `on_its_stand`.
+    """
+    load, coupling = design.load, design.coupling
+    moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
+    if coupling is None or coupling.play_rad == 0.0:
+        return Ride(0.0, 0.0, 0.0, False, load_Nm=moment)
+    press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
+    coupling_Nm = press / design.ratio_behind_coupling
+    twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
+    passed = 1.0 if load.path == "back-drivable" else 0.0
+    held = passed * coupling_Nm / design.ratio_to_coupling
+    return Ride(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
+
+
+def full_torque_Nm(design: Design) -> float:
+    """Torque that the motor reaches at its limits, at standstill."""
+    motor, limits = design.effective_motor, design.limits
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * limits.voltage_V
+    short = limits.voltage_V / (motor.resistance_ohm or 1.0)
+    return (motor.torque_constant_Nm_A or 0.0) * min(limits.peak_current_A, short)
+
+
+def _felt(design: Design) -> float:
+    """Motor torque that a moment at the output costs, times N."""
+    passed = 1.0 if design.load.path == "back-drivable" else 0.0
+    return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
+
+
+def _fastest(design: Design, load_Nm: float) -> Ride | None:
+    """The fastest ride within the limits; None where there is none."""
     limits = design.limits
     speed = SHARE * limits.speed_rad_s if isfinite(limits.speed_rad_s) else FASTEST_RAD_S
-    while speed > 1e-9 * FASTEST_RAD_S:
+    current = SHARE * min(limits.peak_current_A, limits.continuous_current_A)
+    while speed > SLOWEST * FASTEST_RAD_S:
         found = riding_at(design, speed, load_Nm)
-        if found.voltage_V <= SHARE * limits.voltage_V and found.current_A <= SHARE * limits.peak_current_A:
+        fits = found.voltage_V <= SHARE * limits.voltage_V and abs(found.current_A) <= current
+        if fits and _commands_fit(design, found) and found.room_rad_s > 0.0:
             return found
         speed *= 0.8
-    dry = design.friction.dry_Nm(load_Nm)
-    message = f"dry friction of {dry:.3g} N m takes more than {SHARE:.0%} of the current or voltage limit"
-    raise InputError(f"{message}: no steady motion to test on", where=design.name)
+    return None
+
+
+def _commands_fit(design: Design, found: Ride) -> bool:
+    """Whether commands leave room to the limits: a controller without an integral needs an error."""
+    control, limits, wanted = design.controller, design.limits, found.voltage_V
+    if control.current is not None:
+        loop = control.current
+        state = current_state(
+            found,
+            loop.gain_V_A,
+            loop.integral_time_s is not None,
+            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
+            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
+        )
+        wanted = state.command
+        if abs(wanted) > COMMANDED * limits.peak_current_A:
+            return False
+    if control.velocity is not None:
+        velocity = control.velocity
+        integral = velocity.integral_time_s is not None
+        wanted = velocity_state(design, found, wanted, velocity.gain, integral).command
+        return abs(wanted) <= COMMANDED * limits.speed_rad_s
+    return True
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A controller in its steady state: what it is commanded, its integrator, and its output before filters."""
+
+    command: float
+    integrator: float
+    output: float
+
+
+def current_state(ride: Ride, gain: float, integral: bool, back_emf: float, resistance: float) -> Steady:
+    """The current controller of a ride; the last two are shares of feed-forward in V s/rad and ohm."""
+    i, left = ride.current_A, ride.voltage_V - back_emf * ride.speed_rad_s
+    if integral:
+        return Steady(i, left - resistance * i, ride.voltage_V)
+    return Steady((left + gain * i) / (gain + resistance), 0.0, ride.voltage_V)
+
+
+def velocity_state(design: Design, ride: Ride, wanted: float, gain: float, integral: bool) -> Steady:
+    """The velocity controller of a ride whose output behind the filters is ``wanted``."""
+    before = wanted / steady_gain(design, "torque")
+    seen = ride.speed_rad_s * steady_gain(design, "speed")
+    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
+
+
+def steady_gain(design: Design, place: FilterPlace) -> float:
+    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return 1.0
+    found, period_s = 1.0, velocity.every * design.controller.period_s
+    for item in velocity.filters_on(place):
+        b0, b1, b2, a1, a2 = section(item, period_s)
+        found *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return found
 
 
 def riding_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> Ride:
-    """The steady state at a motor speed (rad/s, positive)."""
-    friction, motor = design.friction, design.motor
-    torque = friction.dry_Nm(load_Nm) + friction.offset_torque_Nm + friction.viscous() * speed_rad_s
-    if design.load.path == "back-drivable":
-        torque -= load_Nm / design.total_ratio
+    """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
+    friction = design.friction
+    passed = 1.0 if design.load.path == "back-drivable" else 0.0
+    twist = coupling_Nm = 0.0
+    if design.coupling is None:
+        torque = friction.load_coefficient * abs(load_Nm) - passed * load_Nm / design.total_ratio
+    else:
+        coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
+        coupling_Nm -= load_Nm / design.ratio_behind_coupling
+        half = 0.5 * design.coupling.play_rad * (1.0 if coupling_Nm > 0.0 else -1.0)
+        twist = coupling_Nm / design.coupling.stiffness_Nm_rad + half
+        torque = passed * coupling_Nm / design.ratio_to_coupling
+        torque += friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
+    torque += _own(friction, speed_rad_s) + friction.offset_torque_Nm
+    room = _room(friction, speed_rad_s)
+    current, voltage = _driven(design, torque, speed_rad_s)
+    return Ride(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
+
+
+def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:
+    """Current and voltage of a torque at a speed."""
+    motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
-        return Ride(speed_rad_s, 0.0, torque / motor.source_gain_Nm_V, friction_on=True)
+        return 0.0, torque_Nm / motor.source_gain_Nm_V
     assert motor.torque_constant_Nm_A is not None
     assert motor.resistance_ohm is not None
     assert motor.back_emf_constant_Vs_rad is not None
-    current = torque / motor.torque_constant_Nm_A
-    voltage = motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
-    return Ride(speed_rad_s, current, voltage, friction_on=True)
+    current = torque_Nm / motor.torque_constant_Nm_A
+    return current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
+
+
+def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
+    """Friction of the load at its own shaft."""
+    if friction is None:
+        return 0.0
+    return friction.dry_torque_Nm + friction.viscous_Nms_rad * speed_rad_s + friction.offset_torque_Nm
+
+
+def _own(friction: Friction, speed_rad_s: float) -> float:
+    """Dry and viscous friction of the motor, or its map, forward."""
+    points = friction.map(1)
+    if not points:
+        return friction.dry_Nm(0.0) + friction.viscous() * speed_rad_s
+    torque = points[0].torque_Nm
+    pieces = segments(points)
+    ends = [start for start, _ in pieces[1:]] + [inf]
+    for (start, slope), end in zip(pieces, ends, strict=True):
+        torque += slope * max(min(speed_rad_s, end) - start, 0.0)
+    return torque
+
+
+def _room(friction: Friction, speed_rad_s: float) -> float:
+    """How far the speed may move: part of the way to rest, to a bend of the map, to the slope of a tanh."""
+    if friction.law == "tanh" and friction.dry_Nm(0.0) > 0.0:
+        least = friction.smoothing_speed_rad_s * 14.0  # there the slope of tanh is below FLAT
+        return min(ROOM * speed_rad_s, speed_rad_s - least) if _flat(friction, speed_rad_s) else 0.0
+    bends = [0.0, *(start for start, _ in segments(friction.map(1)))] if friction.points else [0.0]
+    return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
+
+
+def _flat(friction: Friction, speed_rad_s: float) -> bool:
+    x = speed_rad_s / friction.smoothing_speed_rad_s
+    return x > 300.0 or cosh(x) ** -2 < FLAT

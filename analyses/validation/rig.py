@@ -18,7 +18,14 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.riding import Ride, ride
+from analyses.validation.riding import (
+    Ride,
+    current_state,
+    may_stand,
+    ride,
+    standing,
+    velocity_state,
+)
 from nonlinear import Rows
 from nonlinear.probe import Probe
 
@@ -94,13 +101,23 @@ class Rig:
     def _running(self) -> tuple[str, ...]:
         return self.stages[: self.stages.index(self.outer) + 1]
 
+    @property
+    def condition(self) -> str:
+        """On which motion it is tested, in words."""
+        if self.held:
+            return "rotor held" + (" at a constant speed" if self.ride.speed_rad_s else "")
+        if self.ride.speed_rad_s:
+            pressed = ", coupling pressed by a constant moment" if self.ride.coupling_Nm else ""
+            return f"on a constant speed{pressed}"
+        return "standing, without dry friction"
+
     def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
         """Parameters of a run that starts in the steady state of the ride.
 
         Parameters
         ----------
         gain : float
-            Factor on the controller in front of the point, proportional and integral part: the loop gain.
+            Factor on all parts of the controller in front of the point: the loop gain.
         delay_samples : float
             Extra delay at the point, in its own samples.
         """
@@ -129,29 +146,52 @@ class Rig:
 
     def _start(self, row: Rows) -> None:
         """Write the steady state, from the motor outwards."""
+        self.ride.load(row)
         row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
+        row["twist_start"] = self.ride.twist_rad
+        row["load_speed_start"] = self.ride.speed_rad_s / self.design.ratio_to_coupling
         wanted, point = self.ride.voltage_V, "u"
         row["voltage_start"] = wanted
         for stage in self._running:
             if stage == "position":
-                row["angle_start"] = -wanted / row.value("position_gain")
+                self._position(row, wanted)
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
-                self._command(row)
                 return
-            integral, step, kp = INTEGRALS[stage]
-            base = self.ride.current_A if stage == "current" else self.ride.speed_rad_s
-            if row.value(step) != 0.0:
-                row[integral], wanted = wanted, base
-            else:
-                wanted = base + wanted / row.value(kp)
+            wanted = self._current(row) if stage == "current" else self._velocity(row, wanted)
             point = "i_ref" if stage == "current" else "w_ref"
             if point == "i_ref":
                 row["current_command_start"] = wanted
+        if self.outer == "current":
+            row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         self._constant(row, point, wanted)
 
-    def _command(self, row: Rows) -> None:
-        """Let the command run with the motor."""
+    def _current(self, row: Rows) -> float:
+        """The current controller in its steady state; returns the current command."""
+        found = current_state(
+            self.ride,
+            row.value("current_gain"),
+            row.value("current_integral") != 0.0,
+            row.value("back_emf_feedforward"),
+            row.value("resistance_feedforward"),
+        )
+        row["current_integrator_start"] = found.integrator
+        return found.command
+
+    def _velocity(self, row: Rows, wanted: float) -> float:
+        """The velocity controller in its steady state; returns the speed command."""
+        integral = row.value("velocity_integral") != 0.0
+        found = velocity_state(self.design, self.ride, wanted, row.value("velocity_gain"), integral)
+        row["velocity_integrator_start"] = found.integrator
+        row["current_command_start"] = found.output  # what the torque filters begin with
+        return found.command
+
+    def _position(self, row: Rows, wanted: float) -> None:
+        """Let the command run with the drive, the motor behind it by what the controller needs."""
+        behind = wanted / row.value("position_gain")
+        if self.design.controller.position_loop.sensor == "output":
+            behind -= self.design.ratio_to_coupling * self.ride.twist_rad
+        row["angle_start"] = -behind
         row.ramp("bias", self.ride.speed_rad_s / self.design.total_ratio)
 
     @staticmethod
@@ -163,8 +203,8 @@ class Rig:
     def room(self) -> dict[str, float]:
         """How far each signal may move from its steady value: to its limit, and the speed to zero."""
         row, limits = self.row(), self.design.limits
-        moving = abs(self.ride.speed_rad_s)
-        room = {"motor_speed_rad_s": 0.7 * moving if moving else inf}
+        moving = self.ride.speed_rad_s != 0.0
+        room = {"motor_speed_rad_s": self.ride.room_rad_s if moving else inf}
         room["voltage_V"] = limits.voltage_V - abs(row.value("voltage_start"))
         room["current_command_A"] = limits.peak_current_A - abs(row.value("current_command_start"))
         room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.ride.speed_rad_s)
@@ -173,13 +213,8 @@ class Rig:
         return room
 
 
-INTEGRALS = {
-    "current": ("current_integrator_start", "current_integral", "current_gain"),
-    "velocity": ("velocity_integrator_start", "velocity_integral", "velocity_gain"),
-}
-
 GAINS = {
-    "current": ("current_gain", "current_integral"),
+    "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),
     "velocity": ("velocity_gain", "velocity_integral"),
     "position": ("position_gain", "position_integral", "derivative"),
 }
@@ -187,6 +222,9 @@ GAINS = {
 
 def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
     """Set a drive up for one loop, riding on a constant speed that the code chooses.
+
+    A position controller with an integral or a derivative part cannot be started in the steady state of a
+    ramp: then the drive stands, where it has no slope of its own about rest.
 
     Raises
     ------
@@ -196,7 +234,10 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     known = (*stages_of(design), *points_of(design))
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    return Rig(design, loop, ride(design), limits_on, held)
+    found = Rig(design, loop, ride(design), limits_on, held)
+    if found.outer == "position" and remembers(design) and may_stand(design):
+        return Rig(design, loop, standing(design), limits_on, held)
+    return found
 
 
 def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
@@ -207,10 +248,15 @@ def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
     their own about rest.
     """
     found = rig(design, loop, limits_on=False, held=held)
-    friction, play = design.friction, design.coupling is not None and design.coupling.play_rad > 0.0
-    if play or friction.points or friction.viscous(1) != friction.viscous(-1):
+    if not may_stand(design):
         return found
-    return Rig(design, loop, Ride(0.0, 0.0, 0.0, friction_on=False), limits_on=False, held=held)
+    return Rig(design, loop, standing(design), limits_on=False, held=held)
+
+
+def remembers(design: Design) -> bool:
+    """Whether the position controller has a state that a ramp sets."""
+    place = design.controller.position
+    return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
 
 
 def stages_of(design: Design) -> tuple[str, ...]:
@@ -229,7 +275,8 @@ def target(design: Design, stage: str) -> str:
 
 def points_of(design: Design) -> tuple[str, ...]:
     """Break points that exist, from the motor outwards."""
-    return (*(target(design, stage) for stage in stages_of(design)), "output")
+    output = () if design.controller.position is None else ("output",)
+    return (*(target(design, stage) for stage in stages_of(design)), *output)
 
 
 def producer(design: Design, point: str) -> str:

@@ -33,6 +33,7 @@ ARRIVED = 1e-4  # of the injected sine: so much of it may be missing behind the 
 USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the amplitude takes
 SETTLE_TIME_CONSTANTS = 14.0
 LONGEST_SETTLE_TICKS = 20_000  # at first; a point that is not steady then is given more
+SMALL_ANGLE_RAD = 1e-3  # sin x is x to 2e-7 in the fundamental
 FAINT_SETTLE_TICKS = 2_000
 EXTENSIONS = 3
 PLANT_SIGNAL = {"u": "current_A", "i_ref": "motor_speed_rad_s", "w_ref": "motor_speed_rad_s"}
@@ -162,6 +163,8 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
         moved = np.maximum(high - result.mean(name), result.mean(name) - low)
         most = np.minimum(most, room * faint / np.maximum(moved, 1e-300))
     most = np.minimum(most, _acceleration_room(setup, window, result, faint))
+    most = np.minimum(most, _contact_room(setup, window, result, faint))
+    most = np.minimum(most, _gravity_room(setup, result, faint))
     return np.where(np.isfinite(most), USED_ROOM * most, faint)
 
 
@@ -175,6 +178,25 @@ def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint:
     low, high = result.span(signal)
     change = (high - low) * np.abs(np.sin(np.pi * window.frequency_hz * T))
     return limit * T * faint / np.maximum(change, 1e-300)
+
+
+def _contact_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
+    """Amplitude at which the coupling's torque would change its sign, by what moves the load."""
+    design = setup.design
+    if setup.ride.coupling_Nm == 0.0:
+        return np.full(faint.size, inf)
+    friction, omega = design.load.friction, 2.0 * np.pi * window.frequency_hz
+    viscous = 0.0 if friction is None else friction.viscous_Nms_rad
+    moved = np.abs(phasor(setup, result, "output_angle_rad")) * design.ratio_behind_coupling * omega
+    swing = moved * np.abs(1j * omega * design.load_side_inertia_kgm2 + viscous)
+    return abs(setup.ride.coupling_Nm) * faint / np.maximum(swing, 1e-300)
+
+
+def _gravity_room(setup: Rig, result: BatchResult, faint: Floats) -> Floats:
+    """Amplitude at which gravity is no longer proportional to the angle."""
+    if setup.design.load.gravity is None:
+        return np.full(faint.size, inf)
+    return SMALL_ANGLE_RAD * faint / np.maximum(np.abs(phasor(setup, result, "output_angle_rad")), 1e-300)
 
 
 def _run(
@@ -202,7 +224,7 @@ def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Float
             reasons[k] = "run stopped"
         elif acting:
             reasons[k] = f"{acting[0]} limit"
-        elif result.events[k]:
+        elif result.events[k] and setup.ride.delicate:
             reasons[k] = "speed reversal"
         elif not steady[k]:
             reasons[k] = "not steady"

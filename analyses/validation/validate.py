@@ -26,13 +26,13 @@ from analyses.validation.confirm import (
     point_questions,
     stage_questions,
 )
-from analyses.validation.figures import NotMeasured, measure_figures
+from analyses.validation.figures import NotMeasured, hertz, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
 from analyses.validation.ledger import Entry, loop_entries, not_judged, point_entries
 from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.riding import ride
+from analyses.validation.riding import has_to_stand, on_its_stand, ride
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
@@ -50,7 +50,8 @@ HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 NEAR = (0.9, 0.95, 1.0, 1.05)
-NO_POSITION = "the bench is made for drives with a position loop"
+NO_POSITION = "a drive without a position loop: its loops are judged, motion from rest to an angle is not"
+ABOUT = (0.98, 1.0, 1.02)  # frequencies about each figure, beside the grid
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
 PER_DECADE = 6  # frequencies of a sweep, at least
 BELOW = 20.0  # the sweep begins so far below the lowest figure
@@ -119,7 +120,7 @@ class _Work:
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
-        self.linear = on_the_bench(self.design)
+        self.linear = on_its_stand(on_the_bench(self.design))
         self._warm_up()
         self.budget = Budget(self.settings.seconds)
         if replace(self.linear, command=self.design.command) != self.design:
@@ -137,17 +138,17 @@ class _Work:
         stable = all(found.stable for found in self.figures.values())
         if not stable:
             self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
-        whole = stable and self.design.controller.position is not None
-        if stable and not whole:
-            self.notes.append(f"not judged: {NO_POSITION}")
+        placed = self.design.controller.position is not None
+        whole = stable and placed
+        if not placed:
+            self.notes.append(NO_POSITION)
         with self.timed("frequency response"):
             share = 0.6 / max(len(self.loops.present), 1)
             loops = {name: self._loop(name, loop, share) for name, loop in self._stage_loops().items()}
         with self.timed("margins in time"):
-            bench = self.design.controller.position is not None
-            confirmed = () if not bench else self._within(0.5, "margins in time", self._confirm, ())
+            confirmed = self._within(0.5, "margins in time", self._confirm, ())
         with self.timed("break points"):
-            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if whole else {}
+            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -217,9 +218,11 @@ class _Work:
         """The linear loops, their figures, and the rigs to test them on."""
         from actuator_lti.loops import assemble_loops
 
-        ride(self.linear)  # a drive that has no steady motion cannot be tested
+        point = ride(self.linear).operating(self.linear)  # a drive without steady motion cannot be tested
+        at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
         model = on_the_bench(self.model)
-        loops = assemble_loops(replace(model, command=self.model.command))
+        model = on_its_stand(model) if has_to_stand(self.linear) else model
+        loops = assemble_loops(replace(model, command=self.model.command), **at)  # type: ignore[arg-type]
         self.held = None
         if "current" in loops.present:
             self.held = assemble_loops(model, rotor="locked").current
@@ -238,9 +241,7 @@ class _Work:
         """Sweep one loop and read its figures; where that cannot be done, say why."""
         figures, nothing = self.figures[name], np.empty(0, complex)
         reason = "the linear loop is not stable: there is nothing to measure"
-        if name in self.settle and self.design.controller.position is None:
-            reason = NO_POSITION
-        elif name in self.settle:
+        if name in self.settle:
             try:
                 with self.budget.part(share):
                     return self._measured(name, loop)
@@ -282,7 +283,23 @@ class _Work:
         top = HIGHEST / loop.period_s
         low = max(self._lowest(name), LOWEST * top)
         count = max(self.settings.frequencies, int(PER_DECADE * np.log10(top / low)))
-        return np.geomspace(low, top, count)
+        marks = np.outer(self._marks(name), ABOUT).ravel()
+        return np.unique(
+            np.concatenate([np.geomspace(low, top, count), marks[(marks > low) & (marks < top)]])
+        )
+
+    def _marks(self, name: str) -> list[float]:
+        """Where the linear loop has figures, Hz: there a grid may miss a narrow dip or peak."""
+        found = self.figures[name]
+        marks = [m.frequency_hz for m in found.margins.phase_margins]
+        if found.bandwidth is not None:
+            band = found.bandwidth
+            marks += [x for x in (band.minus3db_hz, band.minus90deg_hz, band.resonance_hz) if x]
+        if found.peaks is not None:
+            marks += [
+                hertz(x) or 0.0 for x in (found.peaks.sensitivity_rad_s, found.peaks.complementary_rad_s)
+            ]
+        return [x for x in marks if x > 0.0]
 
     def _lowest(self, name: str) -> float:
         """Where the sweep of a loop begins, Hz."""
@@ -303,7 +320,7 @@ class _Work:
             questions += stage_questions(
                 small_rig(self.linear, name, held=name == "current"), loop, margins, settle
             )
-        if len(self.settle) == len(self.figures):
+        if self.settle and len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()))
         return confirm_margins(questions)
@@ -400,7 +417,9 @@ class _Work:
                 rows.append(not_judged(name, "bandwidth", "Hz", None, None, loop.reason))
                 rows += point_entries(name, loop.confirmed)
             else:
-                rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed)
+                errors = [x for x in (loop.open_errors, loop.closed_errors) if x is not None]
+                words = rig(self.linear, name, held=name == "current").condition
+                rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed, errors, words)
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)
         if steps is not None:

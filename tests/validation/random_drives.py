@@ -3,7 +3,8 @@
 
 Run as a script it validates a number of them and prints a line for each::
 
-    python -m tests.validation.random_drives 0 40
+    python -m tests.validation.random_drives 0 40            # rigid cascades
+    python -m tests.validation.random_drives 0 40 full all   # every feature, every part of a validation
 """
 
 from __future__ import annotations
@@ -24,12 +25,18 @@ from actuator_lti.design.model import (
     Encoder,
     Filter,
     Friction,
+    FrictionPoint,
     Gear,
+    Gravity,
+    Instruments,
     Limits,
     Load,
+    LoadFriction,
     Motor,
     OutputEncoder,
     PositionLoop,
+    Supply,
+    Temperature,
     Validation,
     VelocityLoop,
 )
@@ -247,11 +254,281 @@ def _widened(dice: Dice, design: Design) -> Design:
     )
 
 
-def stable_drives(first: int, count: int, *, wider: bool = False) -> Iterator[Design]:
-    """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins."""
+def full_drive(seed: int) -> Design:
+    """A drive with any mixture of what sections 6 and 7 of the model know; not known to be stable yet."""
+    design = random_drive(seed)
+    dice = Dice(10**6 + seed)
+    for change in (
+        _elastic,
+        _frictions,
+        _loads,
+        _motor_data,
+        _filtered,
+        _regulators,
+        _outer,
+        _sensors,
+        _commanded,
+        _supplied,
+        _protected,
+        _instrumented,
+        _outermost,
+    ):
+        design = change(dice, design)
+    return design
+
+
+def _elastic(dice: Dice, design: Design) -> Design:
+    """A coupling, with play and friction behind it."""
+    if not dice.chance(0.3) or design.friction.law == "tanh":
+        return design
+    omega = dice.decades(3.0, 100.0) * design.controller.position_loop.gain
+    if design.controller.velocity is None:
+        omega = dice.decades(3.0, 30.0) * 0.05 / design.controller.period_s
+    stiffness = omega**2 * design.inertia_kgm2 * 0.2 * design.total_ratio**2
+    friction = None
+    if dice.chance(0.3):
+        limits, motor = design.limits, design.motor
+        torque = (motor.torque_constant_Nm_A or 1.0) * min(
+            limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
+        )
+        friction = LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
+    coupling = Coupling(
+        stiffness_Nm_rad=stiffness,
+        damping_Nms_rad=dice.decades(0.01, 0.2) * stiffness / omega,
+        play_rad=design.validation.full_deflection_rad * dice.one_of((0.0, 0.0, 1e-3, 0.01)),
+    )
+    path, coefficient = design.load.path, design.friction.load_coefficient
+    if path == "self-locking" and dice.chance(0.5):
+        coefficient = 1.3 / design.total_ratio
+    elif path == "self-locking":
+        path = "back-drivable"
+    return replace(
+        design,
+        coupling=coupling,
+        load=replace(design.load, friction=friction, path=path),
+        friction=replace(design.friction, load_coefficient=coefficient),
+    )
+
+
+def _frictions(dice: Dice, design: Design) -> Design:
+    """Asymmetric, with an offset, or as a map."""
+    friction, kind = design.friction, dice.one_of(("", "", "", "asymmetric", "offset", "map", "load"))
+    dry = friction.dry_torque_Nm
+    if kind == "asymmetric":
+        return replace(
+            design,
+            friction=replace(
+                friction,
+                dry_torque_reverse_Nm=1.4 * dry,
+                viscous_reverse_Nms_rad=0.6 * friction.viscous_Nms_rad,
+            ),
+        )
+    if kind == "offset":
+        return replace(design, friction=replace(friction, offset_torque_Nm=0.3 * dry))
+    if kind == "map" and dry > 0.0 and friction.law == "coulomb":
+        fast = 0.3 * min(
+            design.limits.speed_rad_s,
+            design.limits.voltage_V / (design.motor.back_emf_constant_Vs_rad or 1.0),
+        )
+        points = tuple(
+            FrictionPoint(speed_rad_s=speed * fast, torque_Nm=dry * torque)
+            for speed, torque in ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
+        )
+        return replace(
+            design, friction=replace(friction, dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
+        )
+    if kind == "load":
+        return replace(design, friction=replace(friction, load_coefficient=2.0 / design.total_ratio))
+    return design
+
+
+def _loads(dice: Dice, design: Design) -> Design:
+    """Gravity on a rotary output."""
+    if not dice.chance(0.15) or design.axis == "linear":
+        return design
+    motor, limits = design.motor, design.limits
+    torque = (motor.torque_constant_Nm_A or 1.0) * min(
+        limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
+    )
+    peak = dice.decades(0.01, 0.2) * torque * design.total_ratio
+    gravity = Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of((0.0, 0.5, pi)))
+    load = replace(design.load, gravity=gravity, path="back-drivable", moment_slope_Nm_rad=0.0)
+    return replace(design, load=load)
+
+
+def _motor_data(dice: Dice, design: Design) -> Design:
+    """The same motor from the data sheet of an AC servo motor, or a warm one."""
+    motor, kind = design.motor, dice.one_of(("", "", "ac", "warm"))
+    if kind == "ac":
+        constants = dice.one_of(("rms-line", "peak-phase"))
+        ac = replace(motor, constants=constants)
+        same = replace(design, motor=ac).effective_motor
+        factors = {
+            name: getattr(motor, name) / getattr(same, name)
+            for name in (
+                "resistance_ohm",
+                "inductance_H",
+                "torque_constant_Nm_A",
+                "back_emf_constant_Vs_rad",
+            )
+        }
+        return replace(
+            design, motor=replace(ac, **{name: getattr(motor, name) * x for name, x in factors.items()})
+        )
+    if kind == "warm":
+        return replace(design, temperature=Temperature(winding_degC=90.0, magnet_degC=70.0))
+    return design
+
+
+def _filtered(dice: Dice, design: Design) -> Design:
+    """Filters of the torque command and of the speed."""
+    control, velocity = design.controller, design.controller.velocity
+    if velocity is None:
+        return design
+    at = 2.0 * pi * 0.05 / (control.period_s * velocity.every)
+    shelf = (
+        Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at, order=2),
+        Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
+        Filter(kind="notch", on="torque", frequency_rad_s=at, width_rad_s=0.5 * at, depth=0.1),
+        Filter(kind="leadlag", on="torque", zero_rad_s=at, pole_rad_s=1.5 * at),
+        Filter(kind="biquad", on="torque", b=(0.5, 0.3, 0.0), a=(-0.2, 0.0)),
+    )
+    chosen = tuple(item for item in shelf if dice.chance(0.12))
+    return replace(design, controller=replace(control, velocity=replace(velocity, filters=chosen)))
+
+
+def _regulators(dice: Dice, design: Design) -> Design:
+    """Other kinds of anti-windup, and feed-forward in the current loop."""
+    control, kinds = design.controller, ("conditional", "conditional", "clamped", "back-calculation")
+    if control.velocity is not None and control.velocity.integral_time_s is not None:
+        control = replace(control, velocity=replace(control.velocity, anti_windup=dice.one_of(kinds)))
+    if control.current is not None:
+        current = replace(control.current, back_emf_feedforward=dice.one_of((0.0, 0.0, 0.8)))
+        if current.integral_time_s is not None:
+            current = replace(current, anti_windup=dice.one_of(kinds))
+        control = replace(control, current=current)
+    return replace(design, controller=control)
+
+
+def _outer(dice: Dice, design: Design) -> Design:
+    """PI, PID and feed-forward of the position loop."""
+    control, place = design.controller, design.controller.position_loop
+    if dice.chance(0.25):
+        place = replace(place, integral_time_s=dice.decades(5.0, 30.0) / place.gain)
+    if control.velocity is not None and dice.chance(0.15):
+        place = replace(place, derivative_time_s=0.1 / place.gain, derivative_filter_s=0.02 / place.gain)
+    if control.velocity is not None and dice.chance(0.2):
+        place = replace(place, acceleration_feedforward=dice.one_of((0.5, 1.0)))
+    if dice.chance(0.15):
+        torque = design.friction.dry_torque_Nm
+        share = torque / (design.motor.torque_constant_Nm_A or 1.0)
+        share *= 1.0 if control.current else (design.motor.resistance_ohm or 1.0)
+        place = replace(place, friction_feedforward=share)
+    return replace(design, controller=replace(control, position=place))
+
+
+def _sensors(dice: Dice, design: Design) -> Design:
+    """Position, speed or both from the output's encoder, with counts or without."""
+    control, kind = design.controller, dice.one_of(("", "", "", "", "position", "both"))
+    if not kind:
+        return design
+    counts = dice.one_of((None, int(dice.decades(1e4, 1e6)) * (100 if design.axis == "linear" else 1)))
+    control = replace(control, position=replace(control.position_loop, sensor="output"))
+    if kind == "both" and control.velocity is not None:
+        control = replace(control, velocity=replace(control.velocity, sensor="output"))
+    return replace(design, controller=control, output_encoder=OutputEncoder(counts_per_rev=counts))
+
+
+def _commanded(dice: Dice, design: Design) -> Design:
+    """A filter, a profile."""
+    kind = dice.one_of(("", "", "", "filter", "profile"))
+    gain, full = design.controller.position_loop.gain, design.validation.full_deflection_rad
+    if kind == "filter":
+        return replace(design, command=Command(filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2))))
+    if kind == "profile" and design.controller.velocity is not None:
+        rate = 0.2 * full * gain
+        return replace(
+            design,
+            command=Command(
+                rate_rad_s=rate,
+                acceleration_rad_s2=rate * gain,
+                jerk_rad_s3=dice.one_of((inf, rate * gain**2)),
+            ),
+        )
+    return design
+
+
+def _supplied(dice: Dice, design: Design) -> Design:
+    """A supply with resistance, one that takes nothing back."""
+    R, volts = design.motor.resistance_ohm or 1.0, design.limits.voltage_V
+    kind = dice.one_of(("", "", "", "resistance", "capacitor"))
+    if kind == "resistance":
+        return replace(design, supply=Supply(resistance_ohm=0.1 * R))
+    if kind == "capacitor":
+        farad = 200.0 * design.controller.period_s / R
+        supply = Supply(
+            resistance_ohm=0.05 * R, regenerative=False, capacitance_F=farad, brake_voltage_V=1.2 * volts
+        )
+        return replace(design, supply=supply)
+    return design
+
+
+def _protected(dice: Dice, design: Design) -> Design:
+    """Overload protection."""
+    limits = design.limits
+    if limits.peak_current_A == inf or not dice.chance(0.3):
+        return design
+    return replace(
+        design,
+        limits=replace(
+            limits,
+            continuous_current_A=0.4 * limits.peak_current_A,
+            peak_time_s=1.0,
+            overload=dice.one_of(("thermal", "excess")),
+        ),
+    )
+
+
+def _instrumented(dice: Dice, design: Design) -> Design:
+    """Noise, resolution, jitter."""
+    if not dice.chance(0.15):
+        return design
+    quantum = 1e-4 * design.validation.full_deflection_rad
+    return replace(
+        design,
+        instruments=Instruments(
+            current_resolution_A=1e-3 * design.limits.voltage_V / (design.motor.resistance_ohm or 1.0),
+            angle_noise_rad=quantum * design.total_ratio,
+            jitter_s=0.01 * design.controller.period_s,
+            seed=1,
+        ),
+    )
+
+
+def _outermost(dice: Dice, design: Design) -> Design:
+    """Now and then the drive ends at its speed, its current or its voltage."""
+    control, kind = design.controller, dice.one_of(("", "", "", "", "", "", "speed", "torque"))
+    plain = replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+    if kind == "speed" and control.velocity is not None:
+        return replace(design, controller=replace(control, position=None), command=plain)
+    if kind == "torque" and control.current is not None:
+        control = replace(control, position=None, velocity=None)
+        encoder = replace(design.encoder, speed="ideal", counts_per_rev=None, bandwidth_rad_s=None)
+        return replace(design, controller=control, command=plain, encoder=encoder)
+    return design
+
+
+def stable_drives(first: int, count: int, kind: str = "") -> Iterator[Design]:
+    """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins.
+
+    Parameters
+    ----------
+    kind : {"", "wider", "full"}
+        Of `random_drive`, or `full_drive`.
+    """
     seed, found = first, 0
     while found < count:
-        design = random_drive(seed, wider=wider)
+        design = full_drive(seed) if kind == "full" else random_drive(seed, wider=kind == "wider")
         seed += 1
         if is_stable(design):
             found += 1
@@ -260,10 +537,12 @@ def stable_drives(first: int, count: int, *, wider: bool = False) -> Iterator[De
 
 def is_stable(design: Design) -> bool:
     """Whether every loop is stable, inner ones too."""
+    from actuator_lti.design.checks import check_design
     from actuator_lti.loops import assemble_loops
     from actuator_lti.margins import stability_margins
 
     try:
+        check_design(design, design.name)
         loops = assemble_loops(design)
         return bool(loops.present) and all(
             stability_margins(loop.open_loop).stable is True for loop in loops.present.values()
@@ -272,7 +551,7 @@ def is_stable(design: Design) -> bool:
         return False
 
 
-def main(first: int, count: int, wider: bool) -> None:
+def main(first: int, count: int, kind: str, everything: bool) -> None:
     """Validate and print a line for each."""
     import time
     import traceback
@@ -280,11 +559,11 @@ def main(first: int, count: int, wider: bool) -> None:
     from analyses.isolation import isolated
     from analyses.validation import validate
 
-    for design in stable_drives(first, count, wider=wider):
+    for design in stable_drives(first, count, kind):
         started = time.process_time()
         try:
             with isolated() as missing:
-                found = validate(design, TRIAL)
+                found = validate(design, Settings() if everything else TRIAL)
         except InputError as error:
             print(f"{design.name}  refused: {error}", flush=True)
             continue
@@ -293,16 +572,34 @@ def main(first: int, count: int, wider: bool) -> None:
             continue
         took = time.process_time() - started
         judged = [row for row in found.ledger if row.passed is not None]
-        print(f"{design.name}  {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s", flush=True)
+        stages = "".join(stage[0] for stage in design.controller.stages)
+        verdict = "pass" if found.passed else "FAIL"
+        print(
+            f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s",
+            flush=True,
+        )
         for item in missing:
             print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
         for row in found.failed:
             print(
-                f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason}"
+                f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason} [{row.condition}]"
             )
+        border = None if found.large_signals is None else found.large_signals.border
+        if border is not None and border.passed is False:
+            print(f"    BORDER {border}")
+        if found.conditional is not None and found.conditional.found:
+            print(
+                f"    CONDITIONAL diverges from {found.conditional.next_rad} of {found.conditional.full_deflection_rad}"
+            )
+        if not judged:
+            print(f"    NOTES {found.notes} {[row.reason for row in found.ledger][:6]}")
+        for note in found.notes:
+            if "cut" in note or "refused" in note:
+                print(f"    {note}")
 
 
 if __name__ == "__main__":
     import sys
 
-    main(int(sys.argv[1]), int(sys.argv[2]), len(sys.argv) > 3)
+    words = sys.argv[3:]
+    main(int(sys.argv[1]), int(sys.argv[2]), next((w for w in words if w != "all"), ""), "all" in words)
