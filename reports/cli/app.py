@@ -10,7 +10,7 @@ import typer
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
-    "Linear loops": ("margins", "stiffness", "report", "pdf"),
+    "Linear loops": ("margins", "stiffness", "corners", "report", "pdf"),
     "Nonlinear checks": ("simulate", "validate", "failures"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
