@@ -96,10 +96,14 @@ def _row(case: FailureCase, scale: float, has_current: bool) -> dict[str, Any]:
 
 
 def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, Any]:
-    series = []
+    series, asked = [], result.asked
+    stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
+    last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
     for case in result.cases:
-        every = max(1, len(case.time_s) // _SHOWN)
-        keep = np.union1d(np.arange(0, len(case.time_s), every), [len(case.time_s) - 1])
+        if case.name == "oscillatory-command":
+            continue  # a band of ink; the table has its size
+        count = int(np.searchsorted(case.time_s, last))
+        keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
         series.append(
             {
                 "label": NAMES[case.name],
@@ -108,7 +112,6 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, A
                 "moment": rounded(case.moment_Nm[keep]),
             }
         )
-    asked = result.asked
     data = {
         "series": series,
         "unit": unit,
@@ -116,5 +119,5 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, A
         "stop": scale * asked.stop_rad,
         "detection_s": asked.detection_s,
     }
-    caption = "Deflection of the output and moment in the train after each failure, until the stop."
+    caption = "Deflection of the output and moment in the train after each failure, until the stop; without the oscillation."
     return doc.figure("failures", data, caption=caption, alt=f"Two panels. {caption}")
