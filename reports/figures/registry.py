@@ -19,6 +19,7 @@ MODULES: dict[str, str] = {
     "step": "reports.figures.step",
     "stiffness": "reports.figures.stiffness",
     "failures": "reports.figures.failures",
+    "duty": "reports.figures.duty",
     "forms": "reports.figures.forms",
     "onset": "reports.figures.onset",
     "delay_budget": "reports.figures.delay_budget",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from reports import document as doc
 from reports.findings import Finding
@@ -32,7 +32,7 @@ def section(result: Corners) -> dict[str, Any]:
     words = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
     blocks = [_summary_table(result), doc.details("Every loop at every corner", [_loop_table(rows), *words])]
     told = summary(result)
-    severity = "info" if result.passed else "warn"
+    severity: Literal["info", "warn"] = "info" if result.passed else "warn"
     return doc.section(
         "corners", "Corners", blocks, result=told, intro=intro, status="info" if result.passed else "warn",
         findings=[Finding(severity=severity, text=told, where="corners")],

@@ -119,5 +119,5 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, A
         "stop": scale * asked.stop_rad,
         "detection_s": asked.detection_s,
     }
-    caption = "Deflection of the output and moment in the train after each failure, until the stop; without the oscillation."
+    caption = "Deflection of the output and moment in the train after each failure but the oscillation."
     return doc.figure("failures", data, caption=caption, alt=f"Two panels. {caption}")
