@@ -2,7 +2,7 @@
 
 A figure of a loop is read from an object with the parts ``margins``, ``bandwidth`` and ``step`` (one
 design), or is a column of `actuator_lti.batch.LinearFigures` of its own name (many). A figure of the whole
-drive is an attribute of `actuator_lti.drive.facts.Capability`, for one design or many.
+drive is an attribute of what `found_by` names, for one design or many (`actuator_lti.drive_figure`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ class Quantity:
     words : str
         What reports call it.
     reader : str
-        Where it is found: ``"margins.gain_margin_db"``, or the attribute of a `Capability`.
+        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `found_by` names.
+    found_by : {"loop", "capability", "stiffness"}
+        What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`, or
+        `actuator_lti.loops.stiffness.StiffnessFigures`.
     better : {1, -1}
         Whether larger or smaller is better.
     absolute : bool
@@ -57,6 +60,7 @@ class Quantity:
     closed: bool = True
     timed: bool = False
     size: float = 1.0
+    found_by: Literal["loop", "capability", "stiffness"] = "loop"
 
     def unit_for(self, axis: Axis) -> str:
         """The unit in which this figure is reported."""
@@ -71,7 +75,8 @@ class Quantity:
                 return None
         if self.absolute:
             return abs(value)
-        return value * degrees(1.0) if self.unit_for(axis).startswith("deg/") else value
+        angular = self.scope == "drive" and self.unit_for(axis).startswith("deg")
+        return value * degrees(1.0) if angular else value
 
 
 _LIST = (
@@ -97,11 +102,17 @@ _LIST = (
     Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
              "step.settling_time_s", -1, timed=True),
     Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
-             "output_rate_rad_s", 1, "m/s"),
+             "output_rate_rad_s", 1, "m/s", found_by="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
-             "motor current at top speed", "motor_current_A", -1),
+             "motor current at top speed", "motor_current_A", -1, found_by="capability"),
     Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
-             "acceleration", "acceleration_rad_s2", 1, "m/s^2"),
+             "acceleration", "acceleration_rad_s2", 1, "m/s^2", found_by="capability"),
+    Quantity("static_stiffness", "N*m/rad", "drive", "moment over deflection at 0 Hz, powered",
+             "static stiffness", "static_stiffness_Nm_rad", 1, "N/m", found_by="stiffness"),
+    Quantity("least_stiffness", "N*m/rad", "drive", "least moment over deflection, 0.1 to 1000 Hz",
+             "least dynamic stiffness", "least_stiffness_Nm_rad", 1, "N/m", found_by="stiffness"),
+    Quantity("lost_motion", "deg", "drive", "play of the coupling and the twist that friction holds",
+             "lost motion", "lost_motion_rad", -1, "m", size=0.1, found_by="stiffness"),
 )  # fmt: skip
 
 QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
@@ -110,6 +121,22 @@ LOOP_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope
 DRIVE_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "drive"}
 LOOPS = ("current", "velocity", "position")
 """The loops that a requirement may name, innermost first."""
+
+
+def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:
+    """Every figure of the whole drive with the loads at which it differs: stiffness is that of no load.
+
+    Examples
+    --------
+    >>> [case for case in drive_cases((0.0, 8.0)) if case[0] in ("output_rate", "lost_motion")]
+    [('output_rate', 0.0), ('output_rate', 8.0), ('lost_motion', 0.0)]
+    """
+    loads = tuple(loads_Nm)
+    return tuple(
+        (name, load)
+        for name, quantity in DRIVE_QUANTITIES.items()
+        for load in (loads if quantity.found_by == "capability" else (0.0,))
+    )
 
 
 def judged_loops(loop: str | None, present: Iterable[str]) -> tuple[str, ...]:

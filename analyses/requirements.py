@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
-from analyses.drive_figures import drive_figures
 from analyses.loop_figures import LoopFigures, all_loop_figures
 
 
@@ -85,7 +85,8 @@ def _judge(
             where=design.origin or None,
         )
     if quantity.scope == "drive":
-        value = quantity.read(drive_figures(design, requirement.load_Nm or 0.0), design.axis)
+        found = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
+        value = None if math.isnan(found) else found
         reason = "" if value is not None else "the design has no such figure"
         return [_verdict(requirement, requirement.id, None, value, reason)]
     named = requirement.loop not in (None, "every")
@@ -131,7 +132,7 @@ def _verdict(
         )
     room = distance(requirement, value)
     if math.isinf(value):
-        reason = "no crossing: not limited" if value > 0 else reason
+        reason = "nothing limits it" if value > 0 else reason
     return RequirementVerdict(
         id=id,
         requirement=requirement,

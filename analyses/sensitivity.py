@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
+from actuator_lti.quantities import LOOP_QUANTITIES, drive_cases
 from analyses.sampling import Factor
 
 if TYPE_CHECKING:
@@ -148,8 +148,7 @@ def population_figures(
             if time_figures or not quantity.timed:  # stairs of samples have no slope
                 values = linear.quantity(name, loop)
                 columns[f"{loop}.{name}"] = np.abs(values) if quantity.absolute else values
-    for load in design.validation.loads_Nm:
-        for name in DRIVE_QUANTITIES:
-            if name != "motor_current" or design.motor.has_electrical_dynamics:
-                columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
+    for name, load in drive_cases(design.validation.loads_Nm):
+        if name != "motor_current" or design.motor.has_electrical_dynamics:
+            columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
     return columns

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, pi
+from math import degrees, isnan, pi
 from typing import TYPE_CHECKING
 
 from actuator_lti.batch import Population
+from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES, drive_cases
 from analyses.drive_figures import drive_figures
 
 if TYPE_CHECKING:
@@ -47,10 +48,9 @@ def small_signal(design: Design, found: Mapping[str, LoopFigures]) -> dict[str, 
         for name, quantity in LOOP_QUANTITIES.items():
             value = quantity.read(one) if one.stable or not quantity.closed else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)
-    for load in design.validation.loads_Nm:
-        at_load = drive_figures(design, load)
-        for name, quantity in DRIVE_QUANTITIES.items():
-            figures[f"drive.{name}@{load:g}"] = quantity.read(at_load, design.axis)
+    for name, load in drive_cases(design.validation.loads_Nm):
+        value = float(drive_figure(design, name, load))
+        figures[f"drive.{name}@{load:g}"] = None if isnan(value) else value
     return figures
 
 
@@ -123,6 +123,8 @@ def _name(key: str, design: Design) -> FigureName:
     words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"
+    elif known is not None and known.found_by == "stiffness":
+        at = ""  # no load changes it
     elif at:
         at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
     label = f"{words} at {at}" if at else words

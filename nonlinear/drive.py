@@ -18,6 +18,12 @@ from nonlinear.trajectory import ADVICE, STATUS, State
 Floats = npt.NDArray[np.float64]
 STATE_NAMES = {name[2:].lower(): place for name, place in vars(at).items() if name in at.STATE_NAMES}
 """Numbers of the state by name."""
+NOTED_NAMES = {
+    "output_angle": at.IO_OUTPUT,
+    "twist": at.IO_TWIST,
+    "coupling_torque": at.IO_COUPLING_TORQUE,
+}
+"""What a tick notes of its start, by name; twist and coupling torque are those of an elastic drive."""
 
 
 class Drive:
@@ -129,3 +135,9 @@ class Drive:
         if name not in STATE_NAMES:
             raise InputError(f"state {name!r}: one of {', '.join(STATE_NAMES)}")
         return float(self._s[STATE_NAMES[name]])
+
+    def noted(self, name: str) -> float:
+        """A number that the last `step` noted at its start, by its name in `NOTED_NAMES`."""
+        if name not in NOTED_NAMES:
+            raise InputError(f"noted {name!r}: one of {', '.join(NOTED_NAMES)}")
+        return float(self._io[NOTED_NAMES[name]])

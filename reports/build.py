@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from analyses.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
+FURTHER = ("failures", "duty", "corners")
+"""Sections that a report has only where they are asked for, as they take their time."""
 
 
 def design_report(
@@ -90,6 +92,33 @@ def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, Loop
         return {}, []
     verdicts = attempt("requirements", lambda: evaluate_requirements(design, survey.figures), ())
     return survey.figures, loop_sections(survey, verdicts)
+
+
+def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
+    """Make the sections of `FURTHER` that are named; one that the drive cannot have says why.
+
+    Raises
+    ------
+    InputError
+        For a name that is none.
+    """
+    from importlib import import_module
+
+    from analyses.isolation import attempt, isolated
+
+    for name in names:
+        if name not in FURTHER:
+            raise InputError(f"section {name!r}: allowed: {', '.join(FURTHER)}")
+    made: list[doc.Section] = []
+    with isolated() as missing:
+        for name in dict.fromkeys(names):
+            maker = import_module(f"reports.sections.{name}").of_design
+            try:
+                part = attempt(f"section {name}", partial(maker, design), None)
+            except InputError as error:
+                part = doc.section(name, name.capitalize(), [doc.text(f"Not for this drive: {error}")])
+            made += [part] if part is not None else []
+    return [*made, *notices(missing, "further")]
 
 
 def validation_sections(

@@ -39,7 +39,7 @@ def parse_limit(text: str | float | int, unit: str) -> float:
 
 
 def _si(unit: str) -> str:
-    return {"deg": "rad", "Hz": "rad/s", "deg/s": "rad/s", "deg/s^2": "rad/s^2"}[unit]
+    return {"deg": "rad", "Hz": "rad/s", "deg/s": "rad/s", "deg/s^2": "rad/s^2"}.get(unit, unit)
 
 
 def _decibel(text: str | float | int) -> float:

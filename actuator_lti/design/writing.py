@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
 from dataclasses import fields as dataclass_fields
@@ -202,11 +203,18 @@ def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> No
         raise InputError(f"{path}: unknown key; allowed: a key of the design file")
     old = here.get(parts[-1])
     if isinstance(old, dict) and not isinstance(value, Mapping):
-        kept = {"tolerance": old["tolerance"]} if "tolerance" in old else {}
+        kept = {"tolerance": old["tolerance"]} if "tolerance" in old and not _width_gone(old, value) else {}
         value = (
             {"value": value, "source": f"changed from {old['value']}", **kept} if "value" in old else value
         )
     here[parts[-1]] = value
+
+
+def _width_gone(old: dict[str, Any], value: Any) -> bool:
+    """Whether a relative tolerance would be that of a value of zero, which has none."""
+    relative = isinstance(old["tolerance"], str) and old["tolerance"].strip().endswith("%")
+    number = re.match(r"\s*[-+]?[\d.]+(e[-+]?\d+)?", str(value), re.IGNORECASE)
+    return relative and number is not None and float(number[0]) == 0.0
 
 
 def _label(item: dict[str, Any], number: int) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 Form = Literal["sampled", "continuous", "ideal"]
@@ -77,9 +78,8 @@ class Loops:
     reference_to_output : python-control system or None
         Command at the output shaft to output angle, feed-forward included; of a speed drive the command to
         the motor's speed, of a torque drive to its current, of a voltage drive to the motor's speed.
-    moment_to_output : python-control system or None
-        Moment on the output shaft, held over every tick, to the output angle, all loops closed: the
-        compliance; its inverse is the dynamic stiffness.
+    moment_system : callable or None
+        Makes `moment_to_output`.
     tick_system : TickSystem or None
         The whole sampled closed loop, tick by tick (form ``"sampled"``).
     period_s : float or None
@@ -96,9 +96,19 @@ class Loops:
     break_points: Mapping[str, Loop]
     limiters: Mapping[str, LimiterPath]
     reference_to_output: Any | None
-    moment_to_output: Any | None
+    moment_system: Callable[[], Any] | None
     tick_system: TickSystem | None
     period_s: float | None
+
+    @cached_property
+    def moment_to_output(self) -> Any | None:
+        """Moment on the output shaft, held over every tick, to the output angle, all loops closed.
+
+        The compliance, as a python-control system; its inverse is the dynamic stiffness. It is made when it
+        is first asked for: with slow outer stages it has hundreds of states
+        (`actuator_lti.loops.compliance` has the same response with few). None with the rotor locked.
+        """
+        return None if self.moment_system is None else self.moment_system()
 
     @property
     def operating_point(self) -> str:

@@ -10,7 +10,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
-from analyses.stiffness.curves import compliance, stiffness_at
+from actuator_lti.loops.compliance import compliance
+from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
 from analyses.stiffness.result import AtRest, Check, LostMotion
 from nonlinear import commands, simulate
 from nonlinear.loads import series
@@ -46,9 +47,9 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     """
     twin, period = linear_twin(design), design.controller.period_s
     response = compliance(twin)
-    if response.nstates == 0:
+    if not response.moves:
         raise InputError("stiffness: the output of this drive does not answer a moment")
-    slowest = max(abs(response.poles()), default=0.0)
+    slowest = float(response.slowest)
     if slowest >= 1.0:
         raise InputError("stiffness: the closed loop is not stable")
     settle = min(ceil(log(_SETTLED) / log(slowest)), _MOST_TICKS) if slowest > 0.0 else 1
@@ -56,7 +57,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     for asked in frequencies_hz:
         ticks = _ticks(design, asked)
         frequency = 1.0 / (ticks * period)
-        K = complex(stiffness_at(response, frequency, period)[0])
+        K = complex(stiffness_at(response, frequency)[0])
         moment = _DEFLECTION * twin.validation.full_deflection_rad * abs(K)
         made.append(Check(frequency, K, _injected(twin, moment, ticks, ceil(settle / ticks) + 1, True)))
     return tuple(made)
@@ -96,12 +97,10 @@ def _injected(design: Design, amplitude: float, ticks: int, skipped: int, linear
 
 def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
     """Lost motion of a coupling, 2 (b + C0_l/k) / N_r; None for a rigid drive train."""
-    coupling, friction = design.coupling, design.load.friction
-    if coupling is None:
+    if design.coupling is None:
         return None
-    N_r, dry = design.ratio_behind_coupling, friction.dry_torque_Nm if friction else 0.0
-    foreseen = (coupling.play_rad + 2.0 * dry / coupling.stiffness_Nm_rad) / N_r
-    return LostMotion(coupling.play_rad / N_r, foreseen, lost_motion_seen(design) if seen else None)
+    play = design.coupling.play_rad / design.ratio_behind_coupling
+    return LostMotion(play, lost_motion_rad(design), lost_motion_seen(design) if seen else None)
 
 
 def lost_motion_seen(design: Design, moment_Nm: float | None = None, duration_s: float = 2.0) -> float:

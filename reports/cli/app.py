@@ -10,8 +10,8 @@ import typer
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
-    "Linear loops": ("margins", "stiffness", "report", "pdf"),
-    "Nonlinear checks": ("simulate", "validate"),
+    "Linear loops": ("margins", "stiffness", "corners", "report", "pdf"),
+    "Nonlinear checks": ("simulate", "validate", "failures", "duty"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
     "Variants and history": ("compare", "montecarlo", "tune", "nightly"),

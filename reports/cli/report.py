@@ -30,6 +30,14 @@ ValidationOption = Annotated[
     bool,
     typer.Option("--validation/--no-validation", help="Check every linear prediction by simulation, too."),
 ]
+AlsoOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--also",
+        metavar="SECTION",
+        help="Add what takes its time: failures, duty, corners, or all (repeatable).",
+    ),
+]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
 
@@ -40,15 +48,17 @@ def report(
     validation: ValidationOption = True,
     pdf: PdfOption = False,
     include: IncludeOption = None,
+    also: AlsoOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
     """Write report.html and report.json of a design.
 
     The page needs no network and opens from disk. With --json the document also goes to standard output.
-    With --include the results of identify and correlate become sections of it.
+    With --include the results of identify and correlate become sections of it; with --also
+    failure cases, duty cycle and corners.
     """
-    from reports.build import design_report, write_report
+    from reports.build import FURTHER, design_report, further_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
@@ -57,6 +67,9 @@ def report(
 
     drive = load_drive(design, changes)
     added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]
+    wanted = FURTHER if also and "all" in also else also or ()
+    with progress(f"further sections of {drive.name}", quiet=quiet):
+        added += further_sections(drive, wanted)
     if validation:
         added = [*_validated(drive, quiet), *added]
     with progress(f"computing {drive.name}", quiet=quiet) as computing:

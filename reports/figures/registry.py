@@ -18,6 +18,8 @@ MODULES: dict[str, str] = {
     "sensitivity": "reports.figures.sensitivity",
     "step": "reports.figures.step",
     "stiffness": "reports.figures.stiffness",
+    "failures": "reports.figures.failures",
+    "duty": "reports.figures.duty",
     "forms": "reports.figures.forms",
     "onset": "reports.figures.onset",
     "delay_budget": "reports.figures.delay_budget",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.quantities import drive_cases
 from reports import document as doc
 from reports.document import rounded
 from reports.sections.names import LOOPS
@@ -130,7 +131,8 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
     for verdict in comparison.base.verdicts:
         r = verdict.requirement
         place = verdict.loop or "drive"
-        key = f"{place}.{r.quantity}" + (f"@{r.load_Nm or 0.0:g}" if place == "drive" else "")
+        loads = dict(drive_cases([r.load_Nm or 0.0]))
+        key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
         if key in comparison.sensitivities.base:
             found[key] = r.minimum if r.minimum is not None else r.maximum
     if not found:

@@ -173,6 +173,12 @@ def _quality(sweep: Any, errors: Any) -> dict[str, Any]:
     }
 
 
+def _decibels(values: np.ndarray) -> np.ndarray:
+    """Magnitude in dB; nothing where the output does not move."""
+    size = np.abs(values)
+    return 20.0 * np.log10(np.where(size > 0.0, size, np.nan))
+
+
 def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
     """Make the section of the sweep from rest."""
     scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
@@ -186,7 +192,7 @@ def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
         "series": [
             {
                 "label": label,
-                "magnitude_db": rounded(20.0 * np.log10(np.abs(values))),
+                "magnitude_db": rounded(_decibels(values)),
                 "phase_deg": rounded(np.degrees(np.unwrap(np.angle(values)))),
                 "points": points,
             }

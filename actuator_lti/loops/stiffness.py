@@ -1,0 +1,89 @@
+"""Stiffness at the output from the linear drive: dynamic, static, least; and lost motion.
+
+K = M_ext / output angle, the inverse of the compliance.  One design or stacked ones (arrays of shape (K,)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.loops.compliance import Compliance, compliance
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+POINTS = 240
+LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
+_SLOW_HZ = 1e-5  # where the limit at zero frequency is read
+
+
+@dataclass(frozen=True)
+class StiffnessFigures:
+    """What a requirement may limit; floats or arrays.
+
+    Attributes
+    ----------
+    static_stiffness_Nm_rad, least_stiffness_Nm_rad : float or ndarray
+        Powered, friction sliding: limit at zero frequency (0 of an output that runs away, inf of one that
+        comes back), and smallest size between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
+    lost_motion_rad : float or ndarray
+        2 (b + C0_l/k)/N_r; 0 of a rigid drive train.
+    """
+
+    static_stiffness_Nm_rad: Any
+    least_stiffness_Nm_rad: Any
+    lost_motion_rad: Any
+
+
+def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
+    """The figures of a design or of stacked ones; no load changes them, as friction slides.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> found = stiffness_figures(load_design("fin"))
+    >>> f"{found.static_stiffness_Nm_rad:.0f} N m/rad, {1e3 * found.lost_motion_rad:.3f} mrad"
+    '1324 N m/rad, 1.625 mrad'
+    """
+    response = compliance(design)
+    size = np.abs(stiffness_at(response, frequencies_hz(response)))
+    return StiffnessFigures(static_stiffness(response), _plain(size.min(axis=-1)), lost_motion_rad(design))
+
+
+def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
+    """Frequencies over which a stiffness is drawn and its least value sought."""
+    highest = np.minimum(HIGHEST_HZ, 0.5 / np.asarray(response.period_s))
+    return np.moveaxis(np.geomspace(LOWEST_HZ, highest, POINTS), 0, -1)
+
+
+def stiffness_at(response: Compliance, frequency_hz: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+    """K = 1 / G(exp(j w Ts)); inf where the output does not move."""
+    period = np.asarray(response.period_s, dtype=float)[..., None]
+    z = np.exp(2j * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float)) * period)
+    G = response(z)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(G == 0.0, complex(np.inf), 1.0 / np.where(G == 0.0, 1.0, G))
+
+
+def static_stiffness(response: Compliance) -> Any:
+    """|K| at zero frequency, by its slope near there: 0 of a drive that runs away, inf with an integral."""
+    low, high = np.moveaxis(np.abs(stiffness_at(response, [_SLOW_HZ, 10.0 * _SLOW_HZ])), -1, 0)
+    gone = ~np.isfinite(low) | (high < 0.5 * low)
+    return _plain(np.where(gone, np.inf, np.where(high > 2.0 * low, 0.0, low)))
+
+
+def lost_motion_rad(design: Design) -> Any:
+    """2 (b + C0_l/k)/N_r at the output: the play, and the twist that the load's dry friction holds."""
+    coupling, friction = design.coupling, design.load.friction
+    if coupling is None:
+        return 0.0
+    dry = 0.0 if friction is None else friction.dry_torque_Nm
+    return (coupling.play_rad + 2.0 * dry / coupling.stiffness_Nm_rad) / design.ratio_behind_coupling
+
+
+def _plain(value: Any) -> Any:
+    return float(value) if np.ndim(value) == 0 else value

@@ -1,0 +1,130 @@
+"""Make the corners of a design and judge each by the linear loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_lti.batch import Population
+from actuator_lti.design.access import with_values
+from actuator_lti.design.model import Design, Temperature, Tolerance
+from actuator_lti.design.tolerances import tolerances
+from actuator_lti.errors import InputError
+from actuator_lti.loops import assemble_loops
+from analyses.corners.result import Asked, Corner, Corners
+from analyses.loop_figures import all_loop_figures
+from analyses.requirements import evaluate_requirements
+from analyses.sampling import Factor
+from analyses.sensitivity import population_figures
+
+_TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
+MARGINS = {"gain_margin": "worst gain margin", "phase_margin": "worst phase margin"}
+
+
+def corners(design: Design, asked: Asked | None = None) -> Corners:
+    """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
+
+    Each corner is a design of its own, put through the same loops as the nominal one.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> [corner.name for corner in corners(load_design("fin")).corners]
+    ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']
+    """
+    asked = Asked.of(design) if asked is None else asked
+    return Corners(design, asked, tuple(_judged(*each) for each in _made(design, asked)))
+
+
+def _judged(name: str, words: str, design: Design) -> Corner:
+    figures = all_loop_figures(assemble_loops(design))
+    return Corner(name, words, design, figures, evaluate_requirements(design, figures))
+
+
+def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
+    """Name, words and design of every corner."""
+    yield "nominal", "as designed", design
+    hot = at_temperature(design, asked.hot_degC)
+    low = replace(design, limits=replace(design.limits, voltage_V=asked.supply_V))
+    supply = f"{asked.supply_V:g} V"
+    if design.motor.has_electrical_dynamics:
+        yield "hot", f"winding and magnets at {asked.hot_degC:g} °C", hot
+        thick = "" if asked.cold_viscous == 1.0 else f", viscous friction times {asked.cold_viscous:g}"
+        cold = _thickened(at_temperature(design, asked.cold_degC), asked.cold_viscous)
+        yield "cold", f"winding and magnets at {asked.cold_degC:g} °C{thick}", cold
+    yield "low supply", supply, low
+    if design.motor.has_electrical_dynamics:
+        both = replace(hot, limits=low.limits)
+        yield "hot, low supply", f"{asked.hot_degC:g} °C and {supply}", both
+    for quantity, name in MARGINS.items():
+        values = worst_ends(design, quantity)
+        if values:
+            words = "each tolerance at the end that lowers it: " + _ends_in_words(design, values)
+            yield name, words, with_values(design, values)
+
+
+def at_temperature(design: Design, degC: float) -> Design:
+    """The design with winding and magnets at a temperature."""
+    heat = design.temperature or Temperature()
+    return replace(design, temperature=replace(heat, winding_degC=degC, magnet_degC=degC))
+
+
+def _thickened(design: Design, factor: float) -> Design:
+    """The design with its viscous friction times a factor."""
+    friction, load = design.friction, design.load
+    back = friction.viscous_reverse_Nms_rad
+    changed = replace(
+        friction,
+        viscous_Nms_rad=factor * friction.viscous_Nms_rad,
+        viscous_reverse_Nms_rad=None if back is None else factor * back,
+    )
+    if load.friction is not None:
+        behind = replace(load.friction, viscous_Nms_rad=factor * load.friction.viscous_Nms_rad)
+        load = replace(load, friction=behind)
+    return replace(design, friction=changed, load=load)
+
+
+def worst_ends(design: Design, quantity: str) -> dict[str, float]:
+    """For each toleranced number the end of its range that alone lowers a margin most, over all loops.
+
+    One at a time, the smallest over the loops counts; a number that lowers it at neither end stays. Torque
+    and back-EMF constant are one constant and go together.
+    """
+    ends = [end for each in tolerances(design) for end in _ends(design, *each)]
+    base = {path: float(design.parameters[path].value) for end in ends for path in end}
+    values = {
+        path: np.array([value, *(end.get(path, value) for end in ends)]) for path, value in base.items()
+    }
+    try:
+        figures = population_figures(Population(design, values, 1 + len(ends)), design)
+    except InputError:
+        return {}
+    columns = [column for name, column in figures.items() if name.endswith(f".{quantity}")]
+    margin = np.min(np.nan_to_num(columns, nan=-np.inf), axis=0)
+    chosen: dict[str, float] = {}
+    for k in range(0, len(ends), 2):
+        low = k if margin[1 + k] <= margin[2 + k] else k + 1
+        if margin[1 + low] < margin[0]:
+            chosen |= ends[low]
+    return chosen
+
+
+def _ends(design: Design, path: str, nominal: float, tolerance: Tolerance) -> list[dict[str, float]]:
+    """Both ends of a range, each with what goes with it; none for what goes with another."""
+    has_both = _TORQUE in design.parameters and _BACK_EMF in design.parameters
+    if path == _BACK_EMF and has_both and design.parameters[_TORQUE].tolerance is not None:
+        return []
+    ends = [{path: float(end)} for end in Factor(path, nominal, tolerance).box]
+    if path == _TORQUE and has_both:
+        back = float(design.parameters[_BACK_EMF].value)
+        return [{**end, _BACK_EMF: back * end[path] / nominal} for end in ends]
+    return ends
+
+
+def _ends_in_words(design: Design, values: dict[str, float]) -> str:
+    up = [path for path, value in values.items() if value > float(design.parameters[path].value)]
+    down = [path for path, value in values.items() if value < float(design.parameters[path].value)]
+    parts = [f"{', '.join(paths)} {way}" for paths, way in ((up, "high"), (down, "low")) if paths]
+    return "; ".join(parts)

@@ -1,0 +1,150 @@
+"""Simulate a duty, then heat the winding and the overload state with its current."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import exp, inf, log
+
+import numpy as np
+from scipy.signal import lfilter
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.duty.result import Asked, Duty, Floats, Heating, Overload
+from nonlinear import Trajectory, commands, simulate
+
+PERIODS = 3  # of the sine that pass before one is taken
+HOLD_S = 1.0
+MOST_TICKS = 2_000_000
+MOST_CYCLES = 10_000
+_DRAWN = 200
+
+
+def duty(design: Design, asked: Asked | None = None) -> Duty:
+    """Current of a duty by simulation, against continuous current, overload protection and temperature.
+
+    The protection is left out of the simulation, so that the current is that of the duty as asked.
+
+    Raises
+    ------
+    InputError
+        For a drive without a motor current or a position loop, or a period of too many ticks.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> found = duty(load_design("joint"))
+    >>> found.rms_A <= found.peak_A
+    True
+    """
+    if not design.motor.has_electrical_dynamics:
+        raise InputError("duty: an ideal torque source has no current")
+    if design.controller.position is None:
+        raise InputError("duty: needs a drive with a position loop")
+    asked = Asked.of(design) if asked is None else asked
+    free = replace(design, limits=replace(design.limits, peak_time_s=None))
+    run, ticks = _moving(free, asked)
+    current = run.current_A[-ticks:]
+    held = _holding_A(free, asked) if asked.share < 1.0 else 0.0
+    moving = float(np.sqrt(np.mean(current**2)))
+    rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
+    acts = [name for name in run.limits if name != "profile" and run.limit_active(name)[-ticks:].any()]
+    return Duty(
+        design, asked, rms, moving, held, float(np.abs(run.current_A).max()),
+        design.limits.continuous_current_A, tuple(acts),
+        run.time_s[:ticks].copy(), current.copy(),
+        _overload(design, asked, current, held), heating(design, rms),
+    )  # fmt: skip
+
+
+def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
+    """The sine until it is steady, and the ticks of a period."""
+    Ts = design.controller.period_s
+    every = design.controller.position_loop.every
+    ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
+    if (PERIODS + 1) * ticks > MOST_TICKS:
+        lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
+        raise InputError(f"frequency {asked.frequency_hz:g} Hz: at least {lowest:.2g} Hz with this period")
+    sine = commands.sine(asked.amplitude_rad, 1.0 / (ticks * Ts))
+    return simulate(design, sine, (PERIODS + 1) * ticks * Ts, asked.load_Nm), ticks
+
+
+def _holding_A(design: Design, asked: Asked) -> float:
+    """Mean square root of the current while the drive holds still under the load."""
+    run = simulate(design, commands.hold(), HOLD_S, asked.load_Nm)
+    return float(np.sqrt(np.mean(run.current_A[run.current_A.size // 2 :] ** 2)))
+
+
+def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:
+    """The first-order state of (i/i_cont)^2 over motion and rest, repeated for ever."""
+    tau, Ts = design.limits.overload_time_s, design.controller.period_s
+    if tau is None:
+        return None
+    drive = (current / design.limits.continuous_current_A) ** 2
+    resting = asked.share < 1.0
+    periods = max(1, round(asked.share * asked.cycle_s * asked.frequency_hz)) if resting else 1
+    a = 1.0 - Ts / tau
+    gained = lfilter([Ts / tau], [1.0, -a], drive)  # over a period, from 0
+    decay = a ** (np.arange(drive.size) + 1.0)
+    earlier = (1.0 - decay[-1] ** (periods - 1)) / (1.0 - decay[-1])
+    rest_s = periods * drive.size * Ts * (1.0 / asked.share - 1.0)
+    cooled, still = exp(-rest_s / tau), (held / design.limits.continuous_current_A) ** 2
+
+    def highest(x: float) -> float:
+        """Largest in the motion that begins with x: in its first or its last period."""
+        last = decay[-1] ** (periods - 1) * x + gained[-1] * earlier
+        return max(float((decay * start + gained).max()) for start in (x, last))
+
+    slope = float(decay[-1] ** periods * cooled)  # of the state after a cycle over that before
+    end = float(gained[-1] * (earlier * decay[-1] + 1.0))
+    settled = (still + (end - still) * cooled) / (1.0 - slope)
+    peak = max(highest(settled), still if resting else 0.0)
+    if peak < 1.0:
+        return Overload(peak, None)
+    cycles = next((k for k in range(MOST_CYCLES) if highest(settled * (1.0 - slope**k)) >= 1.0), MOST_CYCLES)
+    return Overload(peak, (cycles + 1) * (periods * drive.size * Ts + rest_s))
+
+
+def heating(design: Design, rms_A: float) -> Heating | None:
+    """Temperature of the winding under a current of this rms value: ``tau dT/dt = Ta + Rth P(T) - T``.
+
+    P(T) = R i^2 (1 + alpha (T - T_ref)); None without a thermal resistance.
+
+    Examples
+    --------
+    1 ohm, 2 K/W, 3 A, alpha 0: 18 K above ambient.
+
+    >>> from actuator_lti.design import load_design, with_overrides
+    >>> design = with_overrides(load_design("fin"), {"temperature.thermal_resistance": "2 K/W",
+    ...     "temperature.thermal_time": "60 s", "temperature.resistance_coefficient": "0 1/K"})
+    >>> heating(design, 3.0).final_degC
+    43.0
+    """
+    heat = design.temperature
+    if heat is None or heat.thermal_resistance_K_W is None:
+        return None
+    cold = replace(design, temperature=replace(heat, winding_degC=heat.reference_degC)).effective_motor
+    assert cold.resistance_ohm is not None
+    loss = cold.resistance_ohm * rms_A**2
+    rise = heat.thermal_resistance_K_W * loss
+    share = 1.0 - rise * heat.resistance_per_K
+    start = rise * (1.0 + heat.resistance_per_K * (heat.ambient_degC - heat.reference_degC))
+    final = heat.ambient_degC + start / share if share > 0.0 else inf
+    tau = heat.thermal_time_s or 0.0
+    limit = heat.winding_limit_degC
+
+    def after(t: Floats) -> Floats:
+        if share == 0.0:
+            return heat.ambient_degC + start * t / tau
+        return heat.ambient_degC - start / share * np.expm1(-share * t / tau)
+
+    reached = None
+    if final > limit and tau > 0.0:
+        part = (limit - heat.ambient_degC) * share / start
+        reached = (
+            tau * (limit - heat.ambient_degC) / start if share == 0.0 else -tau * log(1.0 - part) / share
+        )
+    last = 5.0 * tau / share if share > 0.0 else (reached or tau)
+    time = np.linspace(0.0, last, _DRAWN)
+    course = after(time) if tau > 0.0 else np.full(_DRAWN, final)
+    return Heating(loss, final, limit, max(reached, 0.0) if reached is not None else None, time, course)

@@ -1,0 +1,145 @@
+"""The failures: what is commanded, when it happens, and what is then broken."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuator_lti.design.model import Design, LoadFriction
+from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.errors import InputError
+from actuator_lti.loops import assemble_loops
+from analyses.failures.result import Asked
+from analyses.failures.rig import Measured, Rig
+
+HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
+OPEN = 1e4  # times the resistance: of a winding with an open phase
+
+Command = Callable[[float], float]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One failure.
+
+    Attributes
+    ----------
+    start_rad : float
+        Where the drive holds before.
+    command : callable
+        Command over the time from the failure on (from the step on, where ``at_rad`` is given).
+    broken : callable
+        What is done to the rig at the failure.
+    at_rad : float or None
+        The failure happens on the way, when the output is this far from the start; ``None``: at once.
+    stops : bool
+        Whether the run ends at the stop.
+    """
+
+    name: str
+    words: str
+    start_rad: float
+    command: Command
+    broken: Callable[[Rig], None]
+    at_rad: float | None = None
+    stops: bool = True
+
+
+def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:
+    """The cases that exist for a design, and why the others do not."""
+    far, near = asked.stop_rad, asked.deflection_rad
+    made = [
+        Case("hard-over", "the power stage puts the whole bus on the motor", 0.0, _constant(0.0), _hard_over),
+        Case("open-phase", "the winding is open: no current, no torque", 0.0, _constant(0.0), _open),
+    ]
+    if design.controller.position is None:
+        why = "the drive has no position loop"
+        return tuple(made), dict.fromkeys(_LOOP_CASES, why)
+    frequency = _followed_most_hz(design)
+    made += [
+        Case("hard-over-command", "the command jumps to the stop", 0.0, _constant(far), _nothing),
+        Case(
+            "jam", "the output jams half-way through a step to the stop", 0.0, _constant(far),
+            lambda rig: rig.fail(jammed(design)), at_rad=0.5 * far, stops=False,
+        ),
+        Case(
+            "frozen-sensor", f"the position sensor freezes, the command steps by {_size(design, near)}", 0.0,
+            _constant(near), lambda rig: _sense(rig, lose=False),
+        ),
+        Case(
+            "lost-sensor", f"the position sensor reads zero while the drive holds {_size(design, 0.5 * far)}",
+            0.5 * far, _constant(0.5 * far), lambda rig: _sense(rig, lose=True),
+        ),
+        Case(
+            "oscillatory-command",
+            f"a sine of {_size(design, near)} at {frequency:.3g} Hz, where the drive follows most", 0.0,
+            lambda t: near * math.sin(2.0 * math.pi * frequency * t), _nothing, stops=False,
+        ),
+    ]  # fmt: skip
+    return tuple(made), {}
+
+
+_LOOP_CASES = ("hard-over-command", "jam", "frozen-sensor", "lost-sensor", "oscillatory-command")
+
+
+def jammed(design: Design) -> Design:
+    """The drive with its output held fast: rigid, the whole train; elastic, what is behind the coupling."""
+    hold = HELD * float(stall_torque_Nm(design))
+    if not math.isfinite(hold):
+        raise InputError("failures: a drive without a limit of voltage or current has no jam")
+    if design.coupling is None:
+        return replace(design, friction=replace(design.friction, law="coulomb", points=(), dry_torque_Nm=hold,
+                       dry_torque_reverse_Nm=None))  # fmt: skip
+    behind = design.load.friction or LoadFriction()
+    held = replace(behind, dry_torque_Nm=hold * design.ratio_to_coupling)
+    return replace(design, load=replace(design.load, friction=held))
+
+
+def _constant(value: float) -> Command:
+    return lambda _: value
+
+
+def _nothing(rig: Rig) -> None:
+    """The command alone fails."""
+
+
+def _hard_over(rig: Rig) -> None:
+    rig.driving = lambda _, bus: bus
+
+
+def _open(rig: Rig) -> None:
+    """No current flows; an ideal torque source gives nothing."""
+    motor = rig.design.motor
+    rig.driving = lambda _, bus: 0.0
+    if motor.resistance_ohm is not None:
+        rig.fail(replace(rig.design, motor=replace(motor, resistance_ohm=OPEN * motor.resistance_ohm)))
+
+
+def _sense(rig: Rig, *, lose: bool) -> None:
+    """Freeze the position loop's sensor, or let it read zero; a speed taken from it is zero."""
+    frozen, loop = rig.measured(), rig.design.controller.position_loop
+    y, th = (0.0, 0.0) if lose else (frozen.output_angle_rad, frozen.angle_rad)
+
+    def output(true: Measured) -> Measured:
+        return replace(true, output_angle_rad=y, output_speed_rad_s=0.0)
+
+    def motor(true: Measured) -> Measured:
+        return replace(true, angle_rad=th, speed_rad_s=0.0)
+
+    rig.sensing = output if loop.sensor == "output" else motor
+
+
+def _followed_most_hz(design: Design) -> float:
+    """Frequency from 0.1 Hz up at which the linear output is largest."""
+    response = assemble_loops(design).reference_to_output
+    assert response is not None
+    period = design.controller.period_s * design.controller.position_loop.every
+    f = np.geomspace(0.1, 0.5 / period, 400)
+    return float(f[np.argmax(np.abs(response(np.exp(2j * np.pi * f * period))))])
+
+
+def _size(design: Design, value: float) -> str:
+    return f"{1e3 * value:.3g} mm" if design.axis == "linear" else f"{math.degrees(value):.3g}°"

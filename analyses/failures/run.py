@@ -1,0 +1,136 @@
+"""Run every failure of a design on the rig of `analyses.failures.rig`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil, log
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.loops.compliance import compliance
+from analyses.drive_figures import drive_figures
+from analyses.failures.cases import Case, cases_of
+from analyses.failures.result import Asked, FailureCase, Failures, Floats
+from analyses.failures.rig import Rig
+
+SETTLED = 1e-3
+LONGEST_S = 5.0  # of waiting before a failure
+MOST_TICKS = 400_000
+
+
+def failures(design: Design, asked: Asked | None = None) -> Failures:
+    """Follow every failure case from its start to the stop or to the end of the time watched.
+
+    Parameters
+    ----------
+    design : Design
+    asked : Asked, optional
+        Default: the design's full deflection is the stop, a tenth of it the deflection asked for.
+
+    Raises
+    ------
+    InputError
+        For a drive whose closed loop is not stable, or a time of too many ticks.
+    NumericalError
+        If a run fails.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> found = failures(load_design("ilr33-amber"))
+    >>> found.case("jam").at_detection_rad < found.case("hard-over").at_detection_rad
+    True
+    """
+    asked = Asked.of(design) if asked is None else asked
+    if asked.watched_s / design.controller.period_s > MOST_TICKS:
+        longest = MOST_TICKS * design.controller.period_s
+        raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
+    wait = _settling_s(design, asked)
+    cases, left_out = cases_of(design, asked)
+    settled = {start: _settled(design, asked, start, wait) for start in {case.start_rad for case in cases}}
+    made = tuple(_run(settled[case.start_rad].copy(), asked, case) for case in cases)
+    return Failures(design, asked, made, left_out)
+
+
+def _settling_s(design: Design, asked: Asked) -> float:
+    """Time to reach half the stop and settle."""
+    slowest = float(compliance(design).slowest)
+    if slowest > 1.0 + 1e-9:
+        raise InputError("failures: the closed loop is not stable")
+    rate = min(drive_figures(design).output_rate_rad_s, design.command.rate_rad_s)
+    travel = 0.5 * asked.stop_rad / rate if rate > 0.0 else LONGEST_S
+    ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0
+    return min(0.1 + travel + ticks * design.controller.period_s, LONGEST_S)
+
+
+def _settled(design: Design, asked: Asked, start_rad: float, wait_s: float) -> Rig:
+    """The drive as it holds a command."""
+    rig = Rig(design, asked.load_Nm)
+    for _ in range(ceil(wait_s / design.controller.period_s)):
+        rig.step(start_rad)
+    return rig
+
+
+def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
+    """Fail and follow."""
+    Ts = rig.design.controller.period_s
+    start = rig.measured().output_angle_rad
+    if case.at_rad is not None:
+        _reach(rig, case, start, ceil(LONGEST_S / Ts))
+        start = rig.measured().output_angle_rad
+    case.broken(rig)
+    rows = []
+    for k in range(ceil(asked.watched_s / Ts) + 1):
+        true = rig.step(case.command(k * Ts))
+        moved = true.output_angle_rad - start
+        rows.append((k * Ts, moved, true.current_A, rig.moment_Nm, rig.controller.value("overloaded")))
+        if case.stops and abs(moved) >= asked.stop_rad:
+            break
+    return _judged(case, asked, *np.array(rows).T)
+
+
+def _reach(rig: Rig, case: Case, start: float, most: int) -> None:
+    """Follow the command until the output is where the failure happens."""
+    assert case.at_rad is not None
+    for k in range(most):
+        if abs(rig.measured().output_angle_rad - start) >= case.at_rad:
+            return
+        rig.step(case.command(k * rig.design.controller.period_s))
+    raise InputError(
+        f"failures: {case.name}: the output does not get half-way to the stop in {LONGEST_S:g} s"
+    )
+
+
+def _judged(
+    case: Case, asked: Asked, t: Floats, moved: Floats, current: Floats, moment: Floats, overloaded: Floats
+) -> FailureCase:
+    size = np.abs(moved)
+    return FailureCase(
+        name=case.name,
+        words=case.words,
+        time_s=t,
+        deflection_rad=moved,
+        current_A=current,
+        moment_Nm=moment,
+        to_deflection_s=_first(
+            t, size >= asked.deflection_rad, lambda k: _between(t, size, k, asked.deflection_rad)
+        ),
+        to_stop_s=_first(t, size >= asked.stop_rad, lambda k: _between(t, size, k, asked.stop_rad)),
+        at_detection_rad=float(size[t <= asked.detection_s * (1.0 + 1e-12)].max()),
+        peak_current_A=float(np.abs(current).max()),
+        peak_moment_Nm=float(np.abs(moment).max()),
+        protected_s=_first(t, overloaded > 0.0, lambda k: float(t[k])),
+    )
+
+
+def _first(t: Floats, true: np.ndarray, when: Callable[[int], float]) -> float | None:
+    return when(int(np.argmax(true))) if true.any() else None
+
+
+def _between(t: Floats, size: Floats, k: int, level: float) -> float:
+    """Time at which the level is crossed, on a line between two ticks."""
+    if k == 0:
+        return float(t[0])
+    return float(t[k] - (t[k] - t[k - 1]) * (size[k] - level) / (size[k] - size[k - 1]))

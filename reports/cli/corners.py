@@ -1,0 +1,105 @@
+"""`actuator-lti corners`: margins and requirements hot, cold, on a low supply, at the worst tolerances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.drive import SetOption, load_drive
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
+
+if TYPE_CHECKING:
+    from analyses.corners import Corner, Corners
+
+HotOption = Annotated[
+    float | None,
+    typer.Option("--hot", metavar="DEGC", help="Winding and magnets when hot; the winding's limit, or 120."),
+]
+ColdOption = Annotated[
+    float | None, typer.Option("--cold", metavar="DEGC", help="Winding and magnets when cold; -40.")
+]
+SupplyOption = Annotated[
+    float | None, typer.Option("--supply", metavar="V", help="The low supply; 0.8 of limits.voltage.")
+]
+ViscousOption = Annotated[
+    float | None,
+    typer.Option("--cold-viscous", metavar="FACTOR", help="Factor on viscous friction in the cold; 1."),
+]
+
+
+def corners(
+    design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
+    hot: HotOption = None,
+    cold: ColdOption = None,
+    supply: SupplyOption = None,
+    cold_viscous: ViscousOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
+
+    Resistance and torque constant follow [temperature] of the design, or copper and NdFeB. The exit status is
+    1 where a requirement is not met, or a loop not stable, at any corner. In the report: --also corners.
+    """
+    from analyses.corners import Asked
+    from analyses.corners import corners as analyse
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
+    from reports.sections.corners import summary
+
+    drive = load_drive(design, changes)
+    asked = Asked.of(drive, hot_degC=hot, cold_degC=cold, supply_V=supply, cold_viscous=cold_viscous)
+    found = analyse(drive, asked)
+    if as_json:
+        print_json(_json(found))
+    else:
+        print_line(f"{drive.name}: corners")
+        for corner in found.corners:
+            for line in _lines(corner):
+                print_line(line)
+        print_line(summary(found))
+    leave_with(found.passed)
+
+
+def _json(found: Corners) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {
+        "design": found.design.name,
+        "asked": asdict(found.asked),
+        "passed": found.passed,
+        "corners": [
+            {
+                "name": corner.name,
+                "what": corner.words,
+                "passed": corner.passed,
+                "loops": {
+                    name: {
+                        "stable": one.margins.stable,
+                        "gain_margin_db": one.margins.gain_margin_db,
+                        "phase_margin_deg": one.margins.phase_margin_deg,
+                        "bandwidth_hz": one.bandwidth.minus3db_hz if one.bandwidth else None,
+                    }
+                    for name, one in corner.figures.items()
+                },
+                "requirements": [
+                    {"id": one.id, "value": one.value, "passed": one.passed} for one in corner.verdicts
+                ],
+            }
+            for corner in found.corners
+        ],
+    }
+
+
+def _lines(corner: Corner) -> list[str]:
+    from reports.sections.corners import least, unmet
+
+    parts = []
+    for attribute, words, unit in (("gain_margin_db", "gain", "dB"), ("phase_margin_deg", "phase", "deg")):
+        found = least(corner, attribute)
+        if found is not None:
+            parts.append(f"least {words} margin {found[0]:.1f} {unit} ({found[1]} loop)")
+    missed = unmet(corner)
+    parts.append(f"not met: {missed}" if missed else "all met")
+    return [f"  {corner.name}: {corner.words}", f"    {', '.join(parts)}"]

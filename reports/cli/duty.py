@@ -1,0 +1,120 @@
+"""`actuator-lti duty`: can the motor do this motion for ever."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.drive import SetOption, load_drive, output_quantity
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, read_load
+
+if TYPE_CHECKING:
+    from analyses.duty import Duty
+
+AmplitudeOption = Annotated[
+    str | None,
+    typer.Option("--amplitude", metavar="ANGLE", help='Peak, such as "5 deg"; half the full deflection.'),
+]
+FrequencyOption = Annotated[float, typer.Option("--frequency", metavar="HZ", help="Of the sine.")]
+ShareOption = Annotated[
+    float, typer.Option("--share", help="Share of the time in motion; the drive holds still for the rest.")
+]
+CycleOption = Annotated[float, typer.Option("--cycle", metavar="S", help="One motion and one rest together.")]
+DutyLoadOption = Annotated[
+    float | None,
+    typer.Option(
+        "--load", metavar="LOAD", parser=read_load,
+        help='Moment at the output, such as "4 N*m", all the time; the largest of validation.loads.',
+    ),
+]  # fmt: skip
+
+
+def duty(
+    design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
+    amplitude: AmplitudeOption = None,
+    frequency: FrequencyOption = 1.0,
+    load: DutyLoadOption = None,
+    share: ShareOption = 1.0,
+    cycle: CycleOption = 10.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Hold a duty cycle against continuous current, overload protection (I2t) and winding temperature.
+
+    The duty is a sine under a load, for a share of the time. The temperature needs thermal_resistance and
+    thermal_time in [temperature], the protection limits.peak_time. The exit status is 1 where the drive
+    cannot do the duty for ever. In the report: --also duty.
+    """
+    from analyses.duty import Asked
+    from analyses.duty import duty as analyse
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
+    from reports.sections.duty import summary
+
+    drive = load_drive(design, changes)
+    asked = Asked.of(
+        drive, amplitude_rad=output_quantity("--amplitude", amplitude, drive),
+        frequency_hz=frequency, load_Nm=load, share=share, cycle_s=cycle,
+    )  # fmt: skip
+    found = analyse(drive, asked)
+    if as_json:
+        print_json(_json(found))
+    else:
+        for line in [f"{drive.name}: duty cycle", *_lines(found), summary(found)]:
+            print_line(line)
+    leave_with(found.passed)
+
+
+def _known(value: float) -> float | None:
+    from math import isfinite
+
+    return value if isfinite(value) else None
+
+
+def _json(found: Duty) -> dict[str, Any]:
+    """Everything but the curves, SI."""
+    from dataclasses import asdict
+
+    over, heat = found.overload, found.heating
+    return {
+        "design": found.design.name,
+        "asked": asdict(found.asked),
+        "passed": found.passed,
+        "rms_A": found.rms_A,
+        "moving_rms_A": found.moving_rms_A,
+        "holding_A": found.holding_A,
+        "peak_A": found.peak_A,
+        "continuous_A": _known(found.continuous_A),
+        "limited": list(found.limited),
+        "overload": None if over is None else asdict(over),
+        "heating": None
+        if heat is None
+        else {
+            "loss_W": heat.loss_W,
+            "final_degC": _known(heat.final_degC),
+            "limit_degC": _known(heat.limit_degC),
+            "limit_after_s": heat.limit_after_s,
+        },
+    }
+
+
+def _lines(found: Duty) -> list[str]:
+    over, heat = found.overload, found.heating
+    lines = [
+        f"  current {found.rms_A:.4g} A rms (in motion {found.moving_rms_A:.4g} A, "
+        f"peak {found.peak_A:.4g} A), continuous {found.continuous_A:.4g} A"
+    ]
+    if found.asked.share < 1.0:
+        lines.append(f"  holding still: {found.holding_A:.4g} A")
+    if over is not None:
+        acts = "never acts" if over.acts_after_s is None else f"acts after {over.acts_after_s:.3g} s"
+        lines.append(f"  overload state up to {over.peak:.3g} of 1: the protection {acts}")
+    if heat is not None:
+        late = "" if heat.limit_after_s is None else f", reached after {heat.limit_after_s:.4g} s"
+        lines.append(
+            f"  winding {heat.final_degC:.4g} °C in the long run, limit {heat.limit_degC:.4g} °C{late}"
+        )
+    if found.limited:
+        lines.append(f"  limiters that act: {', '.join(found.limited)}; the motion is not followed as asked")
+    return lines

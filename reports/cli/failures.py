@@ -1,0 +1,124 @@
+"""`actuator-lti failures`: what the output does when a part of the drive fails."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from reports.cli.drive import SetOption, load_drive, output_quantity
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption
+
+if TYPE_CHECKING:
+    from analyses.failures import FailureCase, Failures
+
+StopOption = Annotated[
+    str | None,
+    typer.Option("--stop", metavar="ANGLE", help='Mechanical stop, such as "25 deg"; the full deflection.'),
+]
+DeflectionOption = Annotated[
+    str | None,
+    typer.Option(
+        "--deflection", metavar="ANGLE", help='Deflection to which times are given, such as "2 deg"; stop/10.'
+    ),
+]
+DetectionOption = Annotated[
+    float, typer.Option("--detection", metavar="S", help="Seconds from the failure to its detection.")
+]
+WatchedOption = Annotated[
+    float, typer.Option("--duration", metavar="S", help="How long each failure is followed.")
+]
+
+
+def failures(
+    design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
+    stop: StopOption = None,
+    deflection: DeflectionOption = None,
+    detection: DetectionOption = 0.1,
+    duration: WatchedOption = 1.0,
+    load: LoadOption = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
+
+    Prints for each failure the time to a stated deflection and to the mechanical stop, the deflection until
+    the failure is detected, the largest current and the largest moment in the train. The load pushes forward
+    from the start. In the report: actuator-lti report DESIGN --also failures.
+    """
+    from analyses.failures import Asked
+    from analyses.failures import failures as analyse
+    from reports.cli.output import print_json, print_line
+
+    drive = load_drive(design, changes)
+    asked = Asked.of(
+        drive,
+        stop_rad=output_quantity("--stop", stop, drive),
+        deflection_rad=output_quantity("--deflection", deflection, drive),
+        detection_s=detection,
+        watched_s=duration,
+        load_Nm=load,
+    )
+    found = analyse(drive, asked)
+    if as_json:
+        print_json(_json(found))
+        return
+    for line in _lines(found):
+        print_line(line)
+
+
+def _json(found: Failures) -> dict[str, Any]:
+    """Everything but the curves, SI."""
+    from dataclasses import asdict, fields
+
+    from analyses.failures import FailureCase
+
+    scalars = [
+        each.name for each in fields(FailureCase)
+        if each.name not in ("time_s", "deflection_rad", "current_A", "moment_Nm")
+    ]  # fmt: skip
+    return {
+        "design": found.design.name,
+        "axis": found.design.axis,
+        "asked": asdict(found.asked),
+        "cases": [{name: getattr(case, name) for name in scalars} for case in found.cases],
+        "left_out": found.left_out,
+    }
+
+
+def _lines(found: Failures) -> list[str]:
+    """The same for people."""
+    from reports.sections.failures import NAMES, summary
+    from reports.sections.large_signal import load_unit, output_unit
+
+    scale, unit = output_unit(found.design)
+    asked = found.asked
+    lines = [
+        f"{found.design.name}: stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
+        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}"
+    ]
+    for case in found.cases:
+        lines += [f"  {NAMES[case.name]}: {case.words}", f"    {_figures(found, case)}"]
+    lines += [f"  {NAMES[name]}: not for this drive, as {why}" for name, why in found.left_out.items()]
+    return [*lines, summary(found)]
+
+
+def _figures(found: Failures, case: FailureCase) -> str:
+    from reports.sections.large_signal import load_unit, output_unit
+
+    scale, unit = output_unit(found.design)
+    parts = []
+    if case.to_deflection_s is not None:
+        parts.append(
+            f"{scale * found.asked.deflection_rad:.4g} {unit} after {1e3 * case.to_deflection_s:.4g} ms"
+        )
+    parts.append(
+        "stop not reached" if case.to_stop_s is None else f"stop after {1e3 * case.to_stop_s:.4g} ms"
+    )
+    parts.append(f"{scale * case.at_detection_rad:.4g} {unit} until detected")
+    if found.design.motor.has_electrical_dynamics:
+        parts.append(f"up to {case.peak_current_A:.4g} A")
+    parts.append(f"up to {case.peak_moment_Nm:.4g} {load_unit(found.design)}")
+    if case.protected_s is not None:
+        parts.append(f"overload protection after {1e3 * case.protected_s:.4g} ms")
+    return ", ".join(parts)

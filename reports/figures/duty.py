@@ -1,0 +1,41 @@
+"""Current of a duty over one period, and the winding's temperature.
+
+Data: ``time_s``, ``current``, ``rms``, ``continuous`` (or null); ``heating``: null, or ``time_s``,
+``temperature``, ``limit`` (or null).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from reports.figures import style
+from reports.figures.style import Chart, Panel
+
+
+def draw(data: dict[str, Any]) -> Chart:
+    """Draw one panel, or two side by side."""
+    chart = Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel(title="One period of the motion")
+    last = data["time_s"][-1]
+    scale = style.time_axis(panel, last)
+    panel.curve([t * scale for t in data["time_s"]], data["current"], "current", **style.series(0))
+    panel.rule_y(data["rms"], "rms of the duty", colour=style.BLUE, dash=1)
+    panel.y.see([data["rms"]])
+    if data["continuous"] is not None:
+        panel.y.see([data["continuous"]])
+        panel.rule_y(data["continuous"], "continuous", colour=style.RED, dash=2)
+    panel.y.label = "current, A"
+    panel.x.limits(0.0, last * scale)
+    if data["heating"] is not None:
+        _winding(chart.panel(title="Winding"), data["heating"])
+    return chart
+
+
+def _winding(panel: Panel, data: dict[str, Any]) -> None:
+    """Draw the rise from ambient."""
+    scale = style.time_axis(panel, data["time_s"][-1])
+    panel.curve([t * scale for t in data["time_s"]], data["temperature"], "winding", **style.series(1))
+    if data["limit"] is not None:
+        panel.y.see([data["limit"]])
+        panel.rule_y(data["limit"], "limit", colour=style.RED, dash=1)
+    panel.y.label = "winding, °C"

@@ -1,0 +1,129 @@
+"""Duty cycle: can the motor do this for ever, by current, overload protection and winding temperature."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, Literal
+
+from reports import document as doc
+from reports.document import rounded
+from reports.findings import Finding
+from reports.sections.large_signal import load_unit, output_unit
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.duty import Duty, Heating
+
+_SHOWN = 400
+
+
+def of_design(design: Design) -> dict[str, Any]:
+    """Make the section of a report."""
+    from analyses.duty import duty
+
+    return section(duty(design))
+
+
+def section(result: Duty) -> dict[str, Any]:
+    """Make the section from `analyses.duty.duty`."""
+    intro = (
+        "The motion is simulated until it is steady, friction, play and limits at work, the overload "
+        "protection left out. Its current, repeated for ever, heats the winding by its mean copper loss and "
+        "drives the overload state."
+    )
+    blocks = [doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), _note(result))]
+    blocks.append(_figure(result))
+    words = summary(result)
+    severity: Literal["info", "warn"] = "info" if result.passed else "warn"
+    return doc.section(
+        "duty", "Duty cycle", blocks, result=words, intro=intro, status=severity,
+        findings=[Finding(severity=severity, text=words, where="duty")],
+    )  # fmt: skip
+
+
+_COLUMNS = [
+    doc.column("what", "What"),
+    doc.column("value", "Found", format="sig:4"),
+    doc.column("limit", "Allowed", format="sig:4"),
+    doc.column("unit", "Unit"),
+    doc.column("when", "Reached after", "s", format="sig:3"),
+]
+
+
+def asked_words(result: Duty) -> str:
+    """Say the duty."""
+    scale, unit = output_unit(result.design)
+    asked = result.asked
+    words = f"±{scale * asked.amplitude_rad:.3g} {unit} at {asked.frequency_hz:.3g} Hz"
+    words += f" under {asked.load_Nm:.3g} {load_unit(result.design)}"
+    if asked.share < 1.0:
+        words += f", {100.0 * asked.share:.3g} % of every {asked.cycle_s:.3g} s"
+    return words
+
+
+def summary(result: Duty) -> str:
+    """Say whether the drive does it for ever."""
+    able = "can be done for ever" if result.passed else "cannot be done for ever"
+    known = math.isfinite(result.continuous_A)
+    part = f" of {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
+    return f"{asked_words(result)} {able}: {result.rms_A:.4g} A rms{part}."
+
+
+def _note(result: Duty) -> str:
+    words = [f"Duty: {asked_words(result)}."]
+    if result.limited:
+        words.append(f"Limiters that act in it: {', '.join(result.limited)}; it is not followed as asked.")
+    if result.heating is None:
+        words.append("No winding temperature: the design states no temperature.thermal_resistance.")
+    if result.overload is None:
+        words.append("No overload state: the design states no limits.peak_time.")
+    return " ".join(words)
+
+
+def _rows(result: Duty) -> list[dict[str, Any]]:
+    over, heat = result.overload, result.heating
+    peak = result.design.limits.peak_current_A
+    rows: list[dict[str, Any]] = [
+        _row("current, rms", result.rms_A, result.continuous_A, "A"),
+        _row("current in motion, rms", result.moving_rms_A, math.inf, "A"),
+    ]
+    if result.asked.share < 1.0:
+        rows.append(_row("current at rest, rms", result.holding_A, math.inf, "A"))
+    rows.append(_row("current, peak", result.peak_A, peak, "A", judged=False))
+    if over is not None:
+        rows.append(_row("overload state, peak", over.peak, 1.0, "1", over.acts_after_s))
+    if heat is not None:
+        rows.append(_row("winding temperature", heat.final_degC, heat.limit_degC, "°C", heat.limit_after_s))
+    return rows
+
+
+def _row(
+    what: str, value: float, limit: float, unit: str, when: float | None = None, *, judged: bool = True
+) -> dict[str, Any]:
+    status = "fail" if judged and value > limit else None
+    return {"what": what, "value": value, "limit": limit, "unit": unit, "when": when, "_status": status}
+
+
+def _figure(result: Duty) -> dict[str, Any]:
+    every = max(1, len(result.time_s) // _SHOWN)
+    data = {
+        "time_s": rounded(result.time_s[::every]),
+        "current": rounded(result.current_A[::every]),
+        "rms": result.rms_A,
+        "continuous": result.continuous_A,
+        "heating": _heating(result.heating),
+    }
+    caption = "Motor current over one period of the motion."
+    if result.heating is not None:
+        caption += " Right: the winding from ambient."
+    return doc.figure("duty", data, caption=caption, alt=caption)
+
+
+def _heating(heat: Heating | None) -> dict[str, Any] | None:
+    if heat is None:
+        return None
+    return {
+        "time_s": rounded(heat.time_s),
+        "temperature": rounded(heat.temperature_degC),
+        "limit": heat.limit_degC,
+    }

@@ -1,0 +1,123 @@
+"""Failure cases: what the output does before anybody notices, and what the train has to carry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document import rounded
+from reports.findings import Finding
+from reports.numbers import short
+from reports.sections.large_signal import load_unit, output_unit
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.failures import FailureCase, Failures
+
+NAMES = {
+    "hard-over": "Hard-over of the power stage",
+    "open-phase": "Open phase",
+    "hard-over-command": "Hard-over command",
+    "jam": "Jam",
+    "frozen-sensor": "Frozen sensor",
+    "lost-sensor": "Lost sensor",
+    "oscillatory-command": "Oscillatory command",
+}
+_SHOWN = 400
+
+
+def of_design(design: Design) -> dict[str, Any]:
+    """Make the section of a report."""
+    from analyses.failures import failures
+
+    return section(failures(design))
+
+
+def section(result: Failures) -> dict[str, Any]:
+    """Make the section from `analyses.failures.failures`."""
+    scale, unit = output_unit(result.design)
+    load, asked = load_unit(result.design), result.asked
+    stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
+    detected = f"{1e3 * asked.detection_s:.4g} ms"
+    intro = (
+        f"Each failure is simulated from a drive that has settled under {asked.load_Nm:g} {load} (positive "
+        f"pushes forward). Deflection counts from where the output was; the stop is {stop} away, and "
+        f"detection takes {detected}. The moment is that in the coupling; in a rigid train the motor's "
+        "torque times the reduction."
+    )
+    blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load)]
+    blocks += [
+        doc.text(f"{NAMES[name]}: not for this drive, as {why}.") for name, why in result.left_out.items()
+    ]
+    words = summary(result)
+    finding = Finding(severity="info", text=words, where="failures")
+    return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, findings=[finding])
+
+
+def summary(result: Failures) -> str:
+    """Say which failure moves the output most until it is detected."""
+    scale, unit = output_unit(result.design)
+    worst = max(result.cases, key=lambda case: case.at_detection_rad)
+    size = short(scale * worst.at_detection_rad, 3)
+    when = f"{1e3 * result.asked.detection_s:.4g} ms"
+    stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
+    return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
+
+
+def _table(result: Failures, scale: float, unit: str, near: str) -> dict[str, Any]:
+    columns = [
+        doc.column("case", "Failure"),
+        doc.column("near", f"To {near}", format="ms:3"),
+        doc.column("stop", "To the stop", format="ms:3"),
+        doc.column("seen", "Until detected", unit, format="sig:3"),
+        doc.column("current", "Peak current", "A", format="sig:3"),
+        doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3"),
+        doc.column("protected", "I²t acts at", format="ms:3"),
+        doc.column("words", "What happens"),
+    ]
+    note = f"No value: not within the {result.asked.watched_s:g} s watched."
+    rows = [_row(case, scale, result.design.motor.has_electrical_dynamics) for case in result.cases]
+    return doc.table("Failure cases", columns, rows, note)
+
+
+def _row(case: FailureCase, scale: float, has_current: bool) -> dict[str, Any]:
+    return {
+        "case": NAMES[case.name],
+        "words": case.words,
+        "near": None if case.to_deflection_s is None else 1e3 * case.to_deflection_s,
+        "stop": None if case.to_stop_s is None else 1e3 * case.to_stop_s,
+        "seen": scale * case.at_detection_rad,
+        "current": case.peak_current_A if has_current else None,
+        "moment": case.peak_moment_Nm,
+        "protected": None if case.protected_s is None else 1e3 * case.protected_s,
+    }
+
+
+def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, Any]:
+    series, asked = [], result.asked
+    stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
+    last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
+    for case in result.cases:
+        if case.name == "oscillatory-command":
+            continue  # a band of ink; the table has its size
+        count = int(np.searchsorted(case.time_s, last))
+        keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
+        series.append(
+            {
+                "label": NAMES[case.name],
+                "time_s": rounded(case.time_s[keep]),
+                "deflection": rounded(scale * case.deflection_rad[keep]),
+                "moment": rounded(case.moment_Nm[keep]),
+            }
+        )
+    data = {
+        "series": series,
+        "unit": unit,
+        "load": load,
+        "stop": scale * asked.stop_rad,
+        "detection_s": asked.detection_s,
+    }
+    caption = "Deflection of the output and moment in the train after each failure but the oscillation."
+    return doc.figure("failures", data, caption=caption, alt=f"Two panels. {caption}")

@@ -1,0 +1,94 @@
+"""Corners: each is the design that its words say, and the worst ends are the worst corner of the box."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from actuator_lti.batch import Population
+from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design.model import Requirement
+from actuator_lti.errors import InputError
+from analyses.corners import Asked, corners
+from analyses.corners.run import worst_ends
+from analyses.sensitivity import population_figures
+from reports.cli.main import main
+from reports.sections.corners import section
+
+
+def test_a_hot_motor_has_more_resistance_and_less_torque() -> None:
+    """R (1 + 0.00393 * 95), k (1 - 0.0011 * 95) at 120 degC, of copper and NdFeB from 25 degC."""
+    design = load_design("fin")
+    hot = next(one for one in corners(design, Asked.of(design, hot_degC=120.0)).corners if one.name == "hot")
+    motor = hot.design.effective_motor
+    assert motor.resistance_ohm == pytest.approx(1.0 * (1 + 0.00393 * 95), rel=1e-12)
+    assert motor.torque_constant_Nm_A == pytest.approx(0.03 * (1 - 0.0011 * 95), rel=1e-12)
+    assert motor.back_emf_constant_Vs_rad == pytest.approx(0.03 * (1 - 0.0011 * 95), rel=1e-12)
+
+
+def test_a_low_supply_lowers_the_rate_and_no_margin() -> None:
+    """Steady: U = R i + kE w, kM i = Tc + Cv w, without a speed limit in the way."""
+    design = load_design("ilr33-amber")
+    rate = Requirement(id="rate", quantity="output_rate", unit="deg/s", minimum=1.0, load_Nm=0.0)
+    design = replace(design, requirements=(rate,))
+    nominal, _, _, low, *_ = corners(design, Asked.of(design, supply_V=4.0)).corners
+    w = np.radians(low.verdicts[0].value) * design.total_ratio
+    i = (2.25e-3 + 5.25e-6 * w) / 5.9e-3
+    assert 0.055 * i + 5.9e-3 * w == pytest.approx(4.0, rel=1e-9)
+    for name, one in low.figures.items():
+        assert one.margins.gain_margin_db == nominal.figures[name].margins.gain_margin_db
+
+
+@pytest.mark.parametrize("quantity", ["gain_margin", "phase_margin"])
+def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -> None:
+    """Four toleranced numbers of the fin: all sixteen corners looked at (the figures are monotone there)."""
+    kept = ("motor.rotor_inertia", "motor.resistance", "load.inertia", "friction.viscous")
+    design = load_design("fin")
+    parameters = {
+        path: one if path in kept else replace(one, tolerance=None) for path, one in design.parameters.items()
+    }
+    design = replace(design, parameters=type(design.parameters)(parameters))
+    chosen = worst_ends(design, quantity)
+    nominal = {path: design.parameters[path].value for path in kept}
+    width = {path: design.parameters[path].tolerance.half_width for path in kept}  # type: ignore[union-attr]
+    every = np.array(list(product((-1.0, 1.0), repeat=4))).T
+    values = {path: nominal[path] + width[path] * every[k] for k, path in enumerate(kept)}  # type: ignore[operator]
+    at_chosen = {path: np.append(values[path], chosen.get(path, nominal[path])) for path in kept}
+    found = population_figures(Population(design, at_chosen, 17), design)
+    margin = np.min([v for name, v in found.items() if name.endswith(f".{quantity}")], axis=0)
+    assert margin[16] == pytest.approx(margin[:16].min(), rel=1e-9)
+
+
+def test_torque_and_back_emf_constant_go_together() -> None:
+    chosen = worst_ends(load_design("joint"), "gain_margin")
+    assert chosen["motor.torque_constant"] == pytest.approx(0.126, rel=1e-12)
+    assert chosen["motor.back_emf_constant"] == pytest.approx(0.126, rel=1e-12)
+
+
+def test_command_and_section(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["corners", "fin", "--json"]) == 1
+    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["corners"]}
+    assert told["nominal"]["passed"]
+    assert not told["cold"]["passed"]
+    made = section(corners(load_design("emps")))
+    assert made["result"].startswith("Every loop is stable")
+    assert main(["corners", "fin", "--hot", "-60"]) == 2
+    assert "allowed: cold below hot" in capsys.readouterr().err
+
+
+def test_a_source_has_no_temperature() -> None:
+    names = [one.name for one in corners(load_design("emps")).corners]
+    assert names == ["nominal", "low supply", "worst gain margin", "worst phase margin"]
+    with pytest.raises(InputError, match="must be positive"):
+        Asked.of(load_design("emps"), supply_V=-1.0)
+
+
+def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:
+    changed = with_overrides(load_design("ballscrew"), {"coupling.damping": "0 N*s/m"})
+    assert changed.coupling is not None
+    assert changed.coupling.damping_Nms_rad == 0.0
+    assert changed.parameters["coupling.damping"].tolerance is None

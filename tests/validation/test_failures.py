@@ -1,0 +1,166 @@
+"""Failure cases against closed forms; nothing failed, the rig is the drive."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design.model import Design, Load
+from actuator_lti.errors import InputError
+from actuator_lti.loops import assemble_loops
+from analyses.failures import Asked, failures
+from analyses.failures.rig import Rig
+from nonlinear import commands, simulate
+from reports.cli.main import main
+from reports.figures.registry import draw_svg
+from reports.sections.failures import section
+from tests.loops.two_mass import drive_d
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint", "ballscrew", "emps"])
+def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
+    """Bit for bit, limits and friction at work, under a load."""
+    design = load_design(name)
+    size, load, ticks = (
+        0.3 * design.validation.full_deflection_rad,
+        0.5 * max(design.validation.loads_Nm),
+        1500,
+    )
+    rig = Rig(design, load)
+    seen = [rig.step(size) for _ in range(ticks)]
+    run = simulate(design, commands.step(size), ticks * design.controller.period_s, load)
+    assert [one.output_angle_rad for one in seen] == run.output_angle_rad.tolist()
+    assert [one.current_A for one in seen] == run.current_A.tolist()
+
+
+def test_hard_over_is_the_motor_on_the_bus() -> None:
+    """Rigid, dry friction constant while it moves: di, dw, dth linear in (i, w, th, 1), after the delay d."""
+    design = load_design("ilr33-amber")
+    m, U, d = design.motor, design.limits.voltage_V, design.controller.computing_delay_s
+    J, N = design.inertia_kgm2, design.total_ratio
+    assert m.inductance_H is not None
+    A = np.zeros((4, 4))
+    A[0] = np.array([-m.resistance_ohm, -m.back_emf_constant_Vs_rad, 0.0, U]) / m.inductance_H
+    A[1] = np.array([m.torque_constant_Nm_A, -design.friction.viscous_Nms_rad, 0.0, 0.0]) / J
+    A[2, 1] = 1.0
+    start = design.friction.dry_torque_Nm / (m.torque_constant_Nm_A * U / m.resistance_ohm)
+    rest = -m.inductance_H / m.resistance_ohm * np.log1p(-start)  # until the current breaks away
+    A[1, 3] = -design.friction.dry_torque_Nm / J
+    moving = np.array([start * U / m.resistance_ohm, 0.0, 0.0, 1.0])
+    asked = Asked.of(design)
+    found = failures(design, asked).case("hard-over")
+    for level, seen in ((asked.deflection_rad, found.to_deflection_s), (asked.stop_rad, found.to_stop_s)):
+        time = brentq(lambda t, level=level: (expm(A * t) @ moving)[2] / N - level, 1e-4, 1.0)
+        assert seen == pytest.approx(d + rest + time, rel=1e-5)  # a tick is a line
+
+
+def test_an_open_phase_leaves_the_output_to_its_load() -> None:
+    """Without current and viscous friction: a (t - 0)^2/2 with J dw/dt = M/N - Tc, the winding gone."""
+    design = free(
+        "ilr33-amber", **{"friction.viscous": "0 N*m*s/rad", "friction.load_coefficient": "0 mN*m/(N*m)"}
+    )
+    M, N = 20.0, design.total_ratio
+    rate = (M / N - design.friction.dry_torque_Nm) / design.inertia_kgm2 / N
+    found = failures(design, Asked.of(design, load_Nm=M)).case("open-phase")
+    k = int(np.searchsorted(found.time_s, 0.2))
+    assert found.deflection_rad[k] == pytest.approx(0.5 * rate * found.time_s[k] ** 2, rel=5e-3)
+
+
+def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
+    """The moment is N kM i; I2t from rest: tau ln(r^2/(r^2 - 1)) at the peak is the stated peak time."""
+    design = with_overrides(
+        load_design("joint"), {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
+    )
+    found = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
+    assert abs(found.deflection_rad).max() < 1e-6
+    k = np.searchsorted(found.time_s, 0.15)
+    assert found.current_A[k] == pytest.approx(15.0, rel=1e-3)
+    assert found.protected_s is not None
+    assert 0.1 < found.protected_s < 0.2  # a little was used on the way
+    assert found.current_A[-1] == pytest.approx(6.0, rel=1e-3)
+
+
+def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
+    """The motor's inertia runs into the coupling: W sqrt(k J_m) N_c, the motor's own push beside it."""
+    design = load_design("ballscrew")
+    assert design.coupling is not None
+    design = replace(design, coupling=replace(design.coupling, damping_Nms_rad=0.0))
+    case = failures(design).case("jam")
+    assert design.coupling is not None
+    k, J, N = design.coupling.stiffness_Nm_rad, design.motor_side_inertia_kgm2, design.ratio_to_coupling
+    half = 0.5 * design.validation.full_deflection_rad
+    run = simulate(design, commands.step(2.0 * half), 0.5)
+    at = int(np.argmax(run.output_angle_rad >= half))
+    speed = run.motor_speed_rad_s[at] / N
+    before = abs(run.coupling_torque_Nm[at])  # type: ignore[index]
+    impact = speed * sqrt(k * J) * N
+    limit = design.limits.peak_current_A * design.effective_motor.torque_constant_Nm_A * N  # type: ignore[operator]
+    assert impact - 2 * limit - before < case.peak_moment_Nm < impact + 2 * limit + before
+    assert impact > 2 * limit  # the impact decides
+
+
+def test_a_frozen_sensor_runs_away_at_the_speed_of_its_error() -> None:
+    """P position, perfect inner loops: rate Kv e, the error e constant (friction off the scale of 0.5 %)."""
+    design = with_overrides(load_design("ballscrew"), {"control.position.sensor": "output"})
+    asked = Asked.of(design)
+    found = failures(design, asked).case("frozen-sensor")
+    rate = design.controller.position_loop.gain * asked.deflection_rad
+    seen = np.gradient(found.deflection_rad, found.time_s)[-200:].mean()
+    assert seen == pytest.approx(rate, rel=0.02)
+
+
+def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
+    """No dry friction, no play, inside every limit: the amplitude is |T| times the command's."""
+    design = replace(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"))
+    design = replace(design, controller=replace(load_position(design), computing_delay_s=1e-4))
+    asked = Asked.of(design, stop_rad=0.1, deflection_rad=0.001, watched_s=3.0)
+    case = failures(design, asked).case("oscillatory-command")
+    response = assemble_loops(design).reference_to_output
+    tail = case.deflection_rad[len(case.time_s) // 2 :]
+    crossings = np.flatnonzero((tail[:-1] < 0) & (tail[1:] >= 0))
+    f = (len(crossings) - 1) / ((crossings[-1] - crossings[0]) * design.controller.period_s)
+    T = abs(response(np.exp(2j * pi * f * 2e-4)))  # type: ignore[misc]
+    assert tail.max() == pytest.approx(0.001 * T, rel=0.01)
+
+
+def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
+    found = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
+    made = section(found)
+    (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
+    assert "Lost sensor" in draw_svg("failures", figure["data"], page=False)
+    assert "until it is detected" in made["result"]
+    assert main(["failures", "fin", "--stop", "25 deg", "--load", "4", "--duration", "0.2", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["asked"]["stop_rad"] == pytest.approx(25 * pi / 180)
+    assert {case["name"] for case in told["cases"]} >= {"jam", "hard-over", "open-phase", "lost-sensor"}
+    assert main(["failures", "fin", "--deflection", "30 mm"]) == 2
+    assert "--deflection '30 mm'" in capsys.readouterr().err
+
+
+def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
+    design = load_design("ilr33-amber")
+    speed = replace(design, controller=replace(design.controller, position=None))
+    found = failures(speed, Asked.of(speed, watched_s=0.1))
+    assert [case.name for case in found.cases] == ["hard-over", "open-phase"]
+    assert found.left_out["jam"] == "the drive has no position loop"
+    with pytest.raises(InputError, match="beyond the stop"):
+        Asked.of(design, stop_rad=0.1, deflection_rad=0.2)
+
+
+def free(name: str, **changes: str) -> Design:
+    """A shipped design, back-drivable, with numbers changed."""
+    return with_overrides(load_design(name), {"load.path": "back-drivable", **changes})
+
+
+def load_position(design: Design):  # type: ignore[no-untyped-def]
+    """The controller of drive D with a position loop of 150 1/s around it."""
+    from actuator_lti.design.model import PositionLoop
+
+    return replace(design.controller, position=PositionLoop(gain=150.0, every=2))
