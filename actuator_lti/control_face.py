@@ -55,12 +55,12 @@ class ControlFace(control.FrequencyResponseData, NonlinearIOSystem):
     @cached_property
     def omega(self) -> np.ndarray:
         """Frequencies in rad/s from a hundredth of the slowest rate to ten times the fastest."""
-        return _grid(self)  # type: ignore[arg-type]
+        return _grid(self)
 
     @cached_property
     def frdata(self) -> np.ndarray:
         """The exact response at `omega`, shape (outputs, inputs, frequencies)."""
-        return np.asarray(self(1j * self.omega, squeeze=False))  # type: ignore[operator]
+        return np.asarray(self(1j * self.omega, squeeze=False))
 
     # Time, as `control.input_output_response` asks for it: _update_params, _out at the start, _rhs as often
     # as its solver likes, then _out at each instant in order.
@@ -86,7 +86,7 @@ class ControlFace(control.FrequencyResponseData, NonlinearIOSystem):
         self._asked += 1
         u = np.atleast_1d(np.asarray(u, dtype=float))
         if self._stepper is None or t <= self._stepper.start_s:
-            self._stepper = DelayStepper(self, t, np.array(x, dtype=float), u)  # type: ignore[arg-type]
+            self._stepper = DelayStepper(self, t, np.array(x, dtype=float), u)
         state, output = self._stepper.at(t, u)
         if isinstance(x, np.ndarray) and x.dtype == float:
             x[:] = state

@@ -61,7 +61,8 @@ def style() -> Iterator[Any]:
     cycler = need("cycler", "plot", "plotting").cycler
     import matplotlib
 
-    with matplotlib.rc_context({**STYLE, "axes.prop_cycle": cycler(color=COLOURS)}):
+    look: dict[Any, Any] = {**STYLE, "axes.prop_cycle": cycler(color=COLOURS)}
+    with matplotlib.rc_context(look):
         yield pyplot
 
 
@@ -83,7 +84,7 @@ def frequencies(system: Any, margins: StabilityMargins | None = None) -> np.ndar
 
     with np.errstate(all="ignore"):
         usual = np.asarray(control.frequency_response(system).omega)
-    found = [] if margins is None else [*margins.gain_margins, *margins.phase_margins]
+    found: list[Any] = [] if margins is None else [*margins.gain_margins, *margins.phase_margins]
     at = [one.frequency_rad_s for one in found if 0.0 < one.frequency_rad_s < np.inf]
     low, high = (min(at) / 30.0, max(at) * 10.0) if at else (usual[usual > 0.0][0], usual[-1])
     if system.isdtime(strict=True):

@@ -126,7 +126,7 @@ class LoopSurvey:
             for form, loops in self.forms.items()
             for name, found in loops.items()
         ]
-        frame = need("pandas", "records", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
+        frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
         frame.attrs = {"design": self.design.name}
         return frame
 

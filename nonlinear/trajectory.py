@@ -254,7 +254,7 @@ class Trajectory:
         """A data frame with one row a tick; name, hash and status in ``attrs``."""
         from actuator_lti.extras import need
 
-        frame = need("pandas", "records", "to_pandas").DataFrame(self.columns())
+        frame = need("pandas", "tables", "to_pandas").DataFrame(self.columns())
         frame.attrs = {"design": self.design_name, "parameters": self.parameters_hash, "status": self.status}
         return frame
 

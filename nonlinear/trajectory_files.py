@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def write_csv(run: Trajectory, path: str | PathLike[str]) -> None:
     """Write a trajectory as CSV; flags as 0 and 1."""
-    need("pyarrow", "records", "a CSV file of a run")
+    need("pyarrow", "tables", "a CSV file of a run")
     import pyarrow as pa
     import pyarrow.csv
 
@@ -26,7 +26,7 @@ def write_csv(run: Trajectory, path: str | PathLike[str]) -> None:
 
 def write_parquet(run: Trajectory, path: str | PathLike[str]) -> None:
     """Write a trajectory as Parquet."""
-    need("pyarrow", "records", "a Parquet file")
+    need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
     import pyarrow.parquet
 

@@ -105,7 +105,7 @@ class AmplitudeMap:
         """A data frame with one row a cell: command, what acts, waveform, fundamental (pandas needed)."""
         from actuator_lti.extras import need
 
-        frame = need("pandas", "records", "to_pandas")
+        frame = need("pandas", "tables", "to_pandas")
         amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")
         return frame.DataFrame(
             {

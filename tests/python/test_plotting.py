@@ -122,7 +122,7 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.M
     run = simulate("ilr33-amber", commands.step(0.01), 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(
-        InputError, match=r'to_pandas needs pandas; allowed: pip install "actuator-lti\[records\]"'
+        InputError, match=r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
     ):
         run.to_pandas()
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
