@@ -9,10 +9,11 @@ STAMP := $(VENV)/.installed
 RELEASE := $(VENV)/.release
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Each package is pinned with the hashes of its files; "make lock" writes them anew from constraints.txt.
+EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables)
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links
 
-.PHONY: wasm report test machines check bench clean install browser fuzz lock limits docs release
+.PHONY: newest installs wasm report test machines check bench clean install browser fuzz lock limits docs release
 
 install: $(STAMP)
 
@@ -65,8 +66,19 @@ $(RELEASE): $(STAMP)
 	$(PIP) install --quiet --constraint constraints.txt '.[release]'
 	touch $(RELEASE)
 
+# The wheel in a clean environment with the newest versions of what it needs, and nothing else; skipped offline.
+newest:
+	$(PYTHON) -m tests.install.clean_install
+
+# The same with every Python that is here, and from the sources with the pinned versions.
+installs: newest
+	$(PYTHON) -m tests.install.clean_install --pinned --sources
+	set -e; for each in python3.12 python3.13 python3.14; do \
+	  if $$each --version >/dev/null 2>&1; then $(PYTHON) -m tests.install.clean_install --python $$each; \
+	  else echo "$$each: not here"; fi; done
+
 lock: $(RELEASE)
-	$(COMPILE) --extra dev --extra docs --extra export --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
+	$(COMPILE) $(EXTRAS) --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
 
 # Wheel, sources and the bill of materials of what they need to run.
 release: $(RELEASE)

@@ -7,8 +7,9 @@ A `DelaySystem` is a state space in linear fractional form with a bank of delays
     v     = C2 x + D21 u + D22 z,      z_k(t) = v_k(t - delays_s[k])
 
 Series, parallel and feedback connection only rearrange these matrices, so nested loops keep every delay
-exactly, and the frequency response is that of the delays themselves: nowhere a Pade approximation.
-Plots of python-control take its frequency response: ``control.bode_plot(control.frequency_response(loop))``.
+exactly, and the frequency response is that of the delays themselves: nowhere a Pade approximation, unless
+`DelaySystem.pade` is asked for one. python-control's plots, ``margin`` and time responses take it as it is,
+see `actuator_lti.control_face`.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from typing import Any
 
 import control
 import numpy as np
-from control.lti import LTI
+from control.iosys import InputOutputSystem
 
+from actuator_lti.control_face import ControlFace
 from actuator_lti.errors import InputError
 
 
@@ -31,7 +33,7 @@ def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:
     return array
 
 
-class DelaySystem(LTI):
+class DelaySystem(ControlFace):
     """A continuous system with internal delays, see the module for the equations.
 
     Parameters
@@ -82,7 +84,7 @@ class DelaySystem(LTI):
             raise InputError(f"delays_s = {self.delays_s.tolist()}: each must be positive and finite")
         names.setdefault("inputs", m)
         names.setdefault("outputs", p)
-        super().__init__(dt=0, **({"states": n} | names))
+        InputOutputSystem.__init__(self, dt=0, **({"states": n} | names))
         self.A, self.D11 = _matrix(A, n, n, "A"), _matrix(D11, p, m, "D11")
         self.B1, self.B2 = _matrix(B1, n, m, "B1"), _matrix(B2, n, k, "B2")
         self.C1, self.C2 = _matrix(C1, p, n, "C1"), _matrix(C2, k, n, "C2")
@@ -149,6 +151,51 @@ class DelaySystem(LTI):
             self.A + self.B2 @ C, self.B1 + self.B2 @ D, self.C1 + self.D12 @ C, self.D11 + self.D12 @ D,
             inputs=self.input_labels, outputs=self.output_labels,
         )  # fmt: skip
+
+    def pade(self, order: int = 4) -> control.StateSpace:
+        """An approximation as `control.StateSpace`: each delay as a Pade quotient of this order.
+
+        For functions of python-control that want poles; its states are those of the system, then
+        ``delay0_0, delay0_1, ...`` of each delay. No figure of this library uses it.
+
+        Raises
+        ------
+        InputError
+            For an order outside 1 to 12, beyond which the coefficients lose their digits.
+
+        Examples
+        --------
+        exp(-s/100) at 50 rad/s: -28.648 degrees.
+
+        >>> import numpy as np
+        >>> near = DelaySystem.delay(0.01).pade(4)
+        >>> near.state_labels
+        ['delay0_0', 'delay0_1', 'delay0_2', 'delay0_3']
+        >>> round(float(np.degrees(np.angle(near(50j)))), 3)
+        -28.648
+        """
+        if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= 12:
+            raise InputError(f"order = {order!r}: allowed: a whole number, 1 to 12")
+        unit = control.ss(control.tf(*control.pade(1.0, order)))  # in time over the delay: well scaled
+        rates = np.diag(1.0 / self.delays_s)
+        A, B = np.kron(rates, unit.A), np.kron(rates, unit.B)
+        C, D = (np.kron(np.eye(len(rates)), part) for part in (unit.C, unit.D))
+        # v = C2 x + D21 u + D22 z, z = C p + D v
+        algebra = np.eye(len(self.delays_s)) - self.D22 @ D
+        Vx, Vp, Vu = (np.linalg.solve(algebra, M) for M in (self.C2, self.D22 @ C, self.D21))
+        Zx, Zp, Zu = D @ Vx, C + D @ Vp, D @ Vu
+        own = self.state_labels if self.nstates else []
+        labels = {"inputs": self.input_labels, "outputs": self.output_labels}
+        states = [*own, *(f"delay{k}_{j}" for k in range(len(self.delays_s)) for j in range(order))]
+        return control.ss(
+            np.block([[self.A + self.B2 @ Zx, self.B2 @ Zp], [B @ Vx, A + B @ Vp]]),
+            np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]),
+            np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
+            self.D11 + self.D12 @ Zu,
+            name=f"{self.name}_pade{order}",
+            **labels,
+            **({"states": states} if states else {}),
+        )
 
     def _descriptor(self, s: np.ndarray) -> np.ndarray:
         """[[sI - A, -B2 E], [-C2, I - D22 E]] with E = diag(exp(-s delays)), stacked over s."""

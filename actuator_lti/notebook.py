@@ -1,11 +1,11 @@
-"""Designs, loops and margins as small HTML tables: what a notebook shows for them."""
+"""Designs, loops, margins and runs as small HTML tables: what a notebook shows for them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
 from math import isinf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -57,6 +57,38 @@ def loops_html(loops: Loops) -> str:
     ]
     head = f"{loops.design.name}: {loops.form}, {loops.operating_point}, load {loops.load_Nm:g}"
     return html_table(head, ("loop", "cut at", "unit", "period"), rows)
+
+
+def run_html(run: Any) -> str:
+    """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
+    linear = run.axis == "linear"
+    factor, angle, speed = (1e3, "mm", "m/s") if linear else (57.29577951308232, "deg", "rad/s")
+    rows = [
+        ("rows", f"{run.time_s.size} of {1e3 * run.period_s * _every(run):g} ms"),
+        ("output, from", f"{_least(factor * run.output_angle_rad, min):.5g} {angle}"),
+        ("output, to", f"{_least(factor * run.output_angle_rad, max):.5g} {angle}"),
+        ("motor speed, up to", f"{_least(abs(run.motor_speed_rad_s), max):.5g} {speed}"),
+        ("current, up to", f"{_least(abs(run.current_A), max):.5g} A"),
+        ("at rest", f"{100.0 * run.stick_fraction:.3g} % of the ticks"),
+        *(
+            (f"{name} limit", f"{100.0 * use.fraction:.3g} % of the ticks, first at {use.first_time_s:.4g} s")
+            for name, use in run.limits.items()
+            if use.active
+        ),
+        ("stick, slip, reversal", f"{run.events} events"),
+        ("status", run.status if not run.advice else f"{run.status}: {run.advice}"),
+    ]
+    return html_table(f"{run.design_name}: {run.time_s.size} rows", ("figure", "value"), rows)
+
+
+def _least(values: Any, which: Any) -> float:
+    """Smallest or largest of some values; NaN of none."""
+    return float(which(values)) if len(values) else float("nan")
+
+
+def _every(run: Any) -> float:
+    """Ticks between two rows."""
+    return float(round((run.time_s[1] - run.time_s[0]) / run.period_s)) if run.time_s.size > 1 else 1.0
 
 
 def margins_html(margins: StabilityMargins) -> str:

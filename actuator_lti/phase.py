@@ -54,7 +54,7 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     omega = np.asarray(omega_rad_s, dtype=float)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):
         raise InputError("omega_rad_s: every frequency must be positive and finite")
-    if hasattr(system, "frdata"):
+    if not hasattr(system, "delays_s") and hasattr(system, "frdata"):
         raise InputError("measured data have no factors: their phase cannot be unwrapped with certainty")
     flat = np.atleast_1d(omega).ravel()
     if hasattr(system, "delays_s"):

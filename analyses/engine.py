@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.extras import need
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -145,6 +146,7 @@ class Engine:
 
     @contextmanager
     def _client(self) -> Iterator[Client]:
+        need("distributed", "cluster", "a cluster of workers")
         import distributed
 
         if self.scheduler is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
     from actuator_lti.delay_budget import DelayBudget
     from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.limiters import Onset
@@ -105,6 +108,41 @@ class LoopSurvey:
     def figures(self) -> Mapping[str, LoopFigures]:
         """The sampled, sliding loops: those that requirements are judged by."""
         return self.forms["sampled"]
+
+    def plot_map(self, axes: Any = None) -> Axes:
+        """Draw over frequency the command amplitude at which each limiter sets in; gives the axes."""
+        from actuator_lti.plotting import plot_onset
+
+        if self.onset is None:
+            raise InputError(f"{self.design.name}: nothing limits, so there is no map")
+        return plot_onset(self.onset, linear_axis=self.design.axis == "linear", axes=axes)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
+        from actuator_lti.extras import need
+
+        rows = [
+            {"form": form, "loop": name, **_row(found)}
+            for form, loops in self.forms.items()
+            for name, found in loops.items()
+        ]
+        frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
+        frame.attrs = {"design": self.design.name}
+        return frame
+
+
+def _row(found: LoopFigures) -> dict[str, Any]:
+    """The figures of one loop, by name with unit."""
+    margins, bandwidth = found.margins, found.bandwidth
+    return {
+        "stable": margins.stable,
+        "gain_margin_db": margins.gain_margin_db,
+        "phase_margin_deg": margins.phase_margin_deg,
+        "delay_margin_s": margins.delay_margin_s,
+        "modulus_margin": margins.modulus_margin,
+        "bandwidth_rad_s": None if bandwidth is None else bandwidth.minus3db_rad_s,
+        "evidence": margins.evidence,
+    }
 
 
 def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:

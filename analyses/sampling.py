@@ -19,6 +19,7 @@ from scipy.special import ndtr, ndtri
 
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.extras import need
 from actuator_lti.reading import read_bytes, shown, shown_path
 
 if TYPE_CHECKING:
@@ -283,6 +284,8 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
     InputError
         If the file cannot be read, a column is no key of the design, or a value is not finite.
     """
+    need("pandas", "tables", "--from-samples")
+    need("pyarrow", "tables", "--from-samples")
     import pandas as pd
     import pyarrow as pa
 

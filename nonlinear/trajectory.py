@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.axes import Axes
 
 Floats = npt.NDArray[np.float64]
 Status = Literal["ok", "too many events", "not finite", "cancelled"]
@@ -251,9 +252,9 @@ class Trajectory:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a tick; name, hash and status in ``attrs``."""
-        import pandas
+        from actuator_lti.extras import need
 
-        frame = pandas.DataFrame(self.columns())
+        frame = need("pandas", "tables", "to_pandas").DataFrame(self.columns())
         frame.attrs = {"design": self.design_name, "parameters": self.parameters_hash, "status": self.status}
         return frame
 
@@ -268,6 +269,28 @@ class Trajectory:
         from nonlinear.trajectory_files import write_parquet
 
         write_parquet(self, path)
+
+    def plot(self, axes: Any = None) -> list[Axes]:
+        """Draw angle, speed, current and voltage over time; gives matplotlib's four axes.
+
+        Grey: the rotor rests. Red: a limit acts.
+
+        Examples
+        --------
+        >>> from nonlinear import commands, simulate
+        >>> panels = simulate("ilr33-amber", commands.step(0.01), 0.05).plot()
+        >>> [panel.get_ylabel() for panel in panels]
+        ['output, deg', 'motor, rad/s', 'current, A', 'voltage, V']
+        """
+        from actuator_lti.plotting import plot_run
+
+        return plot_run(self, axes)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from actuator_lti.notebook import run_html
+
+        return run_html(self)
 
     def __repr__(self) -> str:
         used = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in self.limits.items() if use.active]

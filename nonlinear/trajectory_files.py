@@ -6,6 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 from actuator_lti.atomic import write_stream
+from actuator_lti.extras import need
 
 if TYPE_CHECKING:
     from nonlinear.trajectory import Trajectory
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
 def write_csv(run: Trajectory, path: str | PathLike[str]) -> None:
     """Write a trajectory as CSV; flags as 0 and 1."""
+    need("pyarrow", "tables", "a CSV file of a run")
     import pyarrow as pa
     import pyarrow.csv
 
@@ -24,6 +26,7 @@ def write_csv(run: Trajectory, path: str | PathLike[str]) -> None:
 
 def write_parquet(run: Trajectory, path: str | PathLike[str]) -> None:
     """Write a trajectory as Parquet."""
+    need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
     import pyarrow.parquet
 

@@ -11,6 +11,8 @@ Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import Operating
     from actuator_lti.limiters import LimiterPath
@@ -51,6 +53,32 @@ class Loop:
     unit_in: str
     unit_out: str
     periodic: bool = False
+
+    def plot_bode(self, axes: Any = None) -> list[Axes]:
+        """Draw the open loop over frequency with every gain and phase margin; gives matplotlib's axes.
+
+        Examples
+        --------
+        >>> from actuator_lti import assemble_loops
+        >>> magnitude, phase = assemble_loops("ilr33-amber").position.plot_bode()
+        >>> magnitude.get_ylabel()
+        'magnitude, dB'
+        """
+        from actuator_lti.plotting import loop_bode
+
+        return loop_bode(self, axes)
+
+    def plot_nyquist(self, axes: Any = None) -> Axes:
+        """Draw the locus of the open loop near -1; gives matplotlib's axes."""
+        from actuator_lti.plotting import plot_nyquist
+
+        return plot_nyquist(self.open_loop, label=self.name, axes=axes)
+
+    def plot_step(self, duration_s: float | None = None, axes: Any = None) -> Axes:
+        """Draw the step response of the closed loop; gives matplotlib's axes."""
+        from actuator_lti.plotting import plot_step
+
+        return plot_step(self.closed_loop, duration_s=duration_s, label=self.name, axes=axes)
 
     def __repr__(self) -> str:
         kind = "continuous" if self.period_s is None else f"every {1e3 * self.period_s:g} ms"
@@ -125,6 +153,14 @@ class Loops:
         """The loops that exist, innermost first, by name."""
         named = {"current": self.current, "velocity": self.velocity, "position": self.position}
         return {name: loop for name, loop in named.items() if loop is not None}
+
+    def plot_bode(self, axes: Any = None) -> list[Axes]:
+        """Draw the open loops of all stages in one Bode figure; gives matplotlib's axes."""
+        from actuator_lti.plotting import plot_bode
+
+        for loop in self.present.values():
+            axes = plot_bode(loop.open_loop, label=loop.name, axes=axes)
+        return list(axes)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,10 @@ from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.static_threshold import static_threshold
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 Progress = Callable[[int, int], None]
 AMPLITUDES, FREQUENCIES = 25, 40
@@ -86,6 +91,34 @@ class AmplitudeMap:
     def phase_change_deg(self) -> np.ndarray:
         """Phase against the linear phase, -180 to 180 degrees."""
         return np.asarray(np.degrees(np.angle(self.response / self.linear)))
+
+    def plot_map(self, axes: Any = None, *, linear_axis: bool = False) -> Axes:
+        """Draw what acts in each cell, and the linear onset lines; gives matplotlib's axes."""
+        from actuator_lti.plotting import plot_cells
+
+        return plot_cells(
+            self.frequency_hz, self.amplitude_rad, self.cause, CAUSES,
+            onset_rad=self.onset_rad, linear_axis=linear_axis, axes=axes,
+        )  # fmt: skip
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A data frame with one row a cell: command, what acts, waveform, fundamental (pandas needed)."""
+        from actuator_lti.extras import need
+
+        frame = need("pandas", "tables", "to_pandas")
+        amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")
+        return frame.DataFrame(
+            {
+                "amplitude_rad": amplitude.ravel(),
+                "frequency_hz": frequency.ravel(),
+                "cause": np.array(CAUSES)[self.cause].ravel(),
+                "waveform": np.array(WAVEFORMS)[self.waveform].ravel(),
+                "gain_db": self.gain_db.ravel(),
+                "phase_deg": self.phase_deg.ravel(),
+                "distortion": self.distortion.ravel(),
+                "stick_fraction": self.stick_fraction.ravel(),
+            }
+        )
 
     def share(self, names: tuple[str, ...], kinds: tuple[str, ...] = CAUSES) -> float:
         """Fraction of the cells with one of these causes (or waveforms, with ``kinds=WAVEFORMS``)."""

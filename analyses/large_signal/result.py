@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design.model import Design
 from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
@@ -13,6 +13,8 @@ from analyses.large_signal.map import AMPLITUDES, FREQUENCIES, AmplitudeMap, amp
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from actuator_lti.loops import Loops
 
 Progress = Callable[[int, int], None]
@@ -41,6 +43,10 @@ class LargeSignals:
     border_with_friction: BorderCheck | None
     bode: AmplitudeBode
     sawtooth: Sawtooth
+
+    def plot_map(self, axes: Any = None) -> Axes:
+        """Draw what acts at each amplitude and frequency; gives matplotlib's axes."""
+        return self.map.plot_map(axes, linear_axis=self.design.axis == "linear")
 
 
 def large_signals(

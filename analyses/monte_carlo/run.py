@@ -13,6 +13,7 @@ from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.errors import InputError
+from actuator_lti.extras import need
 from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
 from analyses.monte_carlo.judging import judge, label, source_columns
@@ -113,6 +114,7 @@ def monte_carlo(
     InputError
         If nothing has a tolerance, or the folder holds another study.
     """
+    need("pyarrow", "tables", "a Monte Carlo study")
     settings = settings or MonteCarloSettings()
     task = _task(design, settings)
     sampler = task.sampler

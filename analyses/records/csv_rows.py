@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from actuator_lti.extras import need
 from analyses.records.record import FloatArray, RowCounts
 from analyses.records.spec import MISSING_TEXTS, CsvFormat, Policy
 
@@ -86,6 +87,7 @@ def separator_of(layout: CsvFormat) -> str:
 
 def fast_rows(data: bytes, first_line: int, columns: Columns, layout: CsvFormat) -> Block | None:
     """A whole cleaned block through Arrow's reader; None where any line needs a closer look."""
+    need("pyarrow", "tables", "a record")
     import pyarrow as pa
     import pyarrow.csv as pc
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
+from actuator_lti.extras import need
 from actuator_lti.reading import read_bytes, shown_path
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
@@ -31,6 +32,7 @@ def read_parquet_record(path: str | Path, spec: RecordSpec, *, name: str | None 
 
 def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
     """The columns of numbers by name; a value that is missing is NaN."""
+    need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -83,6 +83,10 @@ def nightly(
     result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
     --reason TEXT` makes the last night the baseline.
     """
+    from actuator_lti.extras import need
+
+    need("filelock", "nightly", "a nightly build")
+    need("ruptures", "nightly", "a nightly build")
     from analyses.engine import Engine
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress

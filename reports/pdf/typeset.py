@@ -11,6 +11,7 @@ from typing import Any
 
 from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.extras import need
 from reports.pdf.printable import printable
 
 TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "pdf" / "report.typ"
@@ -44,6 +45,7 @@ def pdf_bytes(made: Mapping[str, Any]) -> bytes:
     The fonts are those that come with typst and matplotlib, embedded; what they lack is taken from the
     system's.  The same document gives the same file wherever those are the same.
     """
+    need("typst", "pdf", "a PDF")
     import typst
 
     data = json.dumps(printable(made), ensure_ascii=False, allow_nan=False)

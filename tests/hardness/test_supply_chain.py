@@ -26,13 +26,33 @@ def test_every_package_is_pinned_with_hashes() -> None:
 
 
 def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> None:
-    asked = [*PROJECT["project"]["dependencies"], *PROJECT["project"]["optional-dependencies"]["dev"]]
+    extras = PROJECT["project"]["optional-dependencies"]
+    asked = list(PROJECT["project"]["dependencies"])
+    asked += [words for name, wanted in extras.items() if name not in ("all", "release") for words in wanted]
     asked += PROJECT["build-system"]["requires"]
     for words in asked:
         wanted = Requirement(words)
         name = canonicalize_name(wanted.name)
         assert name in LOCKED, f"{name}: make lock"
         assert wanted.specifier.contains(LOCKED[name], prereleases=True), words
+
+
+def test_the_extra_all_has_what_the_commands_ask_for() -> None:
+    (words,) = PROJECT["project"]["optional-dependencies"]["all"]
+    extras = set(PROJECT["project"]["optional-dependencies"]) - {"all", "dev", "docs", "release"}
+    assert Requirement(words).extras == extras
+    sources = [
+        path
+        for top in ("actuator_lti", "nonlinear", "analyses", "reports")
+        for path in (ROOT / top).rglob("*.py")
+    ]
+    named = [
+        one
+        for path in sources
+        for one in re.findall(r'\bneed\("[\w.]+", "(\w+)"', path.read_text(encoding="utf-8"))
+    ]
+    assert set(named) <= extras
+    assert {"cluster", "nightly", "pdf", "plot", "tables"} <= set(named)
 
 
 def test_the_build_back_end_is_pinned() -> None:

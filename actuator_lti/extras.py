@@ -1,0 +1,42 @@
+"""Packages that only some commands need: what to install is said in one line."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from actuator_lti.errors import InputError
+
+
+def need(module: str, extra: str, what: str) -> ModuleType:
+    """Import a module that comes with an extra of this package.
+
+    Parameters
+    ----------
+    module : str
+    extra : str
+        Name of the extra in pyproject.toml.
+    what : str
+        What wants it, for the message.
+
+    Raises
+    ------
+    InputError
+        Where it is not installed, with the command that installs it.
+
+    Examples
+    --------
+    >>> need("math", "pdf", "a PDF").pi > 3
+    True
+    >>> need("no_such_module", "pdf", "a PDF")
+    Traceback (most recent call last):
+    ...
+    actuator_lti.errors.InputError: a PDF needs no_such_module; allowed: pip install "actuator-lti[pdf]"
+    """
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        package = module.partition(".")[0]
+        if error.name is None or error.name.partition(".")[0] != package:
+            raise
+        raise InputError(f'{what} needs {package}; allowed: pip install "actuator-lti[{extra}]"') from None

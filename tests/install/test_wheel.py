@@ -1,0 +1,94 @@
+"""What the wheel and the sources hold: all that runs needs, and nothing of the tests."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+(BACK_END,) = PROJECT["build-system"]["requires"]
+BUILD = (
+    "import os, sys; from setuptools import build_meta as b; source, dist = sys.argv[1:];"
+    "os.chdir(source); b.build_wheel(dist); b.build_sdist(dist)"
+)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], set[str], str]:
+    """Names in the wheel and in the sources, and the metadata."""
+    if f"setuptools=={version('setuptools')}" != BACK_END:
+        pytest.skip(f"the build back-end of this environment is not {BACK_END}")
+    source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
+    for name in (*PACKAGES, "tests"):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source / name)
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD, str(source), str(dist)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    (wheel,), (sources,) = dist.glob("*.whl"), dist.glob("*.tar.gz")
+    with zipfile.ZipFile(wheel) as file:
+        names = set(file.namelist())
+        about = file.read(next(name for name in names if name.endswith("/METADATA"))).decode()
+    with tarfile.open(sources) as file:
+        inside = {member.name.partition("/")[2] for member in file.getmembers() if member.isfile()}
+    return names, inside, about
+
+
+def needed() -> set[str]:
+    """Every file under version control's packages: modules, designs, templates, types, the wasm module."""
+    kept = {".py", ".toml", ".html", ".css", ".js", ".typ", ".c", ".h", ".md", ".typed", ".wasm", ".json"}
+    return {
+        str(path.relative_to(ROOT))
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and path.suffix in kept and "__pycache__" not in path.parts
+    }
+
+
+def test_nothing_that_is_needed_is_left_out(built: tuple[set[str], set[str], str]) -> None:
+    names, inside, _ = built
+    wanted = needed()
+    assert {
+        "reports/templates/report.html",
+        "nonlinear/export/wasm/drive.wasm",
+        "nonlinear/native.py",
+    } <= wanted
+    assert "actuator_lti/design/shipped/ilr33-amber.toml" in wanted
+    assert wanted - names == set()
+    assert wanted - inside == set()
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert {"LICENSE", "README.md", "pyproject.toml"} <= inside
+
+
+def test_no_test_and_nothing_else_is_installed(built: tuple[set[str], set[str], str]) -> None:
+    names, _, _ = built
+    tops = {name.partition("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == set(PACKAGES)
+    assert not [name for name in names if re.search(r"(^|/)(tests?|conftest)(/|\.py|_)", name)]
+    assert not [name for name in names if name.endswith((".so", ".pyc"))]
+
+
+def test_the_core_is_light(built: tuple[set[str], set[str], str]) -> None:
+    _, _, about = built
+    core = {
+        re.match(r"[\w-]+", line.partition(": ")[2])[0].lower()
+        for line in about.splitlines()
+        if line.startswith("Requires-Dist") and "extra ==" not in line
+    }
+    assert core == {
+        "control", "numpy", "scipy", "numba", "pydantic", "pint", "typer", "rich", "jinja2", "tomli-w",
+        "defusedxml", "python-flint",
+    }  # fmt: skip

@@ -1,0 +1,130 @@
+"""Figures and tables of results in Python: what is drawn is what was found."""
+
+import subprocess
+import sys
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from actuator_lti import InputError, assemble_loops, load_design, onset, stability_margins
+from actuator_lti.plotting import COLOURS, plot_bode, plot_cells, plot_onset, plot_step
+from analyses.large_signal.classify import CAUSES
+from analyses.large_signal.map import amplitude_map
+from analyses.loop_survey import LoopSurvey
+from nonlinear import commands, simulate
+from reports.charts import paint
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
+def test_a_bode_figure_shows_the_loop_and_its_margins(form: str) -> None:
+    loops = assemble_loops("ilr33-amber", form=form)
+    for loop in loops.present.values():
+        magnitude, phase = loop.plot_bode()
+        x, y = magnitude.lines[0].get_data()
+        s = 2j * np.pi * x
+        seen = loop.open_loop(np.exp(s * loop.period_s) if loop.period_s else s)
+        np.testing.assert_allclose(y, 20 * np.log10(np.abs(seen)), atol=1e-9)
+        turned = np.exp(1j * np.radians(phase.lines[0].get_ydata()))
+        np.testing.assert_allclose(turned, seen / np.abs(seen), atol=1e-6)
+        found = stability_margins(loop.open_loop)
+        words = {text.get_text() for text in (*magnitude.texts, *phase.texts)}
+        assert {f"{m.db:+.1f} dB" for m in found.gain_margins} <= words
+        assert {f"{m.deg:+.1f}°" for m in found.phase_margins} <= words
+        if loop.period_s:
+            assert x.max() <= 0.5 / loop.period_s
+
+
+def test_all_loops_in_one_figure_and_axes_of_ones_own() -> None:
+    loops = assemble_loops("ilr33-amber")
+    both = loops.plot_bode()
+    assert [text.get_text() for text in both[0].get_legend().get_texts()] == list(loops.present)
+    figure, own = plt.subplots(2, 1)
+    assert loops.position.plot_bode(own)[0] is own[0]
+    assert loops.velocity.plot_nyquist().figure is not figure
+    with pytest.raises(InputError, match="allowed: 2 of matplotlib's axes"):
+        loops.position.plot_bode(axes=own[0])
+
+
+def test_steps_of_sampled_and_continuous_loops_end_at_one() -> None:
+    for form in ("sampled", "continuous", "ideal"):
+        line = assemble_loops("ilr33-amber", form=form).velocity.plot_step(0.1).lines[0]
+        assert line.get_ydata()[-1] == pytest.approx(1.0, abs=2e-2)
+    with pytest.raises(InputError, match="duration_s = 0"):
+        plot_step(assemble_loops("ilr33-amber").velocity.closed_loop, duration_s=0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"), [("ilr33-amber", 180 / np.pi, "deg"), ("emps", 1e3, "mm")]
+)
+def test_a_run_is_drawn_in_its_own_units(name: str, factor: float, unit: str) -> None:
+    run = simulate(name, commands.step(0.02), 0.05)
+    panels = run.plot()
+    assert panels[0].get_ylabel() == f"output, {unit}"
+    np.testing.assert_allclose(panels[0].lines[1].get_ydata(), factor * run.output_angle_rad)
+    html = run._repr_html_()
+    assert f"{factor * run.output_angle_rad.max():.5g} {unit}" in html
+    assert html.count("<tr>") == html.count("</tr>") > 6
+    assert run.to_pandas().shape[0] == run.time_s.size
+
+
+def test_the_border_and_the_map() -> None:
+    design = load_design("ilr33-amber")
+    loops = assemble_loops(design)
+    border = onset(loops, np.geomspace(1.0, 3000.0, 60))
+    panel = plot_onset(border)
+    assert {text.get_text() for text in panel.get_legend().get_texts()} == {
+        f"{n} limit" for n in border.each_rad
+    }
+    survey = LoopSurvey(design, loops, {"sampled": {}}, None, {}, (), {}, border)
+    assert len(survey.plot_map().lines) == len(panel.lines)
+    found = amplitude_map(design, loops, counts=(4, 5))
+    drawn = found.plot_map()
+    present = {CAUSES[k] for k in np.unique(found.cause)}
+    assert {text.get_text() for text in drawn.get_legend().get_texts()} == present
+    frame = found.to_pandas()
+    assert set(frame["cause"]) == present
+    assert len(frame) == 20
+    with pytest.raises(InputError, match="nothing limits"):
+        LoopSurvey(design, loops, {"sampled": {}}, None, {}, (), {}, None).plot_map()
+
+
+def test_cells_keep_their_colours_when_some_are_missing() -> None:
+    kind = np.array([[0, 2], [2, 3]])
+    panel = plot_cells(np.array([1.0, 10.0]), np.array([1.0, 2.0]), kind, ("none", "a", "b", "c"))
+    drawn = panel.collections[0]
+    assert drawn.get_array().ravel().tolist() == [0, 1, 1, 2]
+    assert [tuple(np.round(drawn.cmap(k)[:3], 2)) for k in (1, 2)] == [
+        tuple(round(int(COLOURS[k][i : i + 2], 16) / 255, 2) for i in (1, 3, 5)) for k in (2, 3)
+    ]
+
+
+def test_pages_and_notebooks_have_the_same_colours() -> None:
+    assert set(COLOURS) == {paint.COLOURS[name] for name in (*paint.SERIES, "ink", "muted")}
+
+
+def test_matplotlib_is_imported_only_when_something_is_drawn() -> None:
+    code = (
+        "import sys, nonlinear, analyses.loop_survey, actuator_lti.plotting;"
+        "from actuator_lti import load_design; load_design('ilr33-amber'); print('matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate("ilr33-amber", commands.step(0.01), 0.01)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(
+        InputError, match=r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
+    ):
+        run.to_pandas()
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(InputError, match=r"plotting needs matplotlib"):
+        plot_bode(assemble_loops("ilr33-amber").velocity.open_loop)
