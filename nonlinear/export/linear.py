@@ -18,9 +18,8 @@ from actuator_lti.batch._eigen import eigenvalues
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
 from nonlinear._kernels import layout
-from nonlinear._kernels.prepare import prepare_sizes
-from nonlinear._kernels.tick import init, tick
-from nonlinear.export.entries import derive, emitted
+from nonlinear._kernels.tick import tick
+from nonlinear.export.entries import derive, emitted, init, prepare_sizes
 
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
