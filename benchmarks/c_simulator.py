@@ -1,44 +1,30 @@
-"""The C reference, compiled where it is measured and called through ctypes."""
+"""The emitted C of a whole run, compiled for this very machine where it is measured."""
 
 from __future__ import annotations
 
-import ctypes
-import subprocess
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
+from nonlinear.export.build import compile_files
+from nonlinear.export.run_library import run_sources
+from nonlinear.native import call_library, loaded
 
-SOURCE = Path(__file__).with_name("c_reference.c")
-FLAGS = ("-O3", "-march=native", "-std=c11", "-D_GNU_SOURCE", "-fPIC", "-shared")
-DOUBLES = (
-    at.PERIOD, at.RESISTANCE, at.INDUCTANCE, at.BACK_EMF, at.TORQUE_CONSTANT, at.INERTIA, at.RATIO,
-    at.VISCOUS,
-    at.DRY, at.LOAD_COEFFICIENT, at.BREAKAWAY, at.POSITION_GAIN, at.VELOCITY_GAIN, at.VELOCITY_INTEGRAL,
-    at.CURRENT_GAIN, at.CURRENT_INTEGRAL, at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT,
-    at.VOLTAGE_LIMIT, at.LOAD, at.COMMAND + 1, at.COMMAND + 3, at.DELAY_FRACTION,
-)  # fmt: skip
-INTEGERS = (at.TICKS, at.EVERY_VELOCITY, at.EVERY_POSITION, at.DELAY_TICKS)
+FLAGS = ("-O3", "-march=native", "-fPIC", "-shared")
 
 
 class CSimulator:
-    """``simulate`` of ``c_reference.c``; needs gcc."""
+    """A run of the exported code; needs gcc."""
 
     def __init__(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            library = Path(folder) / "c_reference.so"
-            subprocess.run(["gcc", *FLAGS, str(SOURCE), "-o", str(library), "-lm"], check=True)
-            self._simulate = ctypes.CDLL(str(library)).simulate  # stays mapped when the file goes
-        self._simulate.restype = ctypes.c_int64
+            path = Path(folder) / "run.so"
+            path.write_bytes(compile_files(run_sources(), path.name, "this machine", FLAGS, command=["gcc"]))
+            self._library = loaded(path)  # stays mapped when the file goes
 
     def run(self, row: np.ndarray, history: np.ndarray, flags: np.ndarray) -> int:
-        """Fill history (8, ticks) and flags (ticks,) of the run that a row describes; events."""
-        constants = parameters(row)[0][at.SLIP :].copy()
-        drive = np.array([row[k] for k in DOUBLES])
-        counts = np.array([row[k] for k in INTEGERS], dtype=np.int64)
-        packed = np.frombuffer(drive.tobytes() + counts.tobytes(), dtype=np.uint8).copy()
-        pointers = [ctypes.c_void_p(a.ctypes.data) for a in (packed, constants, history, flags)]
-        return int(self._simulate(*pointers))
+        """Fill history (8, ticks) and flags (ticks,) of the run that a row describes; its status."""
+        out, shared, tables = np.zeros(at.OUT_SIZE), np.zeros(2), np.zeros(1)
+        return call_library(self._library, row, tables, history, flags, out, shared)

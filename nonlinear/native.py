@@ -78,14 +78,15 @@ def _opened(choice: str) -> ctypes.CDLL | None:
             )
         return None
     try:
-        return _loaded(path)
+        return loaded(path)
     except OSError:  # made for another machine
         if choice == "c":
             raise InputError(f"{path.name}: does not load; allowed: python -m nonlinear.native") from None
         return None
 
 
-def _loaded(path: Path) -> ctypes.CDLL:
+def loaded(path: Path) -> ctypes.CDLL:
+    """Open a library of `nonlinear.export.run_library`."""
     opened = ctypes.CDLL(str(path))
     pointers = (ctypes.c_void_p,) * 6
     opened.drive_run.argtypes = [*pointers, _Bytes, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
@@ -98,7 +99,7 @@ _borrowed: list[ctypes.CDLL] = []
 @contextmanager
 def borrowed(path: Path) -> Iterator[None]:
     """Let every run of this process go through another library of `nonlinear.export.run_library`."""
-    _borrowed.append(_loaded(path))
+    _borrowed.append(loaded(path))
     try:
         yield
     finally:
@@ -124,12 +125,13 @@ def call(
             from nonlinear._kernels.call import call as numba_call
 
             return numba_call(row, tables, history, flags, out, shared)
-    return _call(opened, row, tables, history, flags, out, shared)
+    return call_library(opened, row, tables, history, flags, out, shared)
 
 
-def _call(
+def call_library(
     opened: Any, row: Floats, tables: Floats, history: Floats, flags: Any, out: Floats, shared: Floats
 ) -> int:
+    """Run one row by an opened library; see `call`."""
     p, s = _prepared(opened, row)
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
     rows = _Bytes(flags.ctypes.data, flags.size)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from actuator_lti import load_design
 from nonlinear.export import fmu_bytes
 from nonlinear.export.build import system_compiler
 
-pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
 pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 
 
 def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> None:
     """Linear loop on one side, the compiled drive in a flight on the other: the border lies between."""
+    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
     from examples.autopilot_loop import GAIN_S, fly, margins
 
     design = load_design("ilr33-amber")
@@ -25,3 +26,20 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     path = tmp_path / "drive.fmu"
     path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
+
+
+@pytest.mark.filterwarnings("ignore")  # those of RocketPy and its libraries are not ours
+def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) -> None:
+    """With friction and play the roll hunts, tenfold; without them, and with the lag, it does not."""
+    pytest.importorskip("rocketpy", reason="RocketPy is not installed (pip install 'actuator-lti[examples]')")
+    from examples.canard_roll import LARGEST_RAD, SETTLED_S, drive_design, fly, lag, real, smooth_design
+
+    actuators = (lag(drive_design()), real(drive_design(), tmp_path), real(smooth_design(), tmp_path))
+    rms = []
+    for actuator in actuators:
+        flight = fly(actuator, SETTLED_S + 0.8)
+        assert np.abs(flight.after(SETTLED_S).command_rad).max() < LARGEST_RAD
+        rms.append(float(np.std(flight.after(SETTLED_S).rate_rad_s)))
+    alone, with_drive, smooth = rms
+    assert with_drive > 10.0 * max(alone, smooth)
+    assert min(alone, smooth) > 0.0

@@ -1,4 +1,4 @@
-"""The C program of the benchmark is the same algorithm: same motion, same events."""
+"""The C that the benchmark measures is the simulator, compiled with all that this machine can do."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nonlinear import Rows, commands, simulate
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
-def test_same_motion(name: str) -> None:
+def test_same_bits(name: str) -> None:
     from benchmarks.c_simulator import CSimulator
 
     design, command, ticks = load_design(name), commands.sine(0.0873, 1.0), 20_000
@@ -21,9 +21,9 @@ def test_same_motion(name: str) -> None:
     rows["ticks"], rows["load"] = ticks, 4.0
     rows.sine("command", 0.0873, 1.0)
     history, flags = np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
-    events = CSimulator().run(rows.values[0], history, flags)
+    assert CSimulator().run(rows.values[0], history, flags) == 0
     run = simulate(design, command, ticks * design.controller.period_s, 4.0)
-    assert events == run.events > 4
+    assert run.events > 4
     assert np.array_equal(flags, run.limit_flags)
     for k, values in ((2, run.motor_speed_rad_s), (3, run.current_A), (7, run.motor_angle_rad)):
-        assert np.abs(history[k] - values).max() < 1e-11 * np.abs(values).max()
+        assert np.array_equal(history[k], values)
