@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.differentiation import filtered_motion
 from analyses.identification.frequency import (
     Lines,
@@ -21,7 +22,13 @@ from analyses.identification.frequency import (
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
 from analyses.identification.to_design import Estimate, design_with_estimate
-from analyses.identification.two_mass import TwoMass, angle_responses, fit_two_mass, start_of
+from analyses.identification.two_mass import (
+    TwoMass,
+    angle_responses,
+    fit_two_mass,
+    other_starts,
+    start_of,
+)
 from analyses.identification.verdict import RESIDUAL_LIMIT, Item, inputs_item, simulated_item
 from analyses.identification.verdict import passed as all_passed
 from analyses.records.consistency import Finding, check_record
@@ -170,6 +177,14 @@ def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[
     start = {**start_of(lines, reduction, torque=names[0]), **held}
     load = "load_angle" if "load_angle" in names else None
     fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
+    if fit.misfit > MISFIT_LIMIT:
+        for other in other_starts(start, lines, reduction):
+            with suppress(NumericalError, np.linalg.LinAlgError):
+                again = {**other, **held}
+                found = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
+                start, fit = (again, found) if found.misfit < fit.misfit else (start, fit)
+            if fit.misfit <= MISFIT_LIMIT:
+                break
     weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
     if not weak:
         return fit
