@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.differentiation import filtered_motion
 from analyses.identification.frequency import (
     Lines,
@@ -21,7 +22,13 @@ from analyses.identification.frequency import (
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
 from analyses.identification.to_design import Estimate, design_with_estimate
-from analyses.identification.two_mass import TwoMass, angle_responses, fit_two_mass, start_of
+from analyses.identification.two_mass import (
+    TwoMass,
+    angle_responses,
+    fit_two_mass,
+    other_starts,
+    start_of,
+)
 from analyses.identification.verdict import RESIDUAL_LIMIT, Item, inputs_item, simulated_item
 from analyses.identification.verdict import passed as all_passed
 from analyses.records.consistency import Finding, check_record
@@ -109,7 +116,7 @@ def identify_frequency(
         names.append("load_angle")
         used["output_angle"] = "load's angle"
     used = {**used, "angle": "motor angle", command: used.get(command, "its period")}
-    lines = excited_lines(with_torque, tuple(names), period)
+    lines = _between_ticks(design, excited_lines(with_torque, tuple(names), period))
     held = _held(design, dict(fixed or {}))
     fit = _fitted(lines, reduction, names, held)
     play = None if play_record is None else _play_of(design, play_record, fit)
@@ -134,6 +141,26 @@ def identify_frequency(
     )
 
 
+def _between_ticks(design: Design, lines: Lines) -> Lines:
+    """The lines of the torque that acts, from those of the current sampled at the ticks.
+
+    Under a voltage held over a tick T the current goes from sample to sample by
+    ``r(s) = (1 - exp(-a s))/(1 - exp(-a T))``, a = R/L; a line of its samples is then one of the current
+    times ``(1/T) integral (1 - r + r exp(j w T)) exp(-j w s) ds``, which is sinc(w T/2)^2 for small a T.
+    """
+    motor, tick = design.effective_motor, design.controller.period_s
+    if motor.resistance_ohm is None or not motor.inductance_H:
+        return lines
+    a, omega = motor.resistance_ohm / motor.inductance_H, lines.omega_rad_s
+    hold = -np.expm1(-1j * omega * tick) / (1j * omega * tick)
+    decay = -np.expm1(-(a + 1j * omega) * tick) / ((a + 1j * omega) * tick)
+    rise = (hold - decay) / -np.expm1(-a * tick)
+    factor = np.ones((len(lines.names), len(omega)), dtype=complex)
+    factor[0] = hold + np.expm1(1j * omega * tick) * rise
+    noise = lines.noise * factor.T[:, :, None] * factor.T.conj()[:, None, :]
+    return replace(lines, means=lines.means * factor, noise=noise)
+
+
 def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]]:
     """The record with the motor's torque and the angle at the coupling's load side as signals."""
     torque, source, told, back_emf = drive_of(design, record)
@@ -150,6 +177,14 @@ def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[
     start = {**start_of(lines, reduction, torque=names[0]), **held}
     load = "load_angle" if "load_angle" in names else None
     fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
+    if fit.misfit > MISFIT_LIMIT:
+        for other in other_starts(start, lines, reduction):
+            with suppress(NumericalError, np.linalg.LinAlgError):
+                again = {**other, **held}
+                found = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
+                start, fit = (again, found) if found.misfit < fit.misfit else (start, fit)
+            if fit.misfit <= MISFIT_LIMIT:
+                break
     weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
     if not weak:
         return fit
@@ -173,7 +208,26 @@ def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
     return held
 
 
+OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
+
+
 def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
+    """The play, its error with what the errors of the frequency response make of it."""
+    own = {name: fit[name] for name in OF_THE_LOAD}
+    play = _play_at(design, record, fit, own)
+    names = [name for name in OF_THE_LOAD if name in fit.names]
+    rows = [fit.names.index(name) for name in names]
+    slopes = []
+    for name in names:
+        step = fit.std(name)
+        moved = _play_at(design, record, fit, {**own, name: own[name] + step})
+        slopes.append((moved.half_rad - play.half_rad) / step if step > 0.0 else 0.0)
+    g = np.array(slopes)
+    passed_on = float(np.sqrt(max(g @ fit.covariance[np.ix_(rows, rows)] @ g, 0.0)))
+    return replace(play, half_std_rad=float(np.hypot(play.half_std_rad, passed_on)))
+
+
+def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
     """The play from the twist and from the torque that the load's own motion needs."""
     if not {"angle", "output_angle"} <= set(record.signals):
         raise InputError("the play needs the motor's angle and the output's", where=record.name)
@@ -182,7 +236,7 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
     cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
     motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)
     load = filtered_motion(behind * record["output_angle"], period, cutoff_hz=cutoff, order=4)
-    inertial = fit["load_inertia"] * load.acceleration
+    inertial = values["load_inertia"] * load.acceleration
     if "torque" in record.signals:
         inertial = inertial - record["torque"] / behind
     twist = motor.position / fit.reduction - load.position
@@ -192,10 +246,10 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
     steps = (_resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"]))
     return find_play(
         twist[part],
-        (inertial - fit["damping"] * twist_rate)[part],
+        (inertial - values["damping"] * twist_rate)[part],
         load.velocity[part],
-        stiffness_Nm_rad=fit["stiffness"],
-        viscous_Nms_rad=fit["load_viscous"],
+        stiffness_Nm_rad=values["stiffness"],
+        viscous_Nms_rad=values["load_viscous"],
         guard_samples=round(GUARD / (cutoff * period)),
         resolution_rad=float(np.hypot(*steps)),
         smooth_samples=0.5 / (cutoff * period),

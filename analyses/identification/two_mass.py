@@ -217,3 +217,19 @@ def start_of(
         "load_inertia": behind,
         "stiffness": behind * valley**2,
     }
+
+
+def other_starts(start: Mapping[str, float], lines: Lines, reduction: float) -> list[dict[str, float]]:
+    """Starts all over the range of the lines, for where the valley of the response drowns in noise.
+
+    The whole inertia of ``start`` is split between the sides, with the antiresonance at six frequencies.
+    """
+    whole = start["motor_inertia"] + start["load_inertia"] / reduction**2
+    low, high = float(np.min(lines.omega_rad_s)), float(np.max(lines.omega_rad_s))
+    found = []
+    for share in (0.5, 0.2, 0.8):
+        for valley in np.geomspace(low, high, 8)[1:-1]:
+            behind = (1.0 - share) * whole * reduction**2
+            sides = {"motor_inertia": share * whole, "load_inertia": behind}
+            found.append({**start, **sides, "stiffness": behind * float(valley) ** 2})
+    return found

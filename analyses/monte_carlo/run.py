@@ -211,5 +211,7 @@ def _notes(task: SampleTask) -> tuple[str, ...]:
     if len(task.sampler.correlation) and not np.array_equal(
         task.sampler.correlation, np.eye(len(task.sampler.correlation))
     ):
-        notes.append("Worst cases are sought in the whole box, without regard to correlations.")
+        notes.append(
+            "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together."
+        )
     return tuple(notes)

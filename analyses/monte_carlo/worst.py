@@ -1,8 +1,9 @@
-"""The worst design in the tolerance box: corners, the worst samples, then differential evolution.
+"""The worst design in the tolerance region: corners, the worst samples, then differential evolution.
 
 Sampling alone finds no worst case: the chance that a point lands near a corner of a box of many dimensions is
 small.  The search starts from the corners and the worst samples, and never returns less bad than the worst of
-them.  Storn and Price 1997 (`scipy.optimize.differential_evolution`), then Nelder and Mead.
+them.  Correlated parameters stay together (`analyses.monte_carlo.region`).  Storn and Price 1997
+(`scipy.optimize.differential_evolution`), then Nelder and Mead.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyses.monte_carlo.judging import judge
+from analyses.monte_carlo.region import Region
 from analyses.monte_carlo.result import WorstCase
 from analyses.monte_carlo.task import SampleTask
 
@@ -53,35 +55,34 @@ def worst_case(
     """
     from scipy.optimize import differential_evolution, minimize
 
-    lower, upper = task.sampler.box
-    span = np.where(upper > lower, upper - lower, 1.0)
+    region = Region(task.sampler)
+    size = region.dimensions
     looked_at = 0
 
     def cost(unit: np.ndarray) -> np.ndarray:
         nonlocal looked_at
-        points = lower + np.clip(np.atleast_2d(unit.T), 0.0, 1.0) * span
+        points = region.values(np.atleast_2d(unit.T))
         looked_at += len(points)
         return distances(task, requirement, points)
 
     drawn = np.vstack([task.sampler.draw(int(k), 1) for k in worst_samples])
-    starts = np.clip((drawn - lower) / span, 0.0, 1.0)
-    edges = corners(np.zeros(len(lower)), np.ones(len(lower)), task.sampler.seed)
-    pool = np.vstack([edges, starts])
+    edges = corners(np.zeros(size), np.ones(size), task.sampler.seed)
+    pool = np.vstack([edges, region.cube(drawn)])
     found = cost(pool.T)
-    size = max(12, min(40, 4 * len(lower)))
-    population = _padded(pool[np.argsort(found, kind="stable")[:size]], size, task.sampler.seed)
+    many = max(12, min(40, 4 * size))
+    population = _padded(pool[np.argsort(found, kind="stable")[:many]], many, task.sampler.seed)
     result = differential_evolution(
-        cost, [(0.0, 1.0)] * len(lower), init=population, maxiter=effort, tol=1e-10, polish=False,
+        cost, [(0.0, 1.0)] * size, init=population, maxiter=effort, tol=1e-10, polish=False,
         vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
     )  # fmt: skip
     fine = minimize(
         lambda x: float(cost(x[:, None])[0]), result.x, method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * len(lower),
-        options={"maxfev": 60 * len(lower), "xatol": 1e-9, "fatol": 1e-12},
+        bounds=[(0.0, 1.0)] * size,
+        options={"maxfev": 60 * size, "xatol": 1e-9, "fatol": 1e-12},
     )  # fmt: skip
     candidates = np.vstack([fine.x, result.x, pool[np.argmin(found)]])
     best = candidates[np.argmin(cost(candidates.T))]
-    return _described(task, requirement, lower + np.clip(best, 0, 1) * span, int(worst_samples[0]), looked_at)
+    return _described(task, requirement, region.values(best[None])[0], int(worst_samples[0]), looked_at)
 
 
 def _padded(points: np.ndarray, size: int, seed: int) -> np.ndarray:

@@ -13,6 +13,7 @@ from analyses.records.factors import explaining, named_factor
 from analyses.records.record import FloatArray, Record
 
 RATE_TOLERANCE = 0.02
+TICK_TOLERANCE = 1e-3
 ALIKE = 0.9
 OVER = 1.2
 ELECTRICAL_FACTOR = 2.0
@@ -38,6 +39,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     """
     checks: tuple[Callable[[Design, Record], Finding | None], ...] = (
         _rate,
+        _clock,
         _reduction,
         _electrical,
         _command,
@@ -113,6 +115,22 @@ def _rate(design: Design, record: Record) -> Finding | None:
         passed=False,
         text=f"{said}: a clock {100.0 * (ratio - 1.0):+.2g} % off, or the scale of one of them",
     )
+
+
+def _clock(design: Design, record: Record) -> Finding | None:
+    """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
+    rate = "velocity" if design.axis == "linear" else "speed"
+    if place_of(design, record) is not None and rate in record.signals:
+        return None
+    ticks = record.period_s / design.controller.period_s
+    if ticks < 1.0 - TICK_TOLERANCE or record.averaged > 1:
+        return None
+    off = abs(ticks - round(ticks))
+    subject = "sampling period against the drive's tick"
+    if off <= TICK_TOLERANCE * ticks:
+        return Finding(subject=subject, passed=True, text=f"{round(ticks)} ticks")
+    text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
+    return Finding(subject=subject, passed=None, text=text)
 
 
 def _other(record: Record, name: str, rate: FloatArray) -> str:

@@ -22,7 +22,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from actuator_lti.errors import InputError
-from reports.nightly import schema
+from reports.nightly import schema, sums
 from reports.nightly.figures import Figure
 from reports.nightly.job import canonical
 from reports.nightly.memory import Memory
@@ -86,6 +86,7 @@ class History:
         with self.connection as c:
             c.execute("BEGIN IMMEDIATE")
             c.execute("UPDATE runs SET state = 'interrupted' WHERE state = 'running'")
+            sums.forget(c)
             cursor = c.execute(
                 "INSERT INTO runs(started, state, code, code_commit, study_commit, libraries, host)"
                 " VALUES (:started, 'running', :code, :code_commit, :study_commit, :libraries, :host)",
@@ -101,6 +102,7 @@ class History:
             for result in results:
                 self._insert(run, result)
             c.execute("UPDATE runs SET state = 'done', finished = ? WHERE id = ?", (finished, run))
+            sums.write(c)
 
     def _insert(self, run: int, result: NewResult) -> None:
         snapshot = self._snapshot(result) if result.key and result.status in ("pass", "fail") else None
@@ -153,12 +155,14 @@ class History:
         """Make a night the baseline of some designs, or of all (``None``)."""
         with self.connection as c:
             c.execute("BEGIN IMMEDIATE")
+            sums.forget(c)
             for name in [None] if names is None else names:
                 c.execute(
                     "INSERT INTO baselines(run, at, by, reason, subject)"
                     " VALUES (?, ?, ?, ?, (SELECT id FROM subjects WHERE name = ?))",
                     (run, at, by, reason, name),
                 )
+            sums.write(c)
 
     def claim(self, study: str) -> None:
         """Note whose history this is.
@@ -259,9 +263,13 @@ class History:
     def inputs(self, snapshot: int) -> dict[str, Any]:
         """Return parameters and settings behind a result."""
         row = self.connection.execute(
-            "SELECT i.body FROM snapshots s JOIN inputs i ON i.id = s.input WHERE s.id = ?", (snapshot,)
+            "SELECT i.body, i.sha FROM snapshots s JOIN inputs i ON i.id = s.input WHERE s.id = ?",
+            (snapshot,),
         ).fetchone()
-        return dict(json.loads(_unpacked(row[0]))) if row else {}
+        body = _unpacked(row[0]) if row else b"{}"
+        if row and sha256(body) != row[1]:
+            raise DamagedError(f"the inputs of result {snapshot} are not what was written")
+        return dict(json.loads(body))
 
     @_whole
     def figures(self, snapshot: int | None) -> dict[str, Figure]:
@@ -395,6 +403,8 @@ def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
         damage = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
         if damage == "ok" and connection.execute("PRAGMA foreign_key_check").fetchone() is not None:
             damage = "an entry refers to one that is missing"
+        if damage == "ok":
+            damage = sums.damage(connection) or "ok"
     except sqlite3.DatabaseError as error:
         if isinstance(error, sqlite3.OperationalError):
             raise

@@ -10,6 +10,7 @@ import sqlite3
 from pathlib import Path
 
 from actuator_lti.errors import InputError
+from reports.nightly import sums
 
 APPLICATION_ID = 0x414C5449  # "ALTI"
 
@@ -55,7 +56,14 @@ ALTER TABLE baselines ADD COLUMN subject INTEGER REFERENCES subjects(id);
 ALTER TABLE runs ADD COLUMN study_commit TEXT NOT NULL DEFAULT '';
 """
 
-STEPS: tuple[str, ...] = (_VERSION_1, _VERSION_2)
+# 3: a checksum for each row of text.
+_VERSION_3 = """
+CREATE TABLE sums(
+    kind TEXT NOT NULL, id INTEGER NOT NULL, sha TEXT NOT NULL, PRIMARY KEY(kind, id)
+) WITHOUT ROWID;
+"""
+
+STEPS: tuple[str, ...] = (_VERSION_1, _VERSION_2, _VERSION_3)
 VERSION = len(STEPS)
 
 
@@ -77,6 +85,7 @@ def prepare(connection: sqlite3.Connection, path: Path) -> str | None:
             for statement in STEPS[number].split(";"):
                 if statement.strip():
                     connection.execute(statement)
+        sums.write(connection)
         connection.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         connection.execute(f"PRAGMA user_version = {VERSION}")
     if backup is None:

@@ -186,3 +186,44 @@ def test_what_sqlite_cannot_see_is_told_when_it_is_read(site, statement, value) 
         everything(history)
     with pytest.raises((InputError, HistoryLost), match=r"history\.sqlite"):
         night(site, 4.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE subjects SET name = 'c' WHERE name = 'a'",
+        "UPDATE subjects SET kind = 'studx' WHERE name = 'a'",
+        "UPDATE results SET status = 'error' WHERE run = 2",
+        "UPDATE results SET worst_id = worst_id || 'x' WHERE run = 1",
+        "UPDATE results SET failed = failed + 1 WHERE run = 1",
+        "UPDATE results SET message = 'x' WHERE run = 2",
+        "UPDATE figures SET unit = 'dC' WHERE id = 1",
+        "UPDATE figures SET name = name || 'x' WHERE id = 1",
+        "UPDATE figures SET better = better + 1 WHERE id = 1",
+        "UPDATE runs SET host = 'elsewhere' WHERE id = 1",
+        "UPDATE runs SET finished = '2020-01-01T00:00:00+00:00' WHERE id = 2",
+        "UPDATE baselines SET by = 'z'",
+        "UPDATE baselines SET run = 3 - run",
+        "UPDATE snapshots SET key = key || '0' WHERE id = 1",
+    ],
+)
+def test_a_changed_name_or_status_is_damage(site, change: str) -> None:
+    """Every text and count of the history is held by a checksum, not only its numbers."""
+    path = state(site) / "history.sqlite"
+    with sqlite3.connect(path) as database:
+        changed = database.execute(change).rowcount
+    database.close()
+    assert changed
+    with pytest.raises(InputError, match="is not what was written"), open_history(path):
+        pass
+
+
+def test_sums_are_written_once_and_hold_over_nights(site) -> None:
+    path = state(site) / "history.sqlite"
+    with open_history(path) as history:
+        before = history.connection.execute("SELECT * FROM sums ORDER BY kind, id").fetchall()
+    night(site, 11.0)
+    with open_history(path) as history:
+        after = history.connection.execute("SELECT * FROM sums ORDER BY kind, id").fetchall()
+    assert {tuple(row) for row in before} < {tuple(row) for row in after}
+    assert {row[0] for row in after} == {"run", "figure", "approval"}

@@ -111,7 +111,7 @@ def test_an_older_history_is_brought_up_to_date_and_says_so(tmp_path) -> None:
     version_1(path)
     with open_history(path) as history:
         assert history.notice is not None
-        assert "from version 1 to 2" in history.notice
+        assert "from version 1 to 3" in history.notice
         assert history.runs()[0].study_commit == ""
         assert history.baselines()[0].by == "somebody"
         assert history.baselines()[0].name is None

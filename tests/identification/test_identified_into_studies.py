@@ -1,0 +1,45 @@
+"""From a record to a study through the command line: identified values with their covariance."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bench_records import columns_of, motion, write
+
+from actuator_lti.design import load_design
+from analyses.sampling import sampler_of
+from analyses.tuning.problem import loop_requirements, problem_of
+from reports.cli.main import main
+
+NAMES = {"viscous": "friction.viscous", "dry": "friction.dry_torque", "offset": "friction.offset_torque"}
+
+
+def test_what_was_identified_is_what_the_studies_draw(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Covariance of the fit = that of the samples (4096 draws, 5 %); tuning knows them; a study runs."""
+    record = write(tmp_path / "a.csv", columns_of(motion(1)))
+    status = main(["identify", str(record), "--design", "ilr33-amber", "--out", str(tmp_path), "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert not status
+    design = load_design(tmp_path / "ilr33-amber-identified.toml")
+    fitted = list(found["parameters"])
+    assert fitted == ["inertia", "viscous", "dry", "offset"]
+    wanted = np.array(found["covariance"])[1:, 1:]
+    sampler = sampler_of(design)
+    paths = [NAMES[name] for name in fitted[1:]]
+    draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
+    size = np.sqrt(np.diag(wanted))
+    assert np.cov((draws / size).T) == pytest.approx(wanted / np.outer(size, size), abs=0.05)
+    corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    assert set(paths) <= {factor.path for factor in corner.factors}
+    status = main(
+        ["montecarlo", str(tmp_path / "ilr33-amber-identified.toml"), "--samples", "64", "--no-worst",
+         "--out", str(tmp_path / "mc"), "--json"]
+    )  # fmt: skip
+    study = json.loads(capsys.readouterr().out)
+    assert not status
+    assert study["verdict"]["passed"] is True

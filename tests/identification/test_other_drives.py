@@ -1,0 +1,195 @@
+"""Records of other drives: a linear axis with a spring, a servo on a voltage, a fin with play, a joint.
+
+Each record is made by the simulator from a shipped design and read by the command line; the identification
+starts from a design whose inertia and friction are wrong by 40 %.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, write_design
+from actuator_lti.design.model import Design
+from nonlinear import Trajectory, commands, simulate
+from nonlinear.commands import Command
+from reports.cli.main import main
+
+Columns = dict[str, np.ndarray]
+
+
+def _bare(name: str) -> Design:
+    return replace(load_design(name), parameters={}, requirements=(), correlations=(), facts=())
+
+
+def _wrong(design: Design) -> Design:
+    friction = replace(
+        design.friction,
+        dry_torque_Nm=0.6 * design.friction.dry_torque_Nm,
+        viscous_Nms_rad=0.6 * design.friction.viscous_Nms_rad,
+        load_coefficient=0.6 * design.friction.load_coefficient,
+    )
+    motor = replace(design.motor, rotor_inertia_kgm2=1.4 * design.motor.rotor_inertia_kgm2)
+    return replace(design, motor=motor, friction=friction)
+
+
+def _linear(run: Trajectory, noise: np.random.Generator) -> Columns:
+    return {
+        "time [ms]": 1e3 * run.time_s,
+        "position_reference [mm]": 1e3 * run.reference_rad,
+        "position [mm]": 1e3 * run.output_angle_rad,
+        "Irms [A]": run.current_A / np.sqrt(1.5) + 0.01 * noise.standard_normal(len(run.time_s)),
+    }
+
+
+def _fin(run: Trajectory, noise: np.random.Generator) -> Columns:
+    count = 2.0 * np.pi / 65536
+    return {
+        "time_s": run.time_s,
+        "cmd_deg": np.degrees(run.reference_rad),
+        "fin_angle_deg": np.degrees(np.floor(run.output_angle_rad / count) * count),
+        "motor_angle_deg": np.degrees(run.motor_angle_rad),
+        "current_mA": 1e3 * run.current_A + 20.0 * noise.standard_normal(len(run.time_s)),
+        "voltage_V": run.voltage_V,
+    }
+
+
+def _joint(run: Trajectory, noise: np.random.Generator) -> Columns:
+    return {
+        "time_s": run.time_s,
+        "goal_position_deg": np.degrees(run.reference_rad),
+        "joint_angle_deg": np.degrees(run.output_angle_rad),
+        "motor_position_rad": run.motor_angle_rad,
+        "iq_A": run.current_A + 0.02 * noise.standard_normal(len(run.time_s)),
+    }
+
+
+def _voltage(run: Trajectory, noise: np.random.Generator) -> Columns:
+    return {
+        "time_s": run.time_s,
+        "reference_rad": run.reference_rad,
+        "angle_rad": run.motor_angle_rad + 1e-4 * noise.standard_normal(len(run.time_s)),
+        "voltage_V": run.voltage_V,
+    }
+
+
+@dataclass(frozen=True)
+class Case:
+    """A drive, its motion and log, and how near the truth each value is to come (relative)."""
+
+    name: str
+    command: Command
+    seconds: float
+    every: int
+    log: object
+    near: dict[str, float]
+    met: float
+
+
+CASES = [
+    Case("ballscrew", commands.multisine(0.02, [0.5, 1.3, 2.9], 6.0, 6.25e-5, seed=2), 6.0, 16, _linear,
+         {"inertia": 0.01, "dry": 0.02, "viscous": 0.03}, 0.02),
+    Case("fin", commands.multisine(0.12, [0.7, 2.3, 4.1], 6.0, 2e-4, seed=2), 6.0, 5, _fin,
+         {"inertia": 0.03, "dry": 0.03, "load_coefficient": 0.05}, 0.04),
+    Case("joint", commands.multisine(0.8, [0.2, 0.5, 1.1], 8.0, 6.25e-5, seed=2), 8.0, 32, _joint,
+         {"inertia": 0.03, "dry": 0.05, "viscous": 0.03}, 0.04),
+    Case("ctms-motor-position", commands.multisine(1.0, [0.5, 1.1, 2.3], 8.0, 1e-3, seed=2), 8.0, 1, _voltage,
+         {"inertia": 0.005, "viscous": 0.02}, 0.02),
+]  # fmt: skip
+
+
+def _truth(design: Design, name: str) -> float:
+    friction = design.friction
+    return {
+        "inertia": design.inertia_kgm2,
+        "dry": friction.dry_torque_Nm,
+        "viscous": friction.viscous_Nms_rad,
+        "load_coefficient": friction.load_coefficient,
+    }[name]
+
+
+@pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+def test_a_drive_is_found_from_its_record(
+    case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    design = _bare(case.name)
+    run = simulate(design, case.command, case.seconds, record_every=case.every)
+    table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
+    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=";",
+               header=";".join(table), comments="", fmt="%.10g")  # fmt: skip
+    (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
+    record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
+    status = main(["identify", record, "--design", str(tmp_path / "wrong.toml"), "--out", out, "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert not status, [check for check in found["checks"] if check["passed"] is False]
+    for name, near in case.near.items():
+        assert found["parameters"][name]["value"] == pytest.approx(_truth(design, name), rel=near), name
+    errors = {}
+    for label, path in (("found", next((tmp_path / "o").glob("*.toml"))), ("wrong", tmp_path / "wrong.toml")):
+        assert not main(["correlate", str(path), record, "--json"])
+        summary = json.loads(capsys.readouterr().out)["summary"]
+        errors[label] = max(
+            summary[name]["relative_error"] for name in ("current", "voltage") if name in summary
+        )
+    assert errors["found"] < case.met < errors["wrong"]
+
+
+def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
+    base = _bare("ilr33-amber")
+    controller = replace(base.controller, position=None, velocity=None, current=None)
+    design = replace(base, controller=controller)
+    time = np.arange(0.0, 2.0, 1e-4)
+    steps = 3.0 * np.sign(np.sin(2.0 * np.pi * 1.25 * time))
+    run = simulate(design, commands.sampled(time, steps), 2.0, record_every=10)
+    table = np.column_stack([run.time_s, run.reference_rad, run.motor_speed_rad_s, run.current_A])
+    header = "time_s,voltage_command_V,motor_speed [rad/s],current_A"
+    np.savetxt(tmp_path / "r.csv", table, delimiter=",", header=header, comments="", fmt="%.10g")
+    (tmp_path / "d.toml").write_text(write_design(design))
+    status = main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--json"])
+    failed = [
+        check["reason"] for check in json.loads(capsys.readouterr().out)["checks"] if not check["passed"]
+    ]
+    assert status == 1
+    assert any("sampled too slowly" in reason for reason in failed)
+
+
+def test_a_stepped_command_is_taken_as_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Logged at every tenth tick: taken as ramps of a millisecond, the current would be off by 20 %."""
+    base = _bare("ilr33-amber")
+    design = replace(base, controller=replace(base.controller, position=None))
+    time = np.arange(0.0, 1.5, 1e-4)
+    speed = np.select([time < 0.2, time < 0.6, time < 1.0], [0.0, 300.0, -450.0], 200.0)
+    run = simulate(design, commands.sampled(time, speed / design.total_ratio), 1.5, record_every=10)
+    table = np.column_stack(
+        [run.time_s, design.total_ratio * run.reference_rad, run.motor_speed_rad_s, run.current_A]
+    )
+    header = "time_s,target_speed [rad/s],motor_speed [rad/s],current_A"
+    np.savetxt(tmp_path / "r.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
+    (tmp_path / "d.toml").write_text(write_design(design))
+    assert not main(["correlate", str(tmp_path / "d.toml"), str(tmp_path / "r.csv"), "--json"])
+    summary = json.loads(capsys.readouterr().out)["summary"]
+    assert summary["current"]["relative_error"] < 1e-6
+    assert summary["speed"]["relative_error"] < 1e-6
+
+
+def test_correlate_begins_with_its_result_and_judges_on_demand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    design = _bare("ctms-motor-position")
+    run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
+    table = _voltage(run, np.random.default_rng(1))
+    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=",",
+               header=",".join(table), comments="", fmt="%.10g")  # fmt: skip
+    (tmp_path / "w.toml").write_text(write_design(_wrong(design)))
+    arguments = ["correlate", str(tmp_path / "w.toml"), str(tmp_path / "r.csv")]
+    assert not main(arguments)
+    assert capsys.readouterr().out.startswith("Motor angle of the model within")
+    assert main([*arguments, "--error-limit", "0.1"]) == 1
+    assert capsys.readouterr().out.startswith("FAIL  Motor angle of the model within")
+    assert not main([*arguments, "--error-limit", "50"])
+    assert capsys.readouterr().out.startswith("PASS")

@@ -1,0 +1,108 @@
+"""The region in which a worst case is looked for: what correlations leave of the tolerance box."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+
+from actuator_lti.design.model import Tolerance
+from analyses.monte_carlo.region import Region
+from analyses.sampling import Factor, Sampler, Table
+
+
+def _normal(path: str, nominal: float = 0.0, std: float = 1.0) -> Factor:
+    return Factor(path, nominal, Tolerance(kind="normal", std=std))
+
+
+def _uniform(path: str, nominal: float, half: float) -> Factor:
+    return Factor(path, nominal, Tolerance(kind="uniform", half_width=half))
+
+
+def _cube(region: Region, count: int = 4000) -> np.ndarray:
+    return np.random.default_rng(1).uniform(size=(count, region.dimensions))
+
+
+def test_without_correlations_it_is_the_box_and_its_corners() -> None:
+    sampler = Sampler((_normal("a", 1.0, 0.1), _uniform("b", 5.0, 2.0)), np.eye(2))
+    region = Region(sampler)
+    assert region.dimensions == 2
+    assert region.values(np.array([[0.0, 1.0]]))[0].tolist() == pytest.approx([0.7, 7.0])
+    drawn = sampler.draw(0, 50)
+    inside = np.clip(drawn, *sampler.box)
+    np.testing.assert_allclose(region.values(region.cube(inside)), inside, rtol=1e-12)
+
+
+@pytest.mark.parametrize("r", [-0.97, -0.4, 0.2, 0.8, 0.999])
+def test_two_normal_parameters_stay_in_their_ellipse_and_reach_its_ends(r: float) -> None:
+    """s' R^-1 s = (s1^2 - 2 r s1 s2 + s2^2) / (1 - r^2), of the probability that two boxes have."""
+    sampler = Sampler((_normal("a", 0.0, 2.0), _normal("b", 10.0, 0.5)), np.array([[1.0, r], [r, 1.0]]))
+    region = Region(sampler)
+    squared = chi2.ppf((1.0 - 2.0 * norm.sf(3.0)) ** 2, 2)
+    values = region.values(_cube(region))
+    s1, s2 = values[:, 0] / 2.0, (values[:, 1] - 10.0) / 0.5
+    inside = (s1**2 - 2.0 * r * s1 * s2 + s2**2) / (1.0 - r**2)
+    free = (np.abs(s1) < 3.0) & (np.abs(s2) < 3.0)  # the box cuts the ends off
+    assert np.max(inside[free]) <= squared * (1.0 + 1e-9)
+    assert np.max(np.abs([s1, s2])) <= 3.0 + 1e-12
+    # the largest difference s1 - s2 of the ellipse is radius * sqrt(2 (1 - r))
+    edge = np.linspace(0.0, 1.0, 2001)
+    faces = np.vstack(
+        [np.column_stack([edge, 0.0 * edge]), np.column_stack([edge, 0.0 * edge + 1.0]),
+         np.column_stack([0.0 * edge, edge]), np.column_stack([0.0 * edge + 1.0, edge])]
+    )  # fmt: skip
+    found = region.values(faces)
+    widest = np.max(found[:, 0] / 2.0 - (found[:, 1] - 10.0) / 0.5)
+    assert widest == pytest.approx(np.sqrt(squared * 2.0 * (1.0 - r)), rel=1e-4 if r > 0.0 else 0.1)
+    drawn = values[free][:200]
+    np.testing.assert_allclose(region.values(region.cube(drawn)), drawn, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_tied_parameters_move_as_one_and_reach_the_edges(sign: float) -> None:
+    """kM = kE: one coordinate; a uniform one reaches its edge, a normal one three deviations."""
+    tie = np.array([[1.0, sign], [sign, 1.0]])
+    uniform = (_uniform("kM", 2.0, 0.2), _uniform("kE", 4.0, 0.4))
+    for pair in (uniform, (_normal("kM", 2.0), _normal("kE", 4.0))):
+        region = Region(Sampler(pair, tie))
+        assert region.dimensions == 1
+        values = region.values(_cube(region, 300))
+        width = [factor.box[1] - factor.nominal for factor in pair]
+        shares = (values - [2.0, 4.0]) / width
+        np.testing.assert_allclose(shares[:, 0], sign * shares[:, 1], atol=1e-9)
+        ends = region.values(np.array([[0.0], [1.0]]))[:, 0]
+        assert sorted(ends) == pytest.approx([2.0 - width[0], 2.0 + width[0]], rel=1e-9)
+
+
+def test_samples_of_a_table_are_taken_whole() -> None:
+    """A table whose columns sum to one: no point of the region breaks that."""
+    first = np.random.default_rng(3).uniform(size=40)
+    table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
+    region = Region(Sampler((_normal("a"),), np.eye(1), table))
+    assert region.dimensions == 2
+    values = region.values(_cube(region, 500))
+    np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)
+    rows = np.column_stack([np.zeros(40), table.rows])
+    np.testing.assert_allclose(region.values(region.cube(rows)), rows, atol=1e-12)
+
+
+def test_a_worst_case_of_correlated_parameters_is_one_that_occurs(tmp_path: Path) -> None:
+    """The friction and inertia of a drive, correlated at -0.95: the search does not leave their ellipse."""
+    from dataclasses import replace
+
+    from actuator_lti.design import load_design
+    from actuator_lti.design.model import Correlation
+    from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+    from analyses.sampling import sampler_of
+
+    base = load_design("ilr33-amber")
+    names = sampler_of(base).paths[:2]
+    tied = replace(base, correlations=(Correlation(first=names[0], second=names[1], coefficient=-0.95),))
+    study = monte_carlo(tied, tmp_path, MonteCarloSettings(samples=64, seed=2))
+    region = Region(sampler_of(tied, seed=2))
+    assert study.worst
+    for case in study.worst:
+        point = np.array([[case.parameters[path] for path in region.sampler.paths]])
+        np.testing.assert_allclose(region.values(region.cube(point)), point, rtol=1e-6)
