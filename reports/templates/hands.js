@@ -77,6 +77,7 @@
     ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "Bandwidth, −3 dB", "Hz", 1],
     ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
   ];
+  const CLOSED = ["bandwidth", "overshoot", "settling_time"]; // of a break point these say nothing
   const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
   const STABLE = data.quantities.length;
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
@@ -299,9 +300,12 @@
         th.dataset.loop = name;
         th.dataset.stable = own.figures[STABLE];
         for (const [quantity, , , factor] of FIGURES) {
+          if (name in now.points && CLOSED.includes(quantity)) {
+            row.append(html("td"));
+            continue;
+          }
           const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity);
           if (bad.has(name + " " + quantity)) td.classList.add("bad");
-          if (name in now.points && ["bandwidth", "overshoot", "settling_time"].includes(quantity)) td.replaceChildren("");
           row.append(td);
         }
       }
@@ -404,7 +408,7 @@
     const part = kept[name], ends = [part.hertz[0], part.hertz[part.hertz.length - 1]], { gain, phase, s, t } = part.curves;
     const [low, high] = range(gain, -90, 90), [lag, lead] = range(phase, -900, 180), [, peak] = range([...s, ...t], -60, 60);
     tell("bode", "chart:axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
-    tell("bode", "chart:axes", { panel: 1, y: [lag - 60, lead + 30] });
+    tell("bode", "chart:axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
     tell("sensitivity", "chart:axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
     tell("step", "chart:axes", { panel: 0, x: [0, part.count * before.loops[name].period * 1e3], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
   };
