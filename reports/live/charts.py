@@ -80,7 +80,6 @@ def _sensitivity() -> Chart:
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0)
     panel = chart.panel()
-    panel.rule_y(1.0)
     _both(panel)
     panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
     panel.x.limits(0.0, 1.0)
@@ -89,9 +88,8 @@ def _step() -> Chart:
 
 
 def _run() -> Chart:
-    chart = Chart(width=style.WIDE, height=290.0)
+    chart = Chart(width=700.0, height=270.0)
     panel = chart.panel()
-    panel.rule_y(1.0)
     _both(panel)
     panel.curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
     panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=1.6)

@@ -73,7 +73,7 @@
   };
   const FIGURES = [
     ["gain_margin", "Gain margin", "dB", 1], ["phase_margin", "Phase margin", "deg", 1],
-    ["delay_margin", "Delay margin", "ms", 1e3], ["modulus_margin", "Modulus margin", "", 1],
+    ["delay_margin", "Delay margin", "ms", 1e3],
     ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "Bandwidth, −3 dB", "Hz", 1],
     ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
   ];
@@ -81,6 +81,7 @@
   const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
   const STABLE = data.quantities.length;
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
+  const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
 
   // --- the module ----------------------------------------------------------------------------------------
   let x = null;
@@ -115,7 +116,9 @@
     return x.step_of(stage, count) > 0 ? Array.from(view(x.y_at(), count)) : null;
   };
   // the drive with all its limits and its friction, from rest; command and output as shares of the scale
+  let acted = 0; // limiters, as bits
   const run = (count, command, scale, moment) => {
+    acted = 0;
     if (!x.start()) return null;
     const at = data.places, io = view(x.io_at(), x.io_length()), out = new Float64Array(count);
     const ratio = view(x.p_at(), at.ratio + 1)[at.ratio];
@@ -125,6 +128,7 @@
       io[at.command] = command(k);
       io[at.moment] = moment;
       if (x.tick() !== 0) return out.subarray(0, k);
+      acted |= io[at.flags];
       out[k] = io[place] / over;
     }
     return out;
@@ -289,7 +293,7 @@
     for (const name of [...data.loops, ...Object.keys(data.points)]) {
       const own = now.loops[name] || now.points[name], old = before.loops[name] || before.points[name];
       if (own.n === 0 && !(name in now.loops)) continue; // no such break point
-      const row = html("tr"), th = html("th", "left", LOOP_NAMES[name] || name);
+      const row = html("tr"), th = html("th", "left", LOOP_NAMES[name] || POINT_NAMES[name]);
       row.append(th);
       if (!own.figures || !old.figures) {
         const td = html("td", "", `not followed here: ${NONE[own.n] || "no loop"}`);
@@ -481,6 +485,8 @@
     if (now.loops[shown].figures && kept[shown]) draw("as changed", { curves: curvesOf(shown, kept[shown].hertz), step: stepOf(shown, Math.min(Math.ceil(kept[shown].count * before.loops[shown].period / now.loops[shown].period), 3000)) }, shown);
     const part = trial(now.row);
     drawRun("as changed", part, unitOf()[0]);
+    const acting = data.limiters.filter(([, bit]) => acted & bit).map(([name]) => name);
+    find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
     if (record && part.y) find(".record").textContent = `${record.name}: ${record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(runBefore), 3)} %.`;
     root.dataset.ms = (performance.now() - began).toFixed(1);
     root.dataset.count = +(root.dataset.count || 0) + 1;

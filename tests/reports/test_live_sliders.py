@@ -32,11 +32,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 DESIGN = "ilr33-amber"
-FIGURES = {  # of the page: of `margins --json`, whether its size counts
+FIGURES = {  # of the page: of `margins --json`
     "gain_margin": "gain_margin_db",
     "phase_margin": "phase_margin_deg",
     "delay_margin": "delay_margin_s",
-    "modulus_margin": "modulus_margin",
     "sensitivity_peak": "sensitivity_peak_db",
     "bandwidth": "bandwidth_hz",
     "overshoot": "overshoot_percent",
