@@ -332,7 +332,24 @@ def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary)
 
 @emitted
 def figures(
-    n, a, b, c, lead, time_figures, row, poles, points, stack, xs, rs, ss, work, state, exchanged, real, imaginary
+    n,
+    a,
+    b,
+    c,
+    lead,
+    time_figures,
+    row,
+    poles,
+    points,
+    stack,
+    xs,
+    rs,
+    ss,
+    work,
+    state,
+    exchanged,
+    real,
+    imaginary,
 ):
     """Figures of a loop that was assembled (see ``one_loop``); the number of scanned points, 0 without poles."""
     fed_back = 0.0 if math.isnan(lead) else 1.0

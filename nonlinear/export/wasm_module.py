@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.batch import _figures, _quoted, _response, _run
-from nonlinear.export.build import compile_files
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import Kind
 from nonlinear.export import linear
+from nonlinear.export.build import compile_files
 from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
 MOST_BYTES = 100_000

@@ -15,7 +15,13 @@ REACH = 1.6
 
 def live_charts() -> dict[str, str]:
     """Give each figure's SVG by its name."""
-    drawn = {"bode": _bode(), "nyquist": _nyquist(), "sensitivity": _sensitivity(), "step": _step(), "run": _run()}
+    drawn = {
+        "bode": _bode(),
+        "nyquist": _nyquist(),
+        "sensitivity": _sensitivity(),
+        "step": _step(),
+        "run": _run(),
+    }
     words = {
         "bode": "Open loop: magnitude and phase, as designed and as changed.",
         "nyquist": "Nyquist curve near -1, as designed and as changed.",
@@ -53,7 +59,12 @@ def _nyquist() -> Chart:
     panel.rule_x(0.0)
     angles = [2.0 * math.pi * k / 72 for k in range(73)]
     panel.curve(
-        [math.cos(a) for a in angles], [math.sin(a) for a in angles], colour=style.MUTED, dash=2, width=1.0, read=False
+        [math.cos(a) for a in angles],
+        [math.sin(a) for a in angles],
+        colour=style.MUTED,
+        dash=2,
+        width=1.0,
+        read=False,
     )
     _both(panel)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)

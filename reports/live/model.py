@@ -82,10 +82,20 @@ def _step(design: Design) -> dict[str, Any]:
     outermost, linear_axis = design.controller.outermost, design.axis == "linear"
     if outermost == "position":
         size, unit = 0.1 * design.validation.full_deflection_rad, "mm" if linear_axis else "deg"
-        return {"size": size, "unit": unit, "factor": 1e-3 if linear_axis else math.pi / 180.0, "of": "output"}
+        return {
+            "size": size,
+            "unit": unit,
+            "factor": 1e-3 if linear_axis else math.pi / 180.0,
+            "of": "output",
+        }
     if outermost == "velocity":
         speed = design.limits.speed_rad_s
         size = 0.1 * (speed if math.isfinite(speed) else 100.0) / design.total_ratio
         return {"size": size, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
     peak = design.limits.peak_current_A
-    return {"size": 0.1 * (peak if math.isfinite(peak) else 10.0), "unit": "A", "factor": 1.0, "of": "current"}
+    return {
+        "size": 0.1 * (peak if math.isfinite(peak) else 10.0),
+        "unit": "A",
+        "factor": 1.0,
+        "of": "current",
+    }

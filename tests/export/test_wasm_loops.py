@@ -95,7 +95,11 @@ def responses_agree(design: Design, ours: dict[str, Any]) -> None:
     for name in STAGES:
         known, system = ours[name], systems.get(name)
         if known["n"] <= 0:
-            assert known["n"] == linear.PERIODIC or system is None or (name == "w_ref" and loops.position is None)
+            assert (
+                known["n"] == linear.PERIODIC
+                or system is None
+                or (name == "w_ref" and loops.position is None)
+            )
             continue
         assert system is not None
         assert known["period"] == pytest.approx(system.period_s, rel=1e-12)
@@ -116,7 +120,9 @@ def test_shipped_designs(tmp_path: Path) -> None:
 
 def test_random_drives(tmp_path: Path) -> None:
     """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
-    designs = [replace(random_drive(np.random.default_rng(seed)), instruments=Instruments()) for seed in range(40)]
+    designs = [
+        replace(random_drive(np.random.default_rng(seed)), instruments=Instruments()) for seed in range(40)
+    ]
     found = in_node(designs, tmp_path)
     assert sum(figures_agree(design, ours) for design, ours in zip(designs, found, strict=True)) > 60
     for design, ours in zip(designs, found, strict=True):
@@ -130,7 +136,11 @@ def test_unstable_drives_are_called_so(tmp_path: Path) -> None:
     design = load_design("ilr33-amber")
     designs = [
         with_values(design, {key: value}, check=False)
-        for key, value in (("control.position.gain", 6000.0), ("control.velocity.gain", 4.0), ("control.current.gain", 0.3))
+        for key, value in (
+            ("control.position.gain", 6000.0),
+            ("control.velocity.gain", 4.0),
+            ("control.current.gain", 0.3),
+        )
     ]
     verdicts = []
     for each, ours in zip(designs, in_node(designs, tmp_path), strict=True):

@@ -109,7 +109,8 @@ def type_value(page: Page, key: str, value: float) -> None:
 def read(page: Page) -> dict[str, dict[str, float]]:
     """Read every figure of the page, to all digits."""
     cells = page.eval_on_selector_all(
-        ".now td[data-figure]", "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])"
+        ".now td[data-figure]",
+        "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
     )
     found: dict[str, dict[str, float]] = {}
     for loop, name, value in cells:
@@ -160,7 +161,9 @@ def test_figures_as_designed_and_as_changed_are_the_command_lines(page: Page, tm
 def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> None:
     """Each key by itself, moved by a fifth; the other way round where that breaks a relation."""
     design = load_design(DESIGN)
-    keys = json.loads(page.inner_text("#live-data") or page.evaluate("document.getElementById('live-data').textContent"))["keys"]
+    keys = json.loads(
+        page.inner_text("#live-data") or page.evaluate("document.getElementById('live-data').textContent")
+    )["keys"]
     assert len(keys) > 25
     for key in keys:
         value = key["value"] * 1.2 if key["value"] else 0.4 * key["high"]
@@ -171,7 +174,11 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
             for name in FIGURES:
                 wanted = float(theirs.quantity(name, loop)[0])
                 if math.isfinite(wanted):
-                    assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (key["path"], loop, name)
+                    assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (
+                        key["path"],
+                        loop,
+                        name,
+                    )
         settled(page, lambda: page.click('[data-do="undo"]'))
 
 
@@ -222,9 +229,7 @@ def record_of(design: Design, path: Path) -> None:
     from nonlinear.commands import step
 
     made = simulate(design, step(math.radians(2.0)), duration_s=0.25)
-    table = np.column_stack(
-        [made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad)]
-    )
+    table = np.column_stack([made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad)])
     np.savetxt(path, table, delimiter=",", header="time_s,command_deg,angle_deg", comments="", fmt="%.12g")
 
 
@@ -261,7 +266,9 @@ def test_nothing_of_a_design_becomes_markup(browser: Browser, tmp_path: Path) ->
 
 def test_a_phone_has_the_sliders_within_its_width(browser: Browser, made: Path) -> None:
     trouble: list[str] = []
-    small = opened(browser, made, trouble, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    small = opened(
+        browser, made, trouble, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
+    )
     assert small.evaluate("document.documentElement.scrollWidth") <= 390
     before = read(small)
     slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
