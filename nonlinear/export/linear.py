@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from actuator_lti.batch._eigen import eigenvalues
+from actuator_lti.batch._linalg import balance, hessenberg
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
 from nonlinear._kernels import layout
@@ -26,6 +27,9 @@ MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
 NO_LOOP, TOO_LONG, PERIODIC = 0, -1, -2
+MOST_TICKS = 16  # between two commands, for what each limiter sees
+SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
+SEEN = 3
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
@@ -391,3 +395,102 @@ def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
     for k in range(count):
         rr, ri, _slope_r, _slope_i = evaluate(n, h, b, c, xs[k], work, state, exchanged)
         rs[2 * k], rs[2 * k + 1] = rr, ri
+
+
+@emitted
+def noted_column(q, s, io, stage, every, size, places, count, angles, column, seen, j):
+    """As `one_column`, with what stands in front of each limiter at every tick put down as column j."""
+    put_inputs(q, io, stage, size)
+    for k in range(every):
+        status = tick(q, s, io)
+        if status != layout.OK:
+            return 0
+        at = k * SEEN * (MOST + 1)
+        seen[at + SPEED * (MOST + 1) + j] = s[layout.S_SPEED_COMMAND]
+        seen[at + CURRENT_COMMAND * (MOST + 1) + j] = s[layout.S_CURRENT_BEFORE]
+        seen[at + VOLTAGE * (MOST + 1) + j] = s[layout.S_VOLTAGE_BEFORE]
+    base = s[layout.S_ANGLE]
+    for i in range(count):
+        column[i] = s[int(places[i])]
+        if i > 0 and i < angles:
+            column[i] -= base
+    return 1
+
+
+@emitted
+def outer_stage(q):
+    """The stage that takes the command."""
+    if q[layout.HAS_POSITION] > 0.0:
+        return COMMAND
+    return VELOCITY if q[layout.HAS_VELOCITY] > 0.0 else CURRENT
+
+
+@emitted
+def outer_interval(q):
+    """Ticks between two commands."""
+    if q[layout.HAS_POSITION] > 0.0:
+        return int(q[layout.EVERY_POSITION])
+    return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
+
+
+@emitted
+def limiters_assembled(p, q, s, io, a, b, places, column, seen):
+    """A and b of the closed drive from its command, and rows of ``seen``: (tick, signal), state; the last is d.
+
+    The number of states, or what stands in the way.
+    """
+    linear_row(p, q)
+    stage, every = outer_stage(q), outer_interval(q)
+    if every > MOST_TICKS:
+        return PERIODIC
+    prepare_sizes(q)
+    derive(q, s)
+    n, angles = listed(q, places)
+    if n > MOST:
+        return TOO_LONG
+    for j in range(n + 1):
+        init(q, s)
+        if j < n:
+            put_unit(s, places, j, angles)
+        size = 0.0 if j < n else 1.0
+        to = j if j < n else MOST
+        done = noted_column(q, s, io, stage, every, size, places, n, angles, column, seen, to)
+        if done == 0:
+            return TOO_LONG
+        for i in range(n):
+            if j < n:
+                a[i * n + j] = column[i]
+            else:
+                b[i] = column[i]
+    for i in range(n):
+        places[i] = 0.0
+        for k in range(every * SEEN):
+            places[i] += abs(seen[k * (MOST + 1) + i])
+    count = pruned(n, a, b, places, column)
+    for k in range(every * SEEN):
+        to_place = 0
+        for i in range(n):
+            if column[i] > 0.0:
+                seen[k * (MOST + 1) + to_place] = seen[k * (MOST + 1) + i]
+                to_place += 1
+    return count
+
+
+@emitted
+def limiter_sizes(n, a, b, seen, every, signal, count, xs, sizes, own, own_b, own_c, work, state, exchanged):
+    """Largest magnitude over the ticks between two commands of a signal in front of a limiter, at each angle."""
+    for g in range(count):
+        sizes[g] = 0.0
+    for k in range(1 if signal == SPEED else every):
+        at = (k * SEEN + signal) * (MOST + 1)
+        for i in range(n):
+            own_b[i], own_c[i] = b[i], seen[at + i]
+            for j in range(n):
+                own[i * n + j] = a[i * n + j]
+        balance(n, own, own_b, own_c)
+        hessenberg(n, own, own_b, own_c, state)
+        for i in range(n):
+            own[i * n + i] -= 1.0
+        for g in range(count):
+            rr, ri, _slope_r, _slope_i = evaluate(n, own, own_b, own_c, xs[g], work, state, exchanged)
+            sizes[g] = max(sizes[g], math.hypot(rr + seen[at + MOST], ri))
