@@ -66,7 +66,7 @@ def _live(made: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "live": Markup(data),
         "module": base64.b64encode(kept_wasm()).decode(),
-        "live_charts": {name: Markup(drawn) for name, drawn in live_charts().items()},
+        "live_charts": {name: Markup(drawn) for name, drawn in live_charts(str(known["step"]["unit"])).items()},
     }
 
 

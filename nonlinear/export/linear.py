@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
+from actuator_lti.batch._complex import over
 from actuator_lti.batch._eigen import eigenvalues
-from actuator_lti.batch._linalg import balance, hessenberg
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
 from nonlinear._kernels import layout
@@ -477,20 +477,83 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
 
 
 @emitted
-def limiter_sizes(n, a, b, seen, every, signal, count, xs, sizes, own, own_b, own_c, work, state, exchanged):
-    """Largest magnitude over the ticks between two commands of a signal in front of a limiter, at each angle."""
+def pivoted(n, k, work, state):
+    """Bring the largest element of column k, from row k on, to row k."""
+    best, largest = k, -1.0
+    for i in range(k, n):
+        size = abs(work[2 * (i * n + k)]) + abs(work[2 * (i * n + k) + 1])
+        if size > largest:
+            best, largest = i, size
+    if best == k:
+        return
+    for j in range(2 * n):
+        kept = work[2 * k * n + j]
+        work[2 * k * n + j] = work[2 * best * n + j]
+        work[2 * best * n + j] = kept
+    for j in range(2):
+        kept = state[2 * k + j]
+        state[2 * k + j] = state[2 * best + j]
+        state[2 * best + j] = kept
+
+
+@emitted
+def cleared(n, k, work, state):
+    """Take row k out of the rows below it."""
+    for i in range(k + 1, n):
+        at, up = 2 * (i * n + k), 2 * (k * n + k)
+        if work[at] == 0.0 and work[at + 1] == 0.0:
+            continue
+        factor_r, factor_i = over(work[at], work[at + 1], work[up], work[up + 1])
+        for j in range(1, n - k):
+            here_r, here_i = work[up + 2 * j], work[up + 2 * j + 1]
+            work[at + 2 * j] -= factor_r * here_r - factor_i * here_i
+            work[at + 2 * j + 1] -= factor_r * here_i + factor_i * here_r
+        here_r, here_i = state[2 * k], state[2 * k + 1]
+        state[2 * i] -= factor_r * here_r - factor_i * here_i
+        state[2 * i + 1] -= factor_r * here_i + factor_i * here_r
+
+
+@emitted
+def states_at(n, a, b, x, work, state):
+    """(z I - A)^-1 b at an angle per interval, as pairs; A as it is, whose zeros keep the states apart."""
+    sine = math.sin(0.5 * x)
+    for i in range(n):
+        for j in range(n):
+            work[2 * (i * n + j)] = -a[i * n + j]
+            work[2 * (i * n + j) + 1] = 0.0
+        work[2 * (i * n + i)] = (1.0 - a[i * n + i]) - 2.0 * sine * sine
+        work[2 * (i * n + i) + 1] = math.sin(x)
+        state[2 * i], state[2 * i + 1] = b[i], 0.0
+    for k in range(n):
+        pivoted(n, k, work, state)
+        cleared(n, k, work, state)
+    i = n - 1
+    while i >= 0:
+        total_r, total_i = state[2 * i], state[2 * i + 1]
+        for j in range(i + 1, n):
+            left_r, left_i = work[2 * (i * n + j)], work[2 * (i * n + j) + 1]
+            total_r -= left_r * state[2 * j] - left_i * state[2 * j + 1]
+            total_i -= left_r * state[2 * j + 1] + left_i * state[2 * j]
+        total_r, total_i = over(total_r, total_i, work[2 * (i * n + i)], work[2 * (i * n + i) + 1])
+        state[2 * i], state[2 * i + 1] = total_r, total_i
+        i -= 1
+
+
+@emitted
+def limiter_sizes(n, a, b, seen, every, count, xs, sizes, work, state):
+    """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
+
+    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal.
+    """
     for g in range(count):
-        sizes[g] = 0.0
-    for k in range(1 if signal == SPEED else every):
-        at = (k * SEEN + signal) * (MOST + 1)
-        for i in range(n):
-            own_b[i], own_c[i] = b[i], seen[at + i]
-            for j in range(n):
-                own[i * n + j] = a[i * n + j]
-        balance(n, own, own_b, own_c)
-        hessenberg(n, own, own_b, own_c, state)
-        for i in range(n):
-            own[i * n + i] -= 1.0
-        for g in range(count):
-            rr, ri, _slope_r, _slope_i = evaluate(n, own, own_b, own_c, xs[g], work, state, exchanged)
-            sizes[g] = max(sizes[g], math.hypot(rr + seen[at + MOST], ri))
+        states_at(n, a, b, xs[g], work, state)
+        for signal in range(SEEN):
+            largest = 0.0
+            for k in range(1 if signal == SPEED else every):
+                at = (k * SEEN + signal) * (MOST + 1)
+                real, imaginary = seen[at + MOST], 0.0
+                for i in range(n):
+                    real += seen[at + i] * state[2 * i]
+                    imaginary += seen[at + i] * state[2 * i + 1]
+                largest = max(largest, math.hypot(real, imaginary))
+            sizes[signal * count + g] = largest

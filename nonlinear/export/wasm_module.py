@@ -39,7 +39,7 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
     linear.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
     linear.limiters_assembled: (_ROW,) * 9,
-    linear.limiter_sizes: ("int", _ROW, _ROW, _ROW, "int", "int", "int", *(_ROW,) * 8),
+    linear.limiter_sizes: ("int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
     linear.outer_interval: (_ROW,),
     linear.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     _quoted.quoted: (_ROW, "float", _ROW),

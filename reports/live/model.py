@@ -42,7 +42,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "fixed": found.fixed,
         "lines": found.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
-        "places": PLACES,
+        "places": {**PLACES, "outer": at.EVERY_POSITION if design.controller.position else at.EVERY_VELOCITY},
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
@@ -51,6 +51,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "requirements": _requirements(design),
         "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
         "step": _step(design),
+        "limits": _limits(design),
         "text": text,
         "patches": places,
     }
@@ -99,3 +100,16 @@ def _step(design: Design) -> dict[str, Any]:
         "factor": 1.0,
         "of": "current",
     }
+
+
+def _limits(design: Design) -> list[list[Any]]:
+    """Give label, place in the row, signal in front of it and whether its rate counts, of each limiter."""
+    control = design.controller
+    known: list[tuple[str, int, int, bool, bool]] = [
+        ("speed limit", at.SPEED_LIMIT, linear.SPEED, False, bool(control.position and control.velocity)),
+        ("acceleration limit", at.ACCELERATION_LIMIT, linear.SPEED, True, bool(control.position and control.velocity)),
+        ("peak current", at.CURRENT_LIMIT, linear.CURRENT_COMMAND, False,
+         control.current is not None and control.outermost != "current"),
+        ("voltage", at.VOLTAGE_LIMIT, linear.VOLTAGE, False, True),
+    ]  # fmt: skip
+    return [[label, place, signal, rate] for label, place, signal, rate, there in known if there]

@@ -115,6 +115,20 @@
     if (name === "position" && Number.isNaN(x.lead_of(stage))) stage = 3; // the whole path from the command
     return x.step_of(stage, count) > 0 ? Array.from(view(x.y_at(), count)) : null;
   };
+  // command amplitude at which each limit is just reached, over frequency
+  const borderOf = (row, hertz) => {
+    const ratio = row[data.places.ratio], T = row[data.places.outer], count = hertz.length;
+    const period = T * row[data.places.period];
+    view(x.p_at(), row.length).set(row);
+    view(x.x_at(), count).set(hertz.map((f) => Math.min(2 * Math.PI * f * period, Math.PI)));
+    if (x.limiters(count) <= 0) return null;
+    const sizes = view(x.y_at(), 3 * count), input = data.step.of === "speed" ? ratio : 1;
+    const each = data.limits.map(([name, place, signal, rate]) => [name, hertz.map((f, k) => {
+      const size = input * sizes[signal * count + k] * (rate ? 2 * Math.sin(Math.min(Math.PI * f * period, Math.PI / 2)) / period : 1);
+      return row[place] / size / data.step.factor;
+    })]);
+    return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
+  };
   // the drive with all its limits and its friction, from rest; command and output as shares of the scale
   let acted = 0; // limiters, as bits
   const run = (count, command, scale, moment) => {
@@ -469,6 +483,27 @@
     return n ? 100 * Math.sqrt(sum / n) : NaN;
   };
 
+  let borderGrid = [], borderUnit = "";
+  const drawBorder = (label, part) => {
+    if (!part) return;
+    tell("border", "chart:redraw", { panel: 0, curve: `lowest, ${label}`, x: borderGrid, y: part.lowest });
+    if (label === "as changed") for (const name of ["speed limit", "acceleration limit", "peak current", "voltage"]) {
+      const own = part.each.find(([known]) => known === name);
+      tell("border", "chart:redraw", { panel: 0, curve: name, x: own ? borderGrid : [], y: own ? own[1] : [] });
+    }
+  };
+  const borderStart = () => {
+    const row = before.row, top = 0.5 / (row[data.places.outer] * row[data.places.period]), band = before.loops[outer].figures;
+    const low = band && Number.isFinite(band[PLACE.bandwidth]) ? Math.min(band[PLACE.bandwidth] / 30, top / 30) : top / 1e3;
+    borderGrid = [];
+    for (let k = 0; k <= 90; k++) borderGrid.push(low * (0.98 * top / low) ** (k / 90));
+    const part = borderOf(row, borderGrid);
+    if (!part) { chart("border").closest(".four > div").hidden = true; return; }
+    const [, high] = range([...part.lowest.slice(0, 1), size / data.step.factor], 0, 1e30), [bottom] = range(part.lowest, 0, 1e30);
+    tell("border", "chart:axes", { panel: 0, x: [borderGrid[0], borderGrid[90]], y: [Math.max(bottom / 4, high / 1e7), high * 8] });
+    drawBorder("as designed", part);
+  };
+
   const update = () => {
     const began = performance.now();
     refused = "";
@@ -483,6 +518,7 @@
     table();
     state();
     if (now.loops[shown].figures && kept[shown]) draw("as changed", { curves: curvesOf(shown, kept[shown].hertz), step: stepOf(shown, Math.min(Math.ceil(kept[shown].count * before.loops[shown].period / now.loops[shown].period), 3000)) }, shown);
+    drawBorder("as changed", borderOf(now.row, borderGrid));
     const part = trial(now.row);
     drawRun("as changed", part, unitOf()[0]);
     const acting = data.limiters.filter(([, bit]) => acted & bit).map(([name]) => name);
@@ -602,6 +638,7 @@
     }
     runKeys();
     runStart();
+    borderStart();
     choose(shown);
     const acts = {
       undo: () => go(past, future), redo: () => go(future, past), reset: () => { values = start.slice(); commit(); },

@@ -110,12 +110,34 @@ def responses_agree(design: Design, ours: dict[str, Any]) -> None:
         assert (np.abs(got - wanted) <= 1e-9 * np.abs(wanted) + rounding).all(), (design.name, name)
 
 
+def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
+    """Compare the gain from the command to what stands in front of each limiter; the number compared."""
+    control, loops = design.controller, assemble_loops(design)
+    every = control.position.every if control.position else control.velocity.every if control.velocity else 1
+    if ours["limiters"]["n"] <= 0:
+        assert every > linear.MOST_TICKS
+        return 0
+    sizes = numbers(ours["limiters"]["sizes"]).reshape(3, -1)
+    ratio = 1.0 if control.outermost != "velocity" else design.total_ratio
+    count = 0
+    for name, signal in (("speed", 0), ("current", 1), ("voltage", 2)):
+        path = loops.limiters.get(name)
+        if path is None:
+            continue
+        wanted = np.abs(path.response(ANGLES / (every * control.period_s)))
+        rounding = 1e-14 * wanted.max()  # far below its largest value a gain is a difference of large ones
+        assert (np.abs(sizes[signal] * ratio - wanted) <= 1e-9 * wanted + rounding).all(), (design.name, name)
+        count += 1
+    return count
+
+
 def test_shipped_designs(tmp_path: Path) -> None:
     designs = [load_design(name) for name in shipped_designs() if rigid(name)]
     assert len(designs) >= 4
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         assert figures_agree(design, ours) > 0
         responses_agree(design, ours)
+        assert limiters_agree(design, ours) > 0
 
 
 def test_random_drives(tmp_path: Path) -> None:
@@ -125,8 +147,11 @@ def test_random_drives(tmp_path: Path) -> None:
     ]
     found = in_node(designs, tmp_path)
     assert sum(figures_agree(design, ours) for design, ours in zip(designs, found, strict=True)) > 60
+    compared = 0
     for design, ours in zip(designs, found, strict=True):
         responses_agree(design, ours)
+        compared += limiters_agree(design, ours)
+    assert compared > 40
 
 
 def test_unstable_drives_are_called_so(tmp_path: Path) -> None:

@@ -20,6 +20,10 @@ for (const row of given.rows) {
     x.respond(stage, count);
     found[name] = { n, figures, period: x.period_of(stage), response: plain(floats(x.y_at(), 2 * count)) };
   }
+  const count = given.angles.length;
+  floats(x.x_at(), count).set(given.angles);
+  const n = x.limiters(count);
+  found.limiters = { n, sizes: n > 0 ? plain(floats(x.y_at(), 3 * count)) : [] };
   all.push(found);
 }
 process.stdout.write(JSON.stringify({ imports: WebAssembly.Module.imports(module), all }));

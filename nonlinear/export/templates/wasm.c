@@ -190,9 +190,6 @@ EXPORT("step_of") int step_of(int stage, int count)
 static double seen[MOST_TICKS * SEEN * (MOST + 1)];
 static double whole_a[MOST * MOST];
 static double whole_b[MOST];
-static double own[MOST * MOST];
-static double own_b[MOST];
-static double own_c[MOST];
 
 /*
  * Gains from the command to speed command, current command and voltage, in front of their limits, at count angles
@@ -207,10 +204,6 @@ EXPORT("limiters") int limiters(int count)
     if (n <= 0) {
         return n;
     }
-    const int every = drive_outer_interval(q);
-    for (int signal = 0; signal < SEEN; signal += 1) {
-        drive_limiter_sizes(n, whole_a, whole_b, seen, every, signal, count, x, &y[signal * count], own, own_b, own_c,
-            work, state, exchanged);
-    }
+    drive_limiter_sizes(n, whole_a, whole_b, seen, drive_outer_interval(q), count, x, y, work, state);
     return n;
 }
