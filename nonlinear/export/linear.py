@@ -14,10 +14,6 @@ import math
 
 import numpy as np
 
-from actuator_lti.batch._complex import over
-from actuator_lti.batch._eigen import eigenvalues
-from actuator_lti.batch._response import evaluate
-from actuator_lti.batch._run import one_loop
 from nonlinear._kernels import layout
 from nonlinear._kernels.prepare import prepare_sizes
 from nonlinear._kernels.tick import init, tick
@@ -27,15 +23,12 @@ MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
 NO_LOOP, TOO_LONG, PERIODIC = 0, -1, -2
-MOST_TICKS = 16  # between two commands, for what each limiter sees
-SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
-SEEN = 3
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
-    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS, layout.PROFILED,
-    layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION, layout.CURRENT_NOISE,
-    layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED, layout.CURRENT_START,
+    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
+    layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD,
+    layout.CURRENT_RESOLUTION, layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED, layout.CURRENT_START,
     layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START, layout.VELOCITY_INTEGRATOR_START,
     layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START, layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH,
     layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
@@ -112,9 +105,9 @@ def interval(q, stage):
         made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
     elif q[layout.HAS_CURRENT] <= 0.0:
         made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
-    if stage == AT_VOLTAGE and q[layout.HAS_CURRENT] <= 0.0 and q[layout.HAS_VELOCITY] <= 0.0:
-        if q[layout.HAS_POSITION] <= 0.0:
-            return NO_LOOP
+    loops = q[layout.HAS_CURRENT] + q[layout.HAS_VELOCITY] + q[layout.HAS_POSITION]
+    if stage == AT_VOLTAGE and loops <= 0.0:
+        return NO_LOOP
     whole = slow
     if fed and int(q[layout.EVERY_VELOCITY]) > whole:
         whole = int(q[layout.EVERY_VELOCITY])
@@ -264,7 +257,7 @@ def put_unit(s, places, j, angles):
 
 @emitted
 def assembled(p, q, s, io, stage, a, b, c, places, column):
-    """A, b, c of a loop from the drive with the parameters p; the number of states, or what stands in the way.
+    """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
 
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
@@ -302,8 +295,7 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
         for i in range(n):
             for j in range(n):
                 a[i * n + j] += b[i] * c[j]
-    count = pruned(n, a, b, c, column)
-    return count
+    return pruned(n, a, b, c, column)
 
 
 @emitted
@@ -315,245 +307,3 @@ def lead_of(p):
         return math.nan
     period = p[layout.EVERY_POSITION] * p[layout.PERIOD]
     return p[layout.FEEDFORWARD] / (p[layout.POSITION_GAIN] * period)
-
-
-@emitted
-def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary):
-    """Poles of a loop, open and closed; 0 where they were not found."""
-    for side in range(2):
-        closed = fed_back * side
-        for i in range(n):
-            for j in range(n):
-                work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
-        found = eigenvalues(n, work, lent, lent_too, real, imaginary)
-        if found == 0:
-            return 0
-        for i in range(n):
-            poles[2 * side * n + i] = real[i]
-            poles[(2 * side + 1) * n + i] = imaginary[i]
-    return 1
-
-
-@emitted
-def figures(
-    n,
-    a,
-    b,
-    c,
-    lead,
-    time_figures,
-    row,
-    poles,
-    points,
-    stack,
-    xs,
-    rs,
-    ss,
-    work,
-    state,
-    exchanged,
-    real,
-    imaginary,
-):
-    """Figures of a loop that was assembled (see ``one_loop``); the number of scanned points, 0 without poles."""
-    fed_back = 0.0 if math.isnan(lead) else 1.0
-    found = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
-    if found == 0:
-        return 0
-    count = one_loop(
-        n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged
-    )
-    return count
-
-
-@emitted
-def stepped(n, h, b, c, lead, count, y, state, after):
-    """Step response of a closed loop at its samples; h is A - I. Where lead is NaN, of A, b, c as they are."""
-    fed_back = 0.0 if math.isnan(lead) else 1.0
-    for i in range(n):
-        state[i] = 0.0
-    y[0] = 0.0
-    for k in range(1, count):
-        error = 1.0 - fed_back * y[k - 1]
-        if k == 1 and lead > 0.0:
-            error += lead
-        for i in range(n):
-            value = state[i] + b[i] * error
-            for j in range(n):
-                value += h[i * n + j] * state[j]
-            after[i] = value
-        total = 0.0
-        for i in range(n):
-            state[i] = after[i]
-            total += c[i] * after[i]
-        y[k] = total
-
-
-@emitted
-def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
-    """Response of a loop at angles per sample, as pairs."""
-    for k in range(count):
-        rr, ri, _slope_r, _slope_i = evaluate(n, h, b, c, xs[k], work, state, exchanged)
-        rs[2 * k], rs[2 * k + 1] = rr, ri
-
-
-@emitted
-def noted_column(q, s, io, stage, every, size, places, count, angles, column, seen, j):
-    """As `one_column`, with what stands in front of each limiter at every tick put down as column j."""
-    put_inputs(q, io, stage, size)
-    for k in range(every):
-        status = tick(q, s, io)
-        if status != layout.OK:
-            return 0
-        at = k * SEEN * (MOST + 1)
-        seen[at + SPEED * (MOST + 1) + j] = s[layout.S_SPEED_COMMAND]
-        seen[at + CURRENT_COMMAND * (MOST + 1) + j] = s[layout.S_CURRENT_BEFORE]
-        seen[at + VOLTAGE * (MOST + 1) + j] = s[layout.S_VOLTAGE_BEFORE]
-    base = s[layout.S_ANGLE]
-    for i in range(count):
-        column[i] = s[int(places[i])]
-        if i > 0 and i < angles:
-            column[i] -= base
-    return 1
-
-
-@emitted
-def outer_stage(q):
-    """The stage that takes the command."""
-    if q[layout.HAS_POSITION] > 0.0:
-        return COMMAND
-    return VELOCITY if q[layout.HAS_VELOCITY] > 0.0 else CURRENT
-
-
-@emitted
-def outer_interval(q):
-    """Ticks between two commands."""
-    if q[layout.HAS_POSITION] > 0.0:
-        return int(q[layout.EVERY_POSITION])
-    return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
-
-
-@emitted
-def limiters_assembled(p, q, s, io, a, b, places, column, seen):
-    """A and b of the closed drive from its command, and rows of ``seen``: (tick, signal), state; the last is d.
-
-    The number of states, or what stands in the way.
-    """
-    linear_row(p, q)
-    stage, every = outer_stage(q), outer_interval(q)
-    if every > MOST_TICKS:
-        return PERIODIC
-    prepare_sizes(q)
-    derive(q, s)
-    n, angles = listed(q, places)
-    if n > MOST:
-        return TOO_LONG
-    for j in range(n + 1):
-        init(q, s)
-        if j < n:
-            put_unit(s, places, j, angles)
-        size = 0.0 if j < n else 1.0
-        to = j if j < n else MOST
-        done = noted_column(q, s, io, stage, every, size, places, n, angles, column, seen, to)
-        if done == 0:
-            return TOO_LONG
-        for i in range(n):
-            if j < n:
-                a[i * n + j] = column[i]
-            else:
-                b[i] = column[i]
-    for i in range(n):
-        places[i] = 0.0
-        for k in range(every * SEEN):
-            places[i] += abs(seen[k * (MOST + 1) + i])
-    count = pruned(n, a, b, places, column)
-    for k in range(every * SEEN):
-        to_place = 0
-        for i in range(n):
-            if column[i] > 0.0:
-                seen[k * (MOST + 1) + to_place] = seen[k * (MOST + 1) + i]
-                to_place += 1
-    return count
-
-
-@emitted
-def pivoted(n, k, work, state):
-    """Bring the largest element of column k, from row k on, to row k."""
-    best, largest = k, -1.0
-    for i in range(k, n):
-        size = abs(work[2 * (i * n + k)]) + abs(work[2 * (i * n + k) + 1])
-        if size > largest:
-            best, largest = i, size
-    if best == k:
-        return
-    for j in range(2 * n):
-        kept = work[2 * k * n + j]
-        work[2 * k * n + j] = work[2 * best * n + j]
-        work[2 * best * n + j] = kept
-    for j in range(2):
-        kept = state[2 * k + j]
-        state[2 * k + j] = state[2 * best + j]
-        state[2 * best + j] = kept
-
-
-@emitted
-def cleared(n, k, work, state):
-    """Take row k out of the rows below it."""
-    for i in range(k + 1, n):
-        at, up = 2 * (i * n + k), 2 * (k * n + k)
-        if work[at] == 0.0 and work[at + 1] == 0.0:
-            continue
-        factor_r, factor_i = over(work[at], work[at + 1], work[up], work[up + 1])
-        for j in range(1, n - k):
-            here_r, here_i = work[up + 2 * j], work[up + 2 * j + 1]
-            work[at + 2 * j] -= factor_r * here_r - factor_i * here_i
-            work[at + 2 * j + 1] -= factor_r * here_i + factor_i * here_r
-        here_r, here_i = state[2 * k], state[2 * k + 1]
-        state[2 * i] -= factor_r * here_r - factor_i * here_i
-        state[2 * i + 1] -= factor_r * here_i + factor_i * here_r
-
-
-@emitted
-def states_at(n, a, b, x, work, state):
-    """(z I - A)^-1 b at an angle per interval, as pairs; A as it is, whose zeros keep the states apart."""
-    sine = math.sin(0.5 * x)
-    for i in range(n):
-        for j in range(n):
-            work[2 * (i * n + j)] = -a[i * n + j]
-            work[2 * (i * n + j) + 1] = 0.0
-        work[2 * (i * n + i)] = (1.0 - a[i * n + i]) - 2.0 * sine * sine
-        work[2 * (i * n + i) + 1] = math.sin(x)
-        state[2 * i], state[2 * i + 1] = b[i], 0.0
-    for k in range(n):
-        pivoted(n, k, work, state)
-        cleared(n, k, work, state)
-    i = n - 1
-    while i >= 0:
-        total_r, total_i = state[2 * i], state[2 * i + 1]
-        for j in range(i + 1, n):
-            left_r, left_i = work[2 * (i * n + j)], work[2 * (i * n + j) + 1]
-            total_r -= left_r * state[2 * j] - left_i * state[2 * j + 1]
-            total_i -= left_r * state[2 * j + 1] + left_i * state[2 * j]
-        total_r, total_i = over(total_r, total_i, work[2 * (i * n + i)], work[2 * (i * n + i) + 1])
-        state[2 * i], state[2 * i + 1] = total_r, total_i
-        i -= 1
-
-
-@emitted
-def limiter_sizes(n, a, b, seen, every, count, xs, sizes, work, state):
-    """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
-
-    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal.
-    """
-    for g in range(count):
-        states_at(n, a, b, xs[g], work, state)
-        for signal in range(SEEN):
-            largest = 0.0
-            for k in range(1 if signal == SPEED else every):
-                at = (k * SEEN + signal) * (MOST + 1)
-                real, imaginary = seen[at + MOST], 0.0
-                for i in range(n):
-                    real += seen[at + i] * state[2 * i]
-                    imaginary += seen[at + i] * state[2 * i + 1]
-                largest = max(largest, math.hypot(real, imaginary))
-            sizes[signal * count + g] = largest

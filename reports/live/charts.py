@@ -11,7 +11,7 @@ from reports.figures.style import Chart, Panel
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 REACH = 1.6
-BORDERS = ("speed limit", "acceleration limit", "peak current", "voltage")  # in the order of the page's script
+BORDERS = ("speed limit", "acceleration limit", "peak current", "voltage")
 
 
 def live_charts(unit: str) -> dict[str, str]:

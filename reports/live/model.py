@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from nonlinear._kernels import layout as at
-from nonlinear.export import linear
+from nonlinear.export import linear, linear_limiters
 from nonlinear.export.c_files import exported
 from reports.live.keys import followed
 from reports.live.text import patches
@@ -105,11 +105,12 @@ def _step(design: Design) -> dict[str, Any]:
 def _limits(design: Design) -> list[list[Any]]:
     """Give label, place in the row, signal in front of it and whether its rate counts, of each limiter."""
     control = design.controller
+    rated = bool(control.position and control.velocity)
     known: list[tuple[str, int, int, bool, bool]] = [
-        ("speed limit", at.SPEED_LIMIT, linear.SPEED, False, bool(control.position and control.velocity)),
-        ("acceleration limit", at.ACCELERATION_LIMIT, linear.SPEED, True, bool(control.position and control.velocity)),
-        ("peak current", at.CURRENT_LIMIT, linear.CURRENT_COMMAND, False,
+        ("speed limit", at.SPEED_LIMIT, linear_limiters.SPEED, False, rated),
+        ("acceleration limit", at.ACCELERATION_LIMIT, linear_limiters.SPEED, True, rated),
+        ("peak current", at.CURRENT_LIMIT, linear_limiters.CURRENT_COMMAND, False,
          control.current is not None and control.outermost != "current"),
-        ("voltage", at.VOLTAGE_LIMIT, linear.VOLTAGE, False, True),
+        ("voltage", at.VOLTAGE_LIMIT, linear_limiters.VOLTAGE, False, True),
     ]  # fmt: skip
     return [[label, place, signal, rate] for label, place, signal, rate, there in known if there]

@@ -514,13 +514,18 @@
       const known = p.curves.find((c) => !c.dots && (key === undefined ? p.curves.length === 1 || c.node.dataset.id === curve : c.key === key));
       if (!known) return;
       let pen = false, d = "";
+      const points = [];
       for (let k = 0; k < x.length; k++) {
         const there = Number.isFinite(x[k]) && Number.isFinite(y[k]);
-        if (there) d += `${pen ? "L" : "M"}${p.x.px(x[k]).toFixed(2)} ${Math.max(-1e5, Math.min(1e5, p.y.px(y[k]))).toFixed(3)}`;
+        if (there) {
+          const at = p.x.px(x[k]), up = Math.max(-1e5, Math.min(1e5, p.y.px(y[k])));
+          d += `${pen ? "L" : "M"}${at.toFixed(2)} ${up.toFixed(3)}`;
+          points.push([at, up, !pen]);
+        }
         pen = there;
       }
       known.node.setAttribute("d", d);
-      known.points = p.curve(known.node).points;
+      known.points = points;
       if (parameter) known.parameter = parameter.filter((_, k) => Number.isFinite(x[k]) && Number.isFinite(y[k]));
       this.hide();
     }

@@ -23,7 +23,7 @@ from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
-from nonlinear.export import linear
+from nonlinear.export import linear, linear_limiters
 from nonlinear.export.c_files import exported
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
@@ -115,7 +115,7 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
     control, loops = design.controller, assemble_loops(design)
     every = control.position.every if control.position else control.velocity.every if control.velocity else 1
     if ours["limiters"]["n"] <= 0:
-        assert every > linear.MOST_TICKS
+        assert every > linear_limiters.MOST_TICKS
         return 0
     sizes = numbers(ours["limiters"]["sizes"]).reshape(3, -1)
     ratio = 1.0 if control.outermost != "velocity" else design.total_ratio
