@@ -63,10 +63,11 @@ def _live(made: Mapping[str, Any]) -> dict[str, Any]:
 
     # within a script element only "<" could end it; JSON may write it otherwise
     data = json.dumps(known, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    drawn = live_charts(str(known["step"]["unit"]))
     return {
         "live": Markup(data),
         "module": base64.b64encode(kept_wasm()).decode(),
-        "live_charts": {name: Markup(drawn) for name, drawn in live_charts().items()},
+        "live_charts": {name: Markup(text) for name, text in drawn.items()},
     }
 
 

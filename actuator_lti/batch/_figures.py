@@ -231,9 +231,7 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
             continue
         if max(_closed_at(k, xs, rs, lead), _closed_at(k + 1, xs, rs, lead)) < 0.7 * best:
             continue
-        x, rr, ri = root(
-            RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
-        )
+        x, rr, ri = root(RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
         size = closed_size(rr, ri, x, lead)
         if size > row[PEAK_T]:
             row[PEAK_T] = size

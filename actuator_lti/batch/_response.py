@@ -127,9 +127,7 @@ def closed_loop(response_r, response_i, x, lead):
         return response_r, response_i
     closed_r, closed_i = over(response_r, response_i, 1.0 + response_r, response_i)
     if lead != 0.0:
-        closed_r, closed_i = times(
-            closed_r, closed_i, 1.0 + lead * (1.0 - math.cos(x)), lead * math.sin(x)
-        )
+        closed_r, closed_i = times(closed_r, closed_i, 1.0 + lead * (1.0 - math.cos(x)), lead * math.sin(x))
     return closed_r, closed_i
 
 
@@ -143,9 +141,7 @@ def _resonance(response_r, response_i, slope_r, slope_i, x, lead):
     value, _unused = over(slope_r, slope_i, below_r, below_i)
     if lead != 0.0:
         back_r, back_i = math.cos(x), -math.sin(x)
-        more, _unused = over(
-            -lead * back_i, lead * back_r, 1.0 + lead * (1.0 - back_r), -lead * back_i
-        )
+        more, _unused = over(-lead * back_i, lead * back_r, 1.0 + lead * (1.0 - back_r), -lead * back_i)
         value += more
     return value
 

@@ -79,15 +79,14 @@ def _grid(n, poles, points):
         if slow > 1e-11:
             low = min(low, 0.01 * slow)
     decades = math.log(0.3 / low) / LOG_10
-    count = int(math.ceil(7.0 * decades))
+    count = int(math.ceil(7.0 * decades))  # noqa: RUF046  (a float in C)
     for i in range(count):
         points[i] = low * math.exp(LOG_10 * decades * (i / count))
     for i in range(16):
         points[count] = 0.3 + (TOP - 0.3) * i / 15.0
         count += 1
     count = _around_poles(n, poles, low, points, count)
-    kept = _sorted(points, count)
-    return kept
+    return _sorted(points, count)
 
 
 @kernel

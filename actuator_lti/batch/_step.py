@@ -97,4 +97,4 @@ def _ticks_to(rest, level, radius):
     """Ticks until the tail ``|rest| radius^k`` has fallen to a level."""
     if abs(rest) <= level:
         return 0
-    return int(math.ceil(math.log(level / abs(rest)) / math.log(radius)))
+    return int(math.ceil(math.log(level / abs(rest)) / math.log(radius)))  # noqa: RUF046  (a float in C)

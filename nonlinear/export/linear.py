@@ -14,9 +14,6 @@ import math
 
 import numpy as np
 
-from actuator_lti.batch._eigen import eigenvalues
-from actuator_lti.batch._response import evaluate
-from actuator_lti.batch._run import one_loop
 from nonlinear._kernels import layout
 from nonlinear._kernels.tick import tick
 from nonlinear.export.entries import derive, emitted, init, prepare_sizes
@@ -28,12 +25,12 @@ NO_LOOP, TOO_LONG, PERIODIC = 0, -1, -2
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
-    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS, layout.PROFILED,
-    layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION, layout.CURRENT_NOISE,
-    layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED, layout.CURRENT_START,
-    layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START, layout.VELOCITY_INTEGRATOR_START,
-    layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START, layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH,
-    layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
+    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
+    layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION,
+    layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED,
+    layout.CURRENT_START, layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START,
+    layout.VELOCITY_INTEGRATOR_START, layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START,
+    layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH, layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
 ])  # fmt: skip
 UNLIMITED = np.array(
     [layout.SPEED_LIMIT, layout.ACCELERATION_LIMIT, layout.CURRENT_LIMIT, layout.VOLTAGE_LIMIT]
@@ -107,9 +104,9 @@ def interval(q, stage):
         made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
     elif q[layout.HAS_CURRENT] <= 0.0:
         made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
-    if stage == AT_VOLTAGE and q[layout.HAS_CURRENT] <= 0.0 and q[layout.HAS_VELOCITY] <= 0.0:
-        if q[layout.HAS_POSITION] <= 0.0:
-            return NO_LOOP
+    loops = q[layout.HAS_CURRENT] + q[layout.HAS_VELOCITY] + q[layout.HAS_POSITION]
+    if stage == AT_VOLTAGE and loops <= 0.0:
+        return NO_LOOP
     whole = slow
     if fed and int(q[layout.EVERY_VELOCITY]) > whole:
         whole = int(q[layout.EVERY_VELOCITY])
@@ -259,7 +256,7 @@ def put_unit(s, places, j, angles):
 
 @emitted
 def assembled(p, q, s, io, stage, a, b, c, places, column):
-    """A, b, c of a loop from the drive with the parameters p; the number of states, or what stands in the way.
+    """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
 
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
@@ -297,8 +294,7 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
         for i in range(n):
             for j in range(n):
                 a[i * n + j] += b[i] * c[j]
-    count = pruned(n, a, b, c, column)
-    return count
+    return pruned(n, a, b, c, column)
 
 
 @emitted
@@ -310,66 +306,3 @@ def lead_of(p):
         return math.nan
     period = p[layout.EVERY_POSITION] * p[layout.PERIOD]
     return p[layout.FEEDFORWARD] / (p[layout.POSITION_GAIN] * period)
-
-
-@emitted
-def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary):
-    """Poles of a loop, open and closed; 0 where they were not found."""
-    for side in range(2):
-        closed = fed_back * side
-        for i in range(n):
-            for j in range(n):
-                work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
-        found = eigenvalues(n, work, lent, lent_too, real, imaginary)
-        if found == 0:
-            return 0
-        for i in range(n):
-            poles[2 * side * n + i] = real[i]
-            poles[(2 * side + 1) * n + i] = imaginary[i]
-    return 1
-
-
-@emitted
-def figures(
-    n, a, b, c, lead, time_figures, row, poles, points, stack, xs, rs, ss, work, state, exchanged, real, imaginary
-):
-    """Figures of a loop that was assembled (see ``one_loop``); the number of scanned points, 0 without poles."""
-    fed_back = 0.0 if math.isnan(lead) else 1.0
-    found = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
-    if found == 0:
-        return 0
-    count = one_loop(
-        n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged
-    )
-    return count
-
-
-@emitted
-def stepped(n, h, b, c, lead, count, y, state, after):
-    """Step response of a closed loop at its samples; h is A - I. Where lead is NaN, of A, b, c as they are."""
-    fed_back = 0.0 if math.isnan(lead) else 1.0
-    for i in range(n):
-        state[i] = 0.0
-    y[0] = 0.0
-    for k in range(1, count):
-        error = 1.0 - fed_back * y[k - 1]
-        if k == 1 and lead > 0.0:
-            error += lead
-        for i in range(n):
-            value = state[i] + b[i] * error
-            for j in range(n):
-                value += h[i * n + j] * state[j]
-            after[i] = value
-        total = 0.0
-        for i in range(n):
-            state[i] = after[i]
-            total += c[i] * after[i]
-        y[k] = total
-
-
-@emitted
-def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
-    """Response of a loop at angles per sample, as pairs."""
-    for k in range(count):
-        rr, ri, _slope_r, _slope_i = evaluate(n, h, b, c, xs[k], work, state, exchanged)
-        rs[2 * k], rs[2 * k + 1] = rr, ri

@@ -7,7 +7,8 @@ its memory; functions that end in ``_at`` say where.  A host writes the row of a
 outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
 its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
 (`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
-``step_of(stage, count)`` its step response, both at ``y_at()``.
+``step_of(stage, count)`` its step response, both at ``y_at()``; ``limiters(count)`` the gains from the
+command to what stands in front of the limits (`nonlinear.export.linear_limiters`).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Any
 from actuator_lti.batch import _figures, _quoted, _response, _run
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import Kind
-from nonlinear.export import linear
+from nonlinear.export import linear, linear_figures, linear_limiters
 from nonlinear.export.build import compile_files
 from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
@@ -36,13 +37,18 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 5),
     linear.interval: (_ROW, "int"),
     linear.lead_of: (_ROW,),
-    linear.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
-    linear.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
-    linear.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
+    linear_figures.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
+    linear_figures.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
+    linear_limiters.limiters_assembled: (_ROW,) * 9,
+    linear_limiters.limiter_sizes: ("int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
+    linear_limiters.outer_interval: (_ROW,),
+    linear_figures.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     _quoted.quoted: (_ROW, "float", _ROW),
 }
 _SIZES = {
     "MOST": linear.MOST,
+    "MOST_TICKS": linear_limiters.MOST_TICKS,
+    "SEEN": linear_limiters.SEEN,
     "STAGES": linear.AT_VOLTAGE + 1,
     "POSITION": linear.POSITION,
     "COMMAND": linear.COMMAND,

@@ -11,16 +11,25 @@ from reports.figures.style import Chart, Panel
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 REACH = 1.6
+BORDERS = ("speed limit", "acceleration limit", "peak current", "voltage")
 
 
-def live_charts() -> dict[str, str]:
-    """Give each figure's SVG by its name."""
-    drawn = {"bode": _bode(), "nyquist": _nyquist(), "sensitivity": _sensitivity(), "step": _step(), "run": _run()}
+def live_charts(unit: str) -> dict[str, str]:
+    """Give each figure's SVG by its name; ``unit`` is that of the command."""
+    drawn = {
+        "bode": _bode(),
+        "nyquist": _nyquist(),
+        "sensitivity": _sensitivity(),
+        "step": _step(),
+        "run": _run(),
+        "border": _border(unit),
+    }
     words = {
         "bode": "Open loop: magnitude and phase, as designed and as changed.",
         "nyquist": "Nyquist curve near -1, as designed and as changed.",
         "sensitivity": "Sensitivity S and closed loop T, as designed and as changed.",
         "step": "Step response of the linear loop, as designed and as changed.",
+        "border": "Command amplitude at which a limit is reached, as designed and as changed.",
         "run": "Step with limits and friction, as designed and as changed, and a measured record.",
     }
     return {name: page_svg(chart, f"live{k}", words[name]) for k, (name, chart) in enumerate(drawn.items())}
@@ -53,7 +62,12 @@ def _nyquist() -> Chart:
     panel.rule_x(0.0)
     angles = [2.0 * math.pi * k / 72 for k in range(73)]
     panel.curve(
-        [math.cos(a) for a in angles], [math.sin(a) for a in angles], colour=style.MUTED, dash=2, width=1.0, read=False
+        [math.cos(a) for a in angles],
+        [math.sin(a) for a in angles],
+        colour=style.MUTED,
+        dash=2,
+        width=1.0,
+        read=False,
     )
     _both(panel)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
@@ -80,7 +94,6 @@ def _sensitivity() -> Chart:
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0)
     panel = chart.panel()
-    panel.rule_y(1.0)
     _both(panel)
     panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
     panel.x.limits(0.0, 1.0)
@@ -89,13 +102,26 @@ def _step() -> Chart:
 
 
 def _run() -> Chart:
-    chart = Chart(width=style.WIDE, height=290.0)
+    chart = Chart(width=style.HALF, height=290.0)
     panel = chart.panel()
-    panel.rule_y(1.0)
     _both(panel)
     panel.curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
     panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=1.6)
     panel.x.label, panel.y.label = "time, ms", "share of the largest command"
     panel.x.limits(0.0, 1.0)
     panel.y.limits(-0.1, 1.3)
+    return chart
+
+
+def _border(unit: str) -> Chart:
+    chart = Chart(width=style.HALF, height=290.0)
+    panel = chart.panel()
+    ends = (1.0, 1000.0)
+    panel.curve(ends, (1.0, 1.0), "lowest, as designed", **BEFORE)
+    panel.curve(ends, (1.0, 1.0), "lowest, as changed", **{**NOW, "width": 2.6})
+    for k, name in enumerate(BORDERS):
+        panel.curve(ends, (1.0, 1.0), name, colour=style.SERIES[k + 1], width=1.1)
+    style.frequency(panel, ends)
+    panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
+    panel.y.limits(1e-3, 1e3)
     return chart

@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from nonlinear._kernels import layout as at
-from nonlinear.export import linear
+from nonlinear.export import linear, linear_limiters
 from nonlinear.export.c_files import exported
 from reports.live.keys import followed
 from reports.live.text import patches
@@ -18,7 +18,7 @@ ELASTIC = "The drive train is elastic, or its friction is a map; the sliders fol
 OPEN = "The drive has no loop."
 PLACES = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
-    "current": at.IO_CURRENT, "period": at.PERIOD, "ratio": at.RATIO,
+    "current": at.IO_CURRENT, "flags": at.IO_FLAGS, "period": at.PERIOD, "ratio": at.RATIO,
 }  # fmt: skip
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
@@ -42,14 +42,16 @@ def live_model(design: Design) -> dict[str, Any]:
         "fixed": found.fixed,
         "lines": found.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
-        "places": PLACES,
+        "places": {**PLACES, "outer": at.EVERY_POSITION if design.controller.position else at.EVERY_VELOCITY},
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
+        "limiters": [[name, bit] for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)],
         "quantities": list(LOOP_QUANTITIES),
         "requirements": _requirements(design),
         "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
         "step": _step(design),
+        "limits": _limits(design),
         "text": text,
         "patches": places,
     }
@@ -77,14 +79,38 @@ def _requirements(design: Design) -> list[dict[str, Any]]:
 
 
 def _step(design: Design) -> dict[str, Any]:
-    """Give the largest command of the step, and what it is a step of."""
+    """Give the command of the step (a tenth of the largest), and what it is a step of."""
     outermost, linear_axis = design.controller.outermost, design.axis == "linear"
     if outermost == "position":
-        size, unit = design.validation.full_deflection_rad, "mm" if linear_axis else "deg"
-        return {"size": size, "unit": unit, "factor": 1e-3 if linear_axis else math.pi / 180.0, "of": "output"}
+        size, unit = 0.1 * design.validation.full_deflection_rad, "mm" if linear_axis else "deg"
+        return {
+            "size": size,
+            "unit": unit,
+            "factor": 1e-3 if linear_axis else math.pi / 180.0,
+            "of": "output",
+        }
     if outermost == "velocity":
         speed = design.limits.speed_rad_s
-        size = (speed if math.isfinite(speed) else 100.0) / design.total_ratio
+        size = 0.1 * (speed if math.isfinite(speed) else 100.0) / design.total_ratio
         return {"size": size, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
     peak = design.limits.peak_current_A
-    return {"size": peak if math.isfinite(peak) else 1.0, "unit": "A", "factor": 1.0, "of": "current"}
+    return {
+        "size": 0.1 * (peak if math.isfinite(peak) else 10.0),
+        "unit": "A",
+        "factor": 1.0,
+        "of": "current",
+    }
+
+
+def _limits(design: Design) -> list[list[Any]]:
+    """Give label, place in the row, signal in front of it and whether its rate counts, of each limiter."""
+    control = design.controller
+    rated = bool(control.position and control.velocity)
+    known: list[tuple[str, int, int, bool, bool]] = [
+        ("speed limit", at.SPEED_LIMIT, linear_limiters.SPEED, False, rated),
+        ("acceleration limit", at.ACCELERATION_LIMIT, linear_limiters.SPEED, True, rated),
+        ("peak current", at.CURRENT_LIMIT, linear_limiters.CURRENT_COMMAND, False,
+         control.current is not None and control.outermost != "current"),
+        ("voltage", at.VOLTAGE_LIMIT, linear_limiters.VOLTAGE, False, True),
+    ]  # fmt: skip
+    return [[label, place, signal, rate] for label, place, signal, rate, there in known if there]

@@ -73,13 +73,15 @@
   };
   const FIGURES = [
     ["gain_margin", "Gain margin", "dB", 1], ["phase_margin", "Phase margin", "deg", 1],
-    ["delay_margin", "Delay margin", "ms", 1e3], ["modulus_margin", "Modulus margin", "", 1],
+    ["delay_margin", "Delay margin", "ms", 1e3],
     ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "Bandwidth, −3 dB", "Hz", 1],
     ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
   ];
+  const CLOSED = ["bandwidth", "overshoot", "settling_time"]; // of a break point these say nothing
   const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
   const STABLE = data.quantities.length;
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
+  const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
 
   // --- the module ----------------------------------------------------------------------------------------
   let x = null;
@@ -113,8 +115,24 @@
     if (name === "position" && Number.isNaN(x.lead_of(stage))) stage = 3; // the whole path from the command
     return x.step_of(stage, count) > 0 ? Array.from(view(x.y_at(), count)) : null;
   };
+  // command amplitude at which each limit is just reached, over frequency
+  const borderOf = (row, hertz) => {
+    const ratio = row[data.places.ratio], T = row[data.places.outer], count = hertz.length;
+    const period = T * row[data.places.period];
+    view(x.p_at(), row.length).set(row);
+    view(x.x_at(), count).set(hertz.map((f) => Math.min(2 * Math.PI * f * period, Math.PI)));
+    if (x.limiters(count) <= 0) return null;
+    const sizes = view(x.y_at(), 3 * count), input = data.step.of === "speed" ? ratio : 1;
+    const each = data.limits.map(([name, place, signal, rate]) => [name, hertz.map((f, k) => {
+      const size = input * sizes[signal * count + k] * (rate ? 2 * Math.sin(Math.min(Math.PI * f * period, Math.PI / 2)) / period : 1);
+      return row[place] / size / data.step.factor;
+    })]);
+    return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
+  };
   // the drive with all its limits and its friction, from rest; command and output as shares of the scale
+  let acted = 0; // limiters, as bits
   const run = (count, command, scale, moment) => {
+    acted = 0;
     if (!x.start()) return null;
     const at = data.places, io = view(x.io_at(), x.io_length()), out = new Float64Array(count);
     const ratio = view(x.p_at(), at.ratio + 1)[at.ratio];
@@ -124,6 +142,7 @@
       io[at.command] = command(k);
       io[at.moment] = moment;
       if (x.tick() !== 0) return out.subarray(0, k);
+      acted |= io[at.flags];
       out[k] = io[place] / over;
     }
     return out;
@@ -288,7 +307,7 @@
     for (const name of [...data.loops, ...Object.keys(data.points)]) {
       const own = now.loops[name] || now.points[name], old = before.loops[name] || before.points[name];
       if (own.n === 0 && !(name in now.loops)) continue; // no such break point
-      const row = html("tr"), th = html("th", "left", LOOP_NAMES[name] || name);
+      const row = html("tr"), th = html("th", "left", LOOP_NAMES[name] || POINT_NAMES[name]);
       row.append(th);
       if (!own.figures || !old.figures) {
         const td = html("td", "", `not followed here: ${NONE[own.n] || "no loop"}`);
@@ -299,9 +318,12 @@
         th.dataset.loop = name;
         th.dataset.stable = own.figures[STABLE];
         for (const [quantity, , , factor] of FIGURES) {
+          if (name in now.points && CLOSED.includes(quantity)) {
+            row.append(html("td"));
+            continue;
+          }
           const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity);
           if (bad.has(name + " " + quantity)) td.classList.add("bad");
-          if (name in now.points && ["bandwidth", "overshoot", "settling_time"].includes(quantity)) td.replaceChildren("");
           row.append(td);
         }
       }
@@ -404,7 +426,7 @@
     const part = kept[name], ends = [part.hertz[0], part.hertz[part.hertz.length - 1]], { gain, phase, s, t } = part.curves;
     const [low, high] = range(gain, -90, 90), [lag, lead] = range(phase, -900, 180), [, peak] = range([...s, ...t], -60, 60);
     tell("bode", "chart:axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
-    tell("bode", "chart:axes", { panel: 1, y: [lag - 60, lead + 30] });
+    tell("bode", "chart:axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
     tell("sensitivity", "chart:axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
     tell("step", "chart:axes", { panel: 0, x: [0, part.count * before.loops[name].period * 1e3], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
   };
@@ -461,6 +483,27 @@
     return n ? 100 * Math.sqrt(sum / n) : NaN;
   };
 
+  let borderGrid = [], borderUnit = "";
+  const drawBorder = (label, part) => {
+    if (!part) return;
+    tell("border", "chart:redraw", { panel: 0, curve: `lowest, ${label}`, x: borderGrid, y: part.lowest });
+    if (label === "as changed") for (const name of ["speed limit", "acceleration limit", "peak current", "voltage"]) {
+      const own = part.each.find(([known]) => known === name);
+      tell("border", "chart:redraw", { panel: 0, curve: name, x: own ? borderGrid : [], y: own ? own[1] : [] });
+    }
+  };
+  const borderStart = () => {
+    const row = before.row, top = 0.5 / (row[data.places.outer] * row[data.places.period]), band = before.loops[outer].figures;
+    const low = band && Number.isFinite(band[PLACE.bandwidth]) ? Math.min(band[PLACE.bandwidth] / 30, top / 30) : top / 1e3;
+    borderGrid = [];
+    for (let k = 0; k <= 90; k++) borderGrid.push(low * (0.98 * top / low) ** (k / 90));
+    const part = borderOf(row, borderGrid);
+    if (!part) { chart("border").closest(".four > div").hidden = true; return; }
+    const [, high] = range([...part.lowest.slice(0, 1), size / data.step.factor], 0, 1e30), [bottom] = range(part.lowest, 0, 1e30);
+    tell("border", "chart:axes", { panel: 0, x: [borderGrid[0], borderGrid[90]], y: [Math.max(bottom / 4, high / 1e7), high * 8] });
+    drawBorder("as designed", part);
+  };
+
   const update = () => {
     const began = performance.now();
     refused = "";
@@ -475,8 +518,11 @@
     table();
     state();
     if (now.loops[shown].figures && kept[shown]) draw("as changed", { curves: curvesOf(shown, kept[shown].hertz), step: stepOf(shown, Math.min(Math.ceil(kept[shown].count * before.loops[shown].period / now.loops[shown].period), 3000)) }, shown);
+    drawBorder("as changed", borderOf(now.row, borderGrid));
     const part = trial(now.row);
     drawRun("as changed", part, unitOf()[0]);
+    const acting = data.limiters.filter(([, bit]) => acted & bit).map(([name]) => name);
+    find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
     if (record && part.y) find(".record").textContent = `${record.name}: ${record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(runBefore), 3)} %.`;
     root.dataset.ms = (performance.now() - began).toFixed(1);
     root.dataset.count = +(root.dataset.count || 0) + 1;
@@ -592,6 +638,7 @@
     }
     runKeys();
     runStart();
+    borderStart();
     choose(shown);
     const acts = {
       undo: () => go(past, future), redo: () => go(future, past), reset: () => { values = start.slice(); commit(); },

@@ -124,6 +124,20 @@
       this.ticks();
       this.clear();
     }
+    // what is no curve goes to its place on axes with new ends
+    follow() {
+      const map = (axis, [low, high]) => {
+        const stretch = (axis.px(high) - axis.px(low)) / (axis.to - axis.from);
+        return [stretch, axis.px(low) - stretch * axis.from];
+      };
+      const [sx, tx] = map(this.x, this.drawn.x), [sy, ty] = map(this.y, this.drawn.y);
+      const known = new Set(this.curves.map((curve) => curve.node));
+      for (const node of this.world.children) {
+        if (known.has(node)) continue;
+        node.setAttribute("transform", `matrix(${sx} 0 0 ${sy} ${tx} ${ty})`);
+        node.style.vectorEffect = "non-scaling-stroke";
+      }
+    }
     ticks() {
       const xt = this.group.querySelector(".xt"), yt = this.group.querySelector(".yt"), grid = this.group.querySelector(".grid");
       const edge = this.group.querySelector(".edge");
@@ -482,8 +496,10 @@
     // gives the axes of a panel new ends: {panel, x: [low, high], y: [low, high], words}; curves are redrawn after it
     rescale({ panel, x, y, words }) {
       const p = this.panels[panel];
+      p.drawn ??= { x: [p.x.low, p.x.high], y: [p.y.low, p.y.high] };
       for (const [axis, ends] of [[p.x, x], [p.y, y]]) if (ends) [axis.low, axis.high] = ends;
       p.scaled = true;
+      p.follow();
       p.update();
       if (words) {
         p.x.unit = words;
@@ -498,13 +514,18 @@
       const known = p.curves.find((c) => !c.dots && (key === undefined ? p.curves.length === 1 || c.node.dataset.id === curve : c.key === key));
       if (!known) return;
       let pen = false, d = "";
+      const points = [];
       for (let k = 0; k < x.length; k++) {
         const there = Number.isFinite(x[k]) && Number.isFinite(y[k]);
-        if (there) d += `${pen ? "L" : "M"}${p.x.px(x[k]).toFixed(2)} ${Math.max(-1e5, Math.min(1e5, p.y.px(y[k]))).toFixed(3)}`;
+        if (there) {
+          const at = p.x.px(x[k]), up = Math.max(-1e5, Math.min(1e5, p.y.px(y[k])));
+          d += `${pen ? "L" : "M"}${at.toFixed(2)} ${up.toFixed(3)}`;
+          points.push([at, up, !pen]);
+        }
         pen = there;
       }
       known.node.setAttribute("d", d);
-      known.points = p.curve(known.node).points;
+      known.points = points;
       if (parameter) known.parameter = parameter.filter((_, k) => Number.isFinite(x[k]) && Number.isFinite(y[k]));
       this.hide();
     }

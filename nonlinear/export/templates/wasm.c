@@ -186,3 +186,24 @@ EXPORT("step_of") int step_of(int stage, int count)
     drive_stepped(it->n, it->a, it->b, it->c, it->lead, count, y, state, work);
     return count;
 }
+
+static double seen[MOST_TICKS * SEEN * (MOST + 1)];
+static double whole_a[MOST * MOST];
+static double whole_b[MOST];
+
+/*
+ * Gains from the command to speed command, current command and voltage, in front of their limits, at count angles
+ * per interval of the command in x: three rows of count numbers in y. Its states, or why there are none.
+ */
+EXPORT("limiters") int limiters(int count)
+{
+    if (SEEN * count > 2 * MOST_OUT) {
+        return 0;
+    }
+    const int n = drive_limiters_assembled(p, q, other_s, other_io, whole_a, whole_b, places, column, seen);
+    if (n <= 0) {
+        return n;
+    }
+    drive_limiter_sizes(n, whole_a, whole_b, seen, drive_outer_interval(q), count, x, y, work, state);
+    return n;
+}

@@ -1,0 +1,194 @@
+"""What stands in front of each limiter under a sinusoidal command; emitted only, for the live page.
+
+Gains far below their largest value are differences of large numbers (an acceleration feed-forward).  So the
+states are not mixed as a Hessenberg form would: ``z I - A`` is solved as it is.
+"""
+
+# mypy: disallow-untyped-defs=False
+from __future__ import annotations
+
+import math
+
+from actuator_lti.batch._complex import over
+from nonlinear._kernels import layout
+from nonlinear._kernels.tick import tick
+from nonlinear.export.entries import derive, emitted, init, prepare_sizes
+from nonlinear.export.linear import (
+    COMMAND,
+    CURRENT,
+    MOST,
+    PERIODIC,
+    TOO_LONG,
+    VELOCITY,
+    linear_row,
+    listed,
+    pruned,
+    put_inputs,
+    put_unit,
+)
+
+MOST_TICKS = 16  # between two commands
+SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
+SEEN = 3
+
+
+@emitted
+def noted_column(q, s, io, stage, every, size, places, count, angles, column, seen, j):
+    """As `one_column`, with what stands in front of each limiter at every tick put down as column j."""
+    put_inputs(q, io, stage, size)
+    for k in range(every):
+        status = tick(q, s, io)
+        if status != layout.OK:
+            return 0
+        at = k * SEEN * (MOST + 1)
+        seen[at + SPEED * (MOST + 1) + j] = s[layout.S_SPEED_COMMAND]
+        seen[at + CURRENT_COMMAND * (MOST + 1) + j] = s[layout.S_CURRENT_BEFORE]
+        seen[at + VOLTAGE * (MOST + 1) + j] = s[layout.S_VOLTAGE_BEFORE]
+    base = s[layout.S_ANGLE]
+    for i in range(count):
+        column[i] = s[int(places[i])]
+        if i > 0 and i < angles:
+            column[i] -= base
+    return 1
+
+
+@emitted
+def outer_stage(q):
+    """The stage that takes the command."""
+    if q[layout.HAS_POSITION] > 0.0:
+        return COMMAND
+    return VELOCITY if q[layout.HAS_VELOCITY] > 0.0 else CURRENT
+
+
+@emitted
+def outer_interval(q):
+    """Ticks between two commands."""
+    if q[layout.HAS_POSITION] > 0.0:
+        return int(q[layout.EVERY_POSITION])
+    return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
+
+
+@emitted
+def limiters_assembled(p, q, s, io, a, b, places, column, seen):
+    """A and b of the closed drive from its command, and rows of ``seen`` (tick, signal): states, then d.
+
+    The number of states, or what stands in the way.
+    """
+    linear_row(p, q)
+    stage, every = outer_stage(q), outer_interval(q)
+    if every > MOST_TICKS:
+        return PERIODIC
+    prepare_sizes(q)
+    derive(q, s)
+    n, angles = listed(q, places)
+    if n > MOST:
+        return TOO_LONG
+    for j in range(n + 1):
+        init(q, s)
+        if j < n:
+            put_unit(s, places, j, angles)
+        size = 0.0 if j < n else 1.0
+        to = j if j < n else MOST
+        done = noted_column(q, s, io, stage, every, size, places, n, angles, column, seen, to)
+        if done == 0:
+            return TOO_LONG
+        for i in range(n):
+            if j < n:
+                a[i * n + j] = column[i]
+            else:
+                b[i] = column[i]
+    for i in range(n):
+        places[i] = 0.0
+        for k in range(every * SEEN):
+            places[i] += abs(seen[k * (MOST + 1) + i])
+    count = pruned(n, a, b, places, column)
+    for k in range(every * SEEN):
+        to_place = 0
+        for i in range(n):
+            if column[i] > 0.0:
+                seen[k * (MOST + 1) + to_place] = seen[k * (MOST + 1) + i]
+                to_place += 1
+    return count
+
+
+@emitted
+def pivoted(n, k, work, state):
+    """Bring the largest element of column k, from row k on, to row k."""
+    best, largest = k, -1.0
+    for i in range(k, n):
+        size = abs(work[2 * (i * n + k)]) + abs(work[2 * (i * n + k) + 1])
+        if size > largest:
+            best, largest = i, size
+    if best == k:
+        return
+    for j in range(2 * n):
+        kept = work[2 * k * n + j]
+        work[2 * k * n + j] = work[2 * best * n + j]
+        work[2 * best * n + j] = kept
+    for j in range(2):
+        kept = state[2 * k + j]
+        state[2 * k + j] = state[2 * best + j]
+        state[2 * best + j] = kept
+
+
+@emitted
+def cleared(n, k, work, state):
+    """Take row k out of the rows below it."""
+    for i in range(k + 1, n):
+        at, up = 2 * (i * n + k), 2 * (k * n + k)
+        if work[at] == 0.0 and work[at + 1] == 0.0:
+            continue
+        factor_r, factor_i = over(work[at], work[at + 1], work[up], work[up + 1])
+        for j in range(1, n - k):
+            here_r, here_i = work[up + 2 * j], work[up + 2 * j + 1]
+            work[at + 2 * j] -= factor_r * here_r - factor_i * here_i
+            work[at + 2 * j + 1] -= factor_r * here_i + factor_i * here_r
+        here_r, here_i = state[2 * k], state[2 * k + 1]
+        state[2 * i] -= factor_r * here_r - factor_i * here_i
+        state[2 * i + 1] -= factor_r * here_i + factor_i * here_r
+
+
+@emitted
+def states_at(n, a, b, x, work, state):
+    """(z I - A)^-1 b at an angle per interval, as pairs; A as it is, whose zeros keep the states apart."""
+    sine = math.sin(0.5 * x)
+    for i in range(n):
+        for j in range(n):
+            work[2 * (i * n + j)] = -a[i * n + j]
+            work[2 * (i * n + j) + 1] = 0.0
+        work[2 * (i * n + i)] = (1.0 - a[i * n + i]) - 2.0 * sine * sine
+        work[2 * (i * n + i) + 1] = math.sin(x)
+        state[2 * i], state[2 * i + 1] = b[i], 0.0
+    for k in range(n):
+        pivoted(n, k, work, state)
+        cleared(n, k, work, state)
+    i = n - 1
+    while i >= 0:
+        total_r, total_i = state[2 * i], state[2 * i + 1]
+        for j in range(i + 1, n):
+            left_r, left_i = work[2 * (i * n + j)], work[2 * (i * n + j) + 1]
+            total_r -= left_r * state[2 * j] - left_i * state[2 * j + 1]
+            total_i -= left_r * state[2 * j + 1] + left_i * state[2 * j]
+        total_r, total_i = over(total_r, total_i, work[2 * (i * n + i)], work[2 * (i * n + i) + 1])
+        state[2 * i], state[2 * i + 1] = total_r, total_i
+        i -= 1
+
+
+@emitted
+def limiter_sizes(n, a, b, seen, every, count, xs, sizes, work, state):
+    """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
+
+    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal.
+    """
+    for g in range(count):
+        states_at(n, a, b, xs[g], work, state)
+        for signal in range(SEEN):
+            largest = 0.0
+            for k in range(1 if signal == SPEED else every):
+                at = (k * SEEN + signal) * (MOST + 1)
+                real, imaginary = seen[at + MOST], 0.0
+                for i in range(n):
+                    real += seen[at + i] * state[2 * i]
+                    imaginary += seen[at + i] * state[2 * i + 1]
+                largest = max(largest, math.hypot(real, imaginary))
+            sizes[signal * count + g] = largest

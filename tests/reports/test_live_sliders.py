@@ -1,0 +1,304 @@
+"""The sliders of the report in a real browser, held against the command line.
+
+A value is moved by mouse, keyboard and touch, figures are read off the page; the design that the page saves
+goes through ``margins``, whose figures are those of the linear form, found without the simulator.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from built_report import HOSTILE
+from typer.testing import CliRunner
+
+from actuator_lti import load_design
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
+from reports.build import design_report
+from reports.cli.app import build
+from reports.document import dumps, loads
+from reports.html import page as page_of
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+DESIGN = "ilr33-amber"
+FIGURES = {  # of the page: of `margins --json`
+    "gain_margin": "gain_margin_db",
+    "phase_margin": "phase_margin_deg",
+    "delay_margin": "delay_margin_s",
+    "sensitivity_peak": "sensitivity_peak_db",
+    "bandwidth": "bandwidth_hz",
+    "overshoot": "overshoot_percent",
+    "settling_time": "settling_time_s",
+}
+
+
+def written(design: Design, folder: Path) -> Path:
+    """Write the page of a design without validation."""
+    path = folder / "page.html"
+    path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(load_design(DESIGN), tmp_path_factory.mktemp("sliders"))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Start a headless Chromium, or skip where there is none."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = next((found for name in names if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no Chromium on this machine")
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with playwright.sync_playwright() as running:
+        started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:
+    """Open a page from disk, offline; complaints and requests are collected."""
+    chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
+    page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
+    own = path.as_uri()
+    page.on("console", lambda message: trouble.append(message.text))
+    page.on("pageerror", lambda error: trouble.append(str(error)))
+    page.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != own else None)
+    page.goto(own + fragment)
+    page.wait_for_selector("#hands-on[data-ready]", timeout=20_000)
+    return page
+
+
+@pytest.fixture
+def page(browser: Browser, made: Path) -> Iterator[Page]:
+    trouble: list[str] = []
+    found = opened(browser, made, trouble)
+    yield found
+    found.context.close()
+    assert trouble == []
+
+
+def settled(page: Page, act: Any) -> None:
+    """Do something and wait until the page has followed."""
+    count = page.get_attribute("#hands-on", "data-count")
+    act()
+    page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def type_value(page: Page, key: str, value: float) -> None:
+    """Type a value, in the unit of the page, into the field of a key."""
+    row = f'.row[data-path="{key}"]'
+    page.eval_on_selector(row, "(node) => { node.closest('details').open = true; }")
+    settled(page, lambda: (page.fill(f"{row} .field", repr(value)), page.press(f"{row} .field", "Enter")))
+
+
+def read(page: Page) -> dict[str, dict[str, float]]:
+    """Read every figure of the page, to all digits."""
+    cells = page.eval_on_selector_all(
+        ".now td[data-figure]",
+        "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
+    )
+    found: dict[str, dict[str, float]] = {}
+    for loop, name, value in cells:
+        found.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
+    return found
+
+
+def command_line(path: Path) -> dict[str, Any]:
+    done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
+    assert done.exit_code in (0, 1), done.output
+    loops: dict[str, Any] = json.loads(done.stdout)["loops"]
+    return loops
+
+
+def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
+    for loop, found in loops.items():
+        for name, key in FIGURES.items():
+            if found[key] is not None and math.isfinite(found[key]):
+                assert ours[loop][name] == pytest.approx(found[key], rel=1e-9, abs=1e-9), (loop, name)
+
+
+def saved(page: Page, path: Path) -> Path:
+    with page.expect_download() as waiting:
+        page.click('[data-do="save"]')
+    waiting.value.save_as(path)
+    return path
+
+
+def test_figures_as_designed_and_as_changed_are_the_command_lines(page: Page, tmp_path: Path) -> None:
+    agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
+    before = read(page)
+    slider = page.locator('.row[data-path="control.position.gain"] input[type=range]')
+    box = slider.bounding_box()
+    assert box is not None
+    settled(page, lambda: page.mouse.click(box["x"] + 0.82 * box["width"], box["y"] + box["height"] / 2))
+    type_value(page, "control.computing_delay", 137.5)
+    type_value(page, "motor.resistance", 61.0)
+    type_value(page, "encoder.filter_time", 0.4e-3)
+    after = read(page)
+    assert after["position"]["phase_margin"] < before["position"]["phase_margin"] - 5.0
+    changed = saved(page, tmp_path / "changed.toml")
+    design = load_design(changed)
+    assert design.controller.computing_delay_s == pytest.approx(137.5e-6)
+    assert design.parameters["motor.resistance"].source == "changed from 55 mohm"
+    agree(after, command_line(changed))
+
+
+def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> None:
+    """Each key by itself, moved by a fifth; the other way round where that breaks a relation."""
+    design = load_design(DESIGN)
+    keys = json.loads(
+        page.inner_text("#live-data") or page.evaluate("document.getElementById('live-data').textContent")
+    )["keys"]
+    assert len(keys) > 25
+    for key in keys:
+        value = key["value"] * 1.2 if key["value"] else 0.4 * key["high"]
+        type_value(page, key["path"], value / key["factor"])
+        ours, changed = read(page), with_values(design, {key["path"]: value}, check=False)
+        theirs = linear_figures(Population(changed, {}, 1))
+        for loop in theirs.loops:
+            for name in FIGURES:
+                wanted = float(theirs.quantity(name, loop)[0])
+                if math.isfinite(wanted):
+                    assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (
+                        key["path"],
+                        loop,
+                        name,
+                    )
+        settled(page, lambda: page.click('[data-do="undo"]'))
+
+
+def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path: Path) -> None:
+    assert page.get_attribute(".state", "data-failing") == "0"
+    type_value(page, "control.position.gain", 590.0)
+    failing = int(page.get_attribute(".state", "data-failing") or 0)
+    done = CliRunner().invoke(build(), ["margins", str(saved(page, tmp_path / "hot.toml")), "--json"])
+    verdicts = [item for item in json.loads(done.stdout)["verdicts"] if item["passed"] is False]
+    assert failing == sum(item["loop"] is not None for item in verdicts) > 0
+    assert f"{failing} of " in page.inner_text(".state")
+
+
+def test_undo_redo_reset_and_keyboard(page: Page) -> None:
+    before = read(page)
+    slider = page.locator('.row[data-path="control.velocity.gain"] input[type=range]')
+    slider.focus()
+    settled(page, lambda: slider.press("ArrowRight"))
+    settled(page, lambda: slider.press("PageUp"))
+    moved = read(page)
+    assert moved["velocity"]["gain_margin"] < before["velocity"]["gain_margin"]
+    settled(page, lambda: page.click('[data-do="undo"]'))
+    settled(page, lambda: page.click('[data-do="undo"]'))
+    assert read(page) == before
+    settled(page, lambda: page.click('[data-do="redo"]'))
+    settled(page, lambda: page.click('[data-do="redo"]'))
+    assert read(page) == moved
+    settled(page, lambda: page.click('[data-do="reset"]'))
+    assert read(page) == before
+    assert "#" not in page.url
+
+
+def test_a_link_carries_the_changes(browser: Browser, page: Page, made: Path) -> None:
+    type_value(page, "control.position.gain", 175.0)
+    type_value(page, "load.inertia", 3e-4)
+    page.click('[data-do="link"]')
+    link = page.input_value(".sheet textarea")
+    trouble: list[str] = []
+    other = opened(browser, made, trouble, fragment="#" + link.split("#")[1])
+    assert read(other) == read(page)
+    other.context.close()
+    assert trouble == []
+
+
+def record_of(design: Design, path: Path) -> None:
+    """Write what the simulator of the command line gives as a measured record, in deg."""
+    from nonlinear import simulate
+    from nonlinear.commands import step
+
+    made = simulate(design, step(math.radians(2.0)), duration_s=0.25)
+    table = np.column_stack([made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad)])
+    np.savetxt(path, table, delimiter=",", header="time_s,command_deg,angle_deg", comments="", fmt="%.12g")
+
+
+def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path: Path) -> None:
+    """The record is a run of another gain: the model meets it once that gain is set."""
+    record_of(with_values(load_design(DESIGN), {"control.position.gain": 80.0}), tmp_path / "bench.csv")
+    text = (tmp_path / "bench.csv").read_text()
+    drop = """(text) => {
+        const data = new DataTransfer();
+        data.items.add(new File([text], "bench.csv"));
+        const drop = new DragEvent("drop", { dataTransfer: data, bubbles: true });
+        document.querySelector("#hands-on").dispatchEvent(drop);
+    }"""
+    settled(page, lambda: page.evaluate(drop, text))
+    words = page.inner_text(".record")
+    assert "bench.csv" in words
+    off = float(words.split("as changed: ")[1].split(" %")[0].replace("×10", "e"))
+    assert off > 0.5
+    type_value(page, "control.position.gain", 80.0)
+    words = page.inner_text(".record")
+    fits = words.split("as changed: ")[1].split(" %")[0].replace("−", "-")
+    assert float(fits) < 1e-6
+
+
+def test_nothing_of_a_design_becomes_markup(browser: Browser, tmp_path: Path) -> None:
+    design = replace(load_design(DESIGN), name=HOSTILE, title=HOSTILE, description=HOSTILE)
+    trouble: list[str] = []
+    found = opened(browser, written(design, tmp_path), trouble)
+    type_value(found, "control.position.gain", 130.0)
+    found.click('[data-do="file"]')
+    assert HOSTILE.split("\u202e")[0].split('"')[0] in found.input_value(".sheet textarea")
+    found.context.close()
+    assert trouble == []
+
+
+def test_a_phone_has_the_sliders_within_its_width(browser: Browser, made: Path) -> None:
+    trouble: list[str] = []
+    small = opened(
+        browser, made, trouble, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True
+    )
+    assert small.evaluate("document.documentElement.scrollWidth") <= 390
+    before = read(small)
+    slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    assert box is not None
+    settled(small, lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
+    assert read(small)["position"]["bandwidth"] > before["position"]["bandwidth"]
+    small.context.close()
+    assert trouble == []
+
+
+def test_without_scripts_the_page_is_the_report_alone(browser: Browser, made: Path) -> None:
+    page = browser.new_context(offline=True, java_script_enabled=False).new_page()
+    page.goto(made.as_uri())
+    assert page.locator("#hands-on").is_hidden()
+    assert page.locator("#verdicts").is_visible()
+
+
+def test_policy_and_size(made: Path) -> None:
+    text = made.read_text(encoding="utf-8")
+    policy = text.split('Content-Security-Policy" content="')[1].split('"')[0]
+    assert "'wasm-unsafe-eval'" in policy or "&#39;wasm-unsafe-eval&#39;" in policy
+    assert "'unsafe-eval'" not in policy
+    assert "http" not in policy
+    assert len(text.encode()) < 2_500_000
+
+
+def test_a_drive_that_cannot_be_followed_says_why(tmp_path: Path) -> None:
+    text = written(load_design("joint"), tmp_path).read_text(encoding="utf-8")
+    assert "No sliders for this design: The drive train is elastic" in text
+    assert "wasm-unsafe-eval" not in text
