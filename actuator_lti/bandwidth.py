@@ -149,7 +149,7 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
         system = system.to_state_space()
     system = _shown(system)
     loop = rational_loop(system)
-    fraction = exact_fraction(system, loop)
+    fraction = exact_fraction(system)
     gain = exact_gain(fraction, loop.in_z)
     if gain is None:
         raise InputError(_POLE)
