@@ -32,6 +32,7 @@ test: $(STAMP)
 
 # The tests of margins, loops and many designs again, as on processors with other linear algebra kernels.
 MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
+  tests/margins/test_margin_reference_loops.py tests/margins/test_unstable_inner_loops.py \
   tests/margins/test_delay_margins.py tests/margins/test_step_random.py tests/margins/test_bandwidth.py \
   tests/loops/test_loops_forms.py tests/loops/test_loops_published.py tests/study/test_compiled_figures.py
 

@@ -23,6 +23,7 @@ from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import reach, subdivided
+from actuator_lti.rest_mode import without_rest_mode
 
 Level = Literal["1/sqrt(2)", "-3 dB"]
 _SQUARES: dict[str, float] = {"1/sqrt(2)": 0.5, "-3 dB": 10.0**-0.3}
@@ -146,8 +147,9 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
         if system.delays_s.size:
             return _of_delays(system, delay_s, level)
         system = system.to_state_space()
+    system = _shown(system)
     loop = rational_loop(system)
-    fraction = exact_fraction(system, loop)
+    fraction = exact_fraction(system)
     gain = exact_gain(fraction, loop.in_z)
     if gain is None:
         raise InputError(_POLE)
@@ -163,6 +165,17 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     crossings = [_unwarped(w, loop) for w in gain.crossings(_SQUARES[level])]
     return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
                       _unwarped(place, loop), double(gain.dc), level)  # fmt: skip
+
+
+def _shown(system: Any) -> Any:
+    """A state space without a mode at zero frequency that it does not show."""
+    if not hasattr(system, "A") or system.ninputs != 1 or system.noutputs != 1:
+        return system
+    from control import StateSpace
+
+    in_z = system.dt is not None and system.dt != 0
+    A, B, C, kept = without_rest_mode(system.A, system.B, system.C, 1.0 if in_z else 0.0)
+    return system if kept.all() else StateSpace(A, B, C, system.D, system.dt, remove_useless_states=False)
 
 
 def _bandwidth(

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import flint
 
-from actuator_lti.exact_fraction import Fraction, double, roots
+from actuator_lti.exact_fraction import Fraction, double
+from actuator_lti.margins.certified_roots import all_roots, even_and_odd, positive_roots
 
 _BITS = 128
 _V = flint.fmpq_poly([0, 1])
@@ -82,23 +83,15 @@ def exact_gain(fraction: Fraction, sampled: bool) -> ExactGain | None:
     num, den = fraction.warped() if sampled else (fraction.num, fraction.den)
     if den[0] == 0:
         return None
-    (a, b), (c, d) = _split(num), _split(den)  # (a + j w b)/(c + j w d)
+    (a, b), (c, d) = even_and_odd(num), even_and_odd(den)  # (a + j w b)/(c + j w d)
     return ExactGain(
         a * a + _V * b * b, c * c + _V * d * d, a * c + _V * b * d, b * c - a * d, num[0] / den[0]
     )
 
 
-def _split(p: flint.fmpq_poly) -> tuple[flint.fmpq_poly, flint.fmpq_poly]:
-    """p(j w) = even(v) + j w odd(v)."""
-    c = p.coeffs()
-    even = flint.fmpq_poly([(-1) ** k * x for k, x in enumerate(c[0::2])])
-    return even, flint.fmpq_poly([(-1) ** k * x for k, x in enumerate(c[1::2])])
-
-
 def _positive_roots(p: flint.fmpq_poly) -> list[tuple[flint.arb, int]]:
     """Positive real roots with their multiplicities, in order."""
-    real = [(z.real, times) for z, times in roots(p) if z.imag == 0 and z.real > 0]
-    return sorted(real, key=lambda pair: float(pair[0].mid()))
+    return positive_roots(all_roots(p.numer()))
 
 
 def _root(v: flint.arb) -> float:

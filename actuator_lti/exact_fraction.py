@@ -8,9 +8,11 @@ from typing import Any
 import flint
 import numpy as np
 
+from actuator_lti.margins.certified_roots import all_roots
+from actuator_lti.margins.exact_loop import exact_polynomials, warped
+from actuator_lti.margins.given import ULP, given_of
 from actuator_lti.margins.loop import RationalLoop
 
-ULPS = 8.0  # by how many units in the last place the entries may be wrong
 _EPS = float(np.finfo(float).eps)
 _LOST = 1e3 * _EPS  # cancellation in c A^-1 b of a state space that leaves no figure
 
@@ -26,36 +28,20 @@ class Fraction:
     def warped(self) -> tuple[flint.fmpq_poly, flint.fmpq_poly]:
         """Both in s of z = (1 + s)/(1 - s): the unit circle becomes the imaginary axis."""
         n = self.den.degree()
-        return _warped(self.num, n), _warped(self.den, n)
+        return warped(self.num, n), warped(self.den, n)
 
 
-def exact_fraction(system: Any, loop: RationalLoop) -> Fraction:
-    """Find the transfer function without a rounding.
-
-    Parameters
-    ----------
-    system : StateSpace or TransferFunction
-        One input, one output.
-    loop : RationalLoop
-        The same, balanced (by powers of two, which is exact); coefficients are taken from the system itself.
-    """
-    if hasattr(system, "num"):
-        num, den = _poly(system.num[0][0]), _poly(system.den[0][0])
-    else:
-        n = loop.order
-        A = flint.fmpq_mat(n, n, [rational(v) for v in loop.A.ravel()])
-        b = flint.fmpq_mat(n, 1, [rational(v) for v in loop.b])
-        c = flint.fmpq_mat(1, n, [rational(v) for v in loop.c])
-        den = A.charpoly()  # det(p - A + b c) = det(p - A) (1 + c (p - A)^-1 b)
-        num = (A - b * c).charpoly() - den + rational(loop.d) * den
+def exact_fraction(system: Any) -> Fraction:
+    """Find the transfer function of a StateSpace or TransferFunction, SISO, without a rounding."""
+    num, den = (flint.fmpq_poly(p) for p in exact_polynomials(given_of(system)))
     common = num.gcd(den)
     return Fraction(num / common, den / common, den) if num != 0 else Fraction(num, flint.fmpq_poly([1]), den)
 
 
 def roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
     """Every root, isolated, with its multiplicity; real ones have no imaginary part at all."""
-    found: Any = p.numer().complex_roots() if p.degree() > 0 else []
-    return [(root, int(times)) for root, times in found]
+    zeros = next((k for k, c in enumerate(p.coeffs()) if c != 0), 0)
+    return [(flint.acb(0), zeros)] * bool(zeros) + all_roots(p.numer())
 
 
 def rational(value: Any) -> flint.fmpq:
@@ -80,21 +66,10 @@ def dc_noise(loop: RationalLoop) -> float:
         if not loop.in_z:
             return 0.0  # one coefficient over another
         below = abs(exact_sum(loop.denominator))
-        return ULPS * _EPS * float(np.abs(loop.numerator).sum()) / below if below else 0.0
+        return ULP * _EPS * float(np.abs(loop.numerator).sum()) / below if below else 0.0
     M = x * np.eye(loop.order) - loop.A
     if not loop.order or np.linalg.cond(M) > 1.0 / _LOST:
         return 0.0
     X, Y = np.abs(np.linalg.solve(M, loop.b)), np.abs(np.linalg.solve(M.T, loop.c))
     size = Y @ (x * X + np.abs(loop.A) @ X) + np.abs(loop.c) @ X + Y @ np.abs(loop.b) + abs(loop.d)
     return _LOST * float(size)
-
-
-def _poly(highest_first: np.ndarray) -> flint.fmpq_poly:
-    return flint.fmpq_poly([rational(v) for v in highest_first[::-1]])
-
-
-def _warped(p: flint.fmpq_poly, degree: int) -> flint.fmpq_poly:
-    """(1 - s)^degree p((1 + s)/(1 - s)), by way of z = -1 + 2/(1 - s)."""
-    about: list[Any] = p(flint.fmpq_poly([-1, 2])).coeffs()
-    about += [0] * (degree + 1 - len(about))
-    return flint.fmpq_poly(about[::-1])(flint.fmpq_poly([1, -1]))

@@ -15,7 +15,8 @@ import flint
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.exact_fraction import ULPS, Fraction, dc_noise, double, exact_fraction, exact_sum, roots
+from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, exact_sum, roots
+from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step_terms import Term
 
@@ -73,7 +74,7 @@ def exact_response(system: Any, loop: RationalLoop) -> ExactResponse:
     NumericalError
         The final value is lost in the rounding of the entries.
     """
-    fraction = exact_fraction(system, loop)
+    fraction = exact_fraction(system)
     dc = flint.fmpq(1 if loop.in_z else 0)
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
@@ -242,10 +243,10 @@ def _notes(loop: RationalLoop) -> tuple[str, ...]:
     if not loop.in_z or loop.numerator is None or loop.denominator is None:
         return ()
     sums = [(abs(exact_sum(p)), float(np.abs(p).sum())) for p in (loop.numerator, loop.denominator)]
-    moved = ULPS * _EPS * sum(whole / total for total, whole in sums)
+    moved = ULP * _EPS * sum(whole / total for total, whole in sums)
     if moved < 0.01:
         return ()
     return (
-        f"{ULPS:g} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
+        f"{ULP} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
         "the figures are those of the coefficients as given; a state space would hold the system better",
     )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.batch.parameters import Population
+from actuator_lti.batch.withheld import withhold
 from actuator_lti.drive.operating import Operating, OperatingPoint
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
@@ -45,6 +46,7 @@ class Crossovers:
 class LinearFigures:
     """Figures of the sampled loops of many designs.
 
+    A design whose figures double precision cannot follow has none: NaN, and it does not count as stable.
     Definitions are those of `actuator_lti.stability_margins`, `actuator_lti.bandwidth` and
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
     are NaN, its delay margin is 0.
@@ -70,6 +72,10 @@ class LinearFigures:
         """Whether the closed loop is stable, bool, shape (count,)."""
         return self._column(loop, 0) == 1.0
 
+    def withheld(self, loop: str) -> np.ndarray:
+        """Whether a design has no figures, as rounding decides them, bool, shape (count,)."""
+        return np.isnan(self._column(loop, 0))
+
     def pole_radius(self, loop: str) -> np.ndarray:
         """Largest modulus of a closed-loop pole, shape (count,)."""
         return self._column(loop, 14).copy()
@@ -94,7 +100,7 @@ class LinearFigures:
         """
         if name not in LOOP_QUANTITIES:
             raise InputError(f"quantity {name!r}: one of {', '.join(LOOP_QUANTITIES)}")
-        return getattr(self, f"_{name}")(loop)
+        return np.where(self.withheld(loop), np.nan, getattr(self, f"_{name}")(loop))
 
     def _index(self, loop: str) -> int:
         if loop not in self.loops:
@@ -245,9 +251,10 @@ def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray)
         loop = fundamental(stage_blocks(wired, stage))
         _figures_of(loop, lead, time_figures and response is None, rows)
         if response is not None:
-            verdict = rows[:, [0, 14]].copy()
+            verdict, withheld = rows[:, [0, 14]].copy(), np.isnan(rows[:, 0])
             _figures_of(response, np.nan, time_figures, rows)
             rows[:, [0, 14]] = verdict
+            rows[withheld, 3:] = np.nan
         out[chosen, LOOPS.index(stage)] = rows
 
 
@@ -262,7 +269,9 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     found = [np.linalg.eigvals(np.where(finite[:, None, None], each, 0.0)) for each in (A, closed)]
     poles = np.stack([part for each in found for part in (each.real, each.imag)], axis=1)
     poles[~finite] = np.nan
-    many_loops(A, B, C, poles, leads, time_figures, rows)
+    many_loops(A.copy(), B.copy(), C.copy(), poles, leads, time_figures, rows)
+    if not np.isnan(leads).any():
+        withhold(A, B, C, poles, rows)
 
 
 def _command_path(wired: Drive) -> tuple[Any, Block | None]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.loops.tick import Tick, TickProgram
+from actuator_lti.rest_mode import without_rest_mode
 
 
 def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -54,6 +55,12 @@ class Block:
         names = tuple(name for name, there in zip(self.states, used, strict=True) if there)
         A = self.A[..., used, :][..., :, used]
         return Block(A, self.B[..., used, :], self.C[..., :, used], self.D, names)
+
+    def shown(self) -> Block:
+        """Without a mode at zero frequency that it does not show, see `rest_mode`; one design only."""
+        A, B, C, kept = without_rest_mode(self.A, self.B, self.C, 1.0)
+        names = tuple(name for name, there in zip(self.states, kept, strict=True) if there)
+        return Block(A, B, C, self.D, names)
 
     def feedback(self) -> Block:
         """Closed with negative unit feedback, output kept: T = L/(1 + L). Needs D = 0."""

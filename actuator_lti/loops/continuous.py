@@ -13,6 +13,7 @@ from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import whole_path
+from actuator_lti.rest_mode import without_rest_mode
 
 RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")}
 """An input and its derivatives, as the ideal form has them."""
@@ -72,7 +73,16 @@ def joined(parts: list[DelaySystem]) -> DelaySystem:
 
 
 def finished(system: DelaySystem, **names: Any) -> Any:
-    """The system under its names; `control.StateSpace` where it has no delay."""
+    """The system under its names; `control.StateSpace` where it has no delay.
+
+    That one without a mode at zero frequency that it does not show, see `rest_mode`.
+    """
+    if system.delay_free:
+        plain = system.to_state_space()
+        A, B, C, kept = without_rest_mode(plain.A, plain.B, plain.C, 0.0)
+        if not kept.all():
+            labels = [name for name, there in zip(system.state_labels, kept, strict=True) if there]
+            system = DelaySystem(A, B, [], C, [], plain.D, [], [], [], [], states=labels)
     system.update_names(**names)
     return system.to_state_space() if system.delay_free else system
 

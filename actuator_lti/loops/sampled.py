@@ -28,7 +28,7 @@ def to_control(block: Block, period_s: float, name: str, source: str, signal: st
 def _loop(
     wired: Drive, block: Block, name: str, point: str, signals: tuple[str, str], periodic: bool
 ) -> Loop:
-    period = wired.period_s(wired.producer(point))
+    block, period = block.shown(), wired.period_s(wired.producer(point))
     error, measured = signals
     unit = wired.unit(error)
     label = name.replace(" ", "_")
@@ -75,7 +75,7 @@ def reference_to_output(wired: Drive) -> control.StateSpace:
     """Command to what the outermost stage moves, at its instants (see `Loops.reference_to_output`)."""
     source, signal, every, label = whole_path(wired)
     block = fundamental_path(TickProgram(wired, wired.outermost), every, "ref", signal)
-    return to_control(block, every * wired.tick_s, "reference_to_output", source, label)
+    return to_control(block.shown(), every * wired.tick_s, "reference_to_output", source, label)
 
 
 def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:

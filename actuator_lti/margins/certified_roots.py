@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
-from flint import acb, arb, arb_poly, ctx, fmpz, fmpz_poly
+from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.root_isolation import NotIsolated, isolated_roots, square_free
@@ -16,6 +16,7 @@ _MOST_BITS = 1 << 15
 _HIGH = 60  # degree above which simultaneous iteration takes less time than the library
 _SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
 V = fmpz_poly([0, 1])
+Polynomial = TypeVar("Polynomial", fmpz_poly, fmpq_poly)
 
 
 @dataclass(frozen=True)
@@ -37,12 +38,14 @@ class Split:
 
 def split(p: fmpz_poly) -> Split:
     """Even and odd part on the imaginary axis."""
-    c = p.coeffs()
-    return Split(_alternating(c[0::2]), _alternating(c[1::2]))
+    return Split(*even_and_odd(p))
 
 
-def _alternating(c: list[fmpz]) -> fmpz_poly:
-    return fmpz_poly([-x if k % 2 else x for k, x in enumerate(c)])
+def even_and_odd(p: Polynomial) -> tuple[Polynomial, Polynomial]:
+    """The polynomials in v = w^2 of p(j w) = even(v) + j w odd(v)."""
+    c: list[Any] = p.coeffs()
+    even, odd = ([-x if k % 2 else x for k, x in enumerate(part)] for part in (c[0::2], c[1::2]))
+    return type(p)(even), type(p)(odd)
 
 
 def free_of(p: fmpz_poly, q: fmpz_poly) -> fmpz_poly:

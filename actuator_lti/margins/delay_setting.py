@@ -12,11 +12,12 @@ from actuator_lti.margins.collocation import open_loop_matrix
 from actuator_lti.margins.delay_form import Cells, DelayForm, border_values
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import slope_at_dc
-from actuator_lti.margins.poles import SortedPoles, sorted_poles
+from actuator_lti.margins.poles import BorderPole, SortedPoles, sorted_poles
 from actuator_lti.margins.sweep import RESOLVED, reach, subdivided
 
 FLOOR = 0.01  # gain below which no crossing of the real axis is listed: 40 dB
 _PER_DECADE = 12
+_NEAR_ZERO = 1e-6  # of the next pole: worth asking whether a pole is exactly zero
 _NO_TURN = 0.99  # a gain below this takes 1 + L out of the right half plane nowhere
 
 
@@ -52,7 +53,7 @@ class Setting:
 
 def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> Setting:
     """Find the setting of a loop; ``band`` in rad/s, as asked for."""
-    poles = sorted_poles(open_loop_matrix(form, 24), form.sampled, gather=True)
+    poles = _exact_zero(form, sorted_poles(open_loop_matrix(form, 24), form.sampled, gather=True))
     at_dc = poles.at_dc
     with np.errstate(divide="ignore"):
         sizes = np.abs(np.log(poles.values)) if form.sampled else np.abs(poles.values)
@@ -75,6 +76,30 @@ def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = T
     if band is None:
         return Setting(form, poles, low, high, order, hidden)
     return Setting(form, poles, low, max(high, float(band[1])), order, hidden, float(band[1]), math.inf)
+
+
+def _exact_zero(form: DelayForm, poles: SortedPoles) -> SortedPoles:
+    """The poles with a simple one at zero put there, where the entries say so exactly.
+
+    Balanced eigenvalues are known to the size of the whole matrix, which is far more than the rounding of
+    two rows that are the same but for a factor: an integrator of the speed beside the angle.
+    """
+    if form.sampled or poles.at_dc or not poles.values.size:
+        return poles
+    size = np.abs(poles.values)
+    k = int(size.argmin())
+    beyond = float(np.delete(size, k).min(initial=np.inf))
+    if size[k] > _NEAR_ZERO * beyond:
+        return poles
+    from actuator_lti.margins.exact_delay import singular_at_rest  # python-flint only where it is needed
+
+    if not singular_at_rest(form):
+        return poles
+    values = poles.values.copy()
+    values[k] = 0.0
+    count = 1 + poles.border_count
+    unstable = int(np.count_nonzero(values.real > 0.0)) if not poles.border else poles.unstable
+    return SortedPoles(values, unstable, (BorderPole(0.0, 1), *poles.border), count, poles.doubtful)
 
 
 def low_frequency(form: DelayForm) -> tuple[float, int]:

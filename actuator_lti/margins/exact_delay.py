@@ -148,3 +148,11 @@ def _newton(values: list[fmpq]) -> fmpq_poly:
     for k in range(len(values) - 2, -1, -1):
         out = out * fmpq_poly([-k, 1]) + differences[k]
     return out
+
+
+def singular_at_rest(form: DelayForm) -> bool:
+    """Whether the open loop has a pole at zero frequency exactly, by its entries."""
+    inner = np.block([[form.A, form.B2], [form.C2, form.D22 - np.eye(form.delays.size)]])
+    m = inner.shape[0]
+    entries = [fmpq(*float(x).as_integer_ratio()) for x in inner.ravel()]
+    return bool(fmpq_mat(m, m, entries).det() == 0)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from flint import fmpz, fmpz_mat, fmpz_poly
 
+from actuator_lti.margins.certified_roots import Polynomial
 from actuator_lti.margins.given import Given
 
 _S = fmpz_poly([0, 1])
@@ -54,12 +55,12 @@ class ExactLoop:
 
 def exact_loop(given: Given) -> ExactLoop:
     """Bring the given doubles into the exact form; no rounding anywhere."""
-    N, D = _by_coefficients(given) if given.A is None else _by_matrices(given)
+    N, D = exact_polynomials(given)
     if given.samples:
         D = D * _S**given.samples
     n = D.degree()
     if given.period_s is not None:
-        N, D = _warped(N, n), _warped(D, n)
+        N, D = warped(N, n), warped(D, n)
     common = N.gcd(D) if N.degree() >= 0 else D
     hidden = _primitive(common)
     at_end = min(n - N.degree(), n - D.degree()) if N.degree() >= 0 else 0  # common poles at z = -1
@@ -69,6 +70,11 @@ def exact_loop(given: Given) -> ExactLoop:
     return ExactLoop(
         N // both, D // both, hidden, n - hidden_degree, hidden_degree, given.period_s is not None
     )
+
+
+def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
+    """Numerator and denominator in s or z, hidden modes among them, times one power of two."""
+    return _by_coefficients(given) if given.A is None else _by_matrices(given)
 
 
 def _integers(*arrays: Any) -> tuple[list[list[int]], int]:
@@ -104,11 +110,12 @@ def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:
     return fmpz_poly([c * (1 << (shift * k)) for k, c in enumerate(p.coeffs())])
 
 
-def _warped(p: fmpz_poly, degree: int) -> fmpz_poly:
+def warped(p: Polynomial, degree: int) -> Polynomial:
     """(1 - s)^degree p((1 + s)/(1 - s)), by way of z = -1 + 2/(1 - s)."""
-    about: list[Any] = list(p(fmpz_poly([-1, 2])).coeffs())
+    kind = type(p)
+    about: list[Any] = list(p(kind([-1, 2])).coeffs())
     about += [0] * (degree + 1 - len(about))
-    return fmpz_poly(about[::-1])(fmpz_poly([1, -1]))
+    return kind(about[::-1])(kind([1, -1]))
 
 
 def _primitive(p: fmpz_poly) -> fmpz_poly:

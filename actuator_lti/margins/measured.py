@@ -13,6 +13,7 @@ from actuator_lti.margins.extremes import DISK
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
 from actuator_lti.margins.measured_data import MeasuredResponse, measured_response
+from actuator_lti.margins.measured_distance import distance_ranges
 from actuator_lti.margins.rational import delay_margins
 from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
 
@@ -22,7 +23,8 @@ _NOTES = (
     "measured data: stability cannot be told from them, and outside of their band nothing is known",
     "each crossing lies between two points (bracket_rad_s); the figure between them is interpolated, it lies "
     "in ratio_range or deg_range as far as the loop between the points is no more curved than about them",
-    "modulus and disk margin are the smallest values at measured points: upper bounds",
+    "modulus and disk margin are the smallest values at measured points; over the band and within the noise "
+    "they lie in modulus_range and alpha_range",
 )
 _QUIET = "no noise is given (MeasuredResponse takes it, or coherence or repeats): the ranges leave it out"
 
@@ -50,6 +52,7 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
     gain_margins, touched = _gain_margins(omega, found)
     distance, alpha = np.abs(1.0 + L), DISK.distance(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
+    modulus_range, alpha_range = distance_ranges(L, radius, found)
     noise = f"noise: {response.source}" if radius.any() else _QUIET
     return StabilityMargins(
         stable=None,
@@ -59,7 +62,8 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         delay_margins=delay_margins(phase_margins, response.dt),
         modulus_margin=float(distance[k]),
         modulus_frequency_rad_s=float(omega[k]),
-        disk_margin=DiskMargin(float(alpha[j]), float(omega[j])),
+        disk_margin=DiskMargin(float(alpha[j]), float(omega[j]), alpha_range),
+        modulus_range=modulus_range,
         period_s=response.dt,
         delay_s=delay_s,
         band_rad_s=(float(omega[0]), float(omega[-1])),

@@ -83,6 +83,8 @@ class StabilityMargins:
         ``"certified"``, ``"checked"`` or ``"withheld"``.
     evidence_reason : str
         Why it is that: one line.
+    modulus_range : tuple of float or None
+        Measured data: where the modulus margin lies between the points and within the noise.
     """
 
     stable: bool | None
@@ -101,6 +103,7 @@ class StabilityMargins:
     notes: tuple[str, ...] = ()
     evidence: Evidence = "checked"
     evidence_reason: str = ""
+    modulus_range: tuple[float, float] | None = None
 
     @property
     def withheld(self) -> bool:
@@ -163,6 +166,10 @@ class StabilityMargins:
         return margins_html(self)
 
 
+def _within(found: tuple[float, float] | None) -> str:
+    return "" if found is None else f", in [{found[0]:.4g}, {found[1]:.4g}]"
+
+
 def _lines(m: StabilityMargins) -> list[str]:
     heads = {
         "stable": "closed loop: stable",
@@ -182,8 +189,9 @@ def _lines(m: StabilityMargins) -> list[str]:
         if len(margins) > _PRINTED:
             lines.append(f"{name} margin: {len(margins) - _PRINTED} more")
     if m.modulus_margin is not None and m.modulus_frequency_rad_s is not None:
-        lines.append(f"modulus margin: {m.modulus_margin:.6g} at {frequency_text(m.modulus_frequency_rad_s)}")
+        where = f"{m.modulus_margin:.6g} at {frequency_text(m.modulus_frequency_rad_s)}"
+        lines.append(f"modulus margin: {where}{_within(m.modulus_range)}")
     if m.disk_margin is not None:
-        lines.append(f"disk margin: {m.disk_margin}")
+        lines.append(f"disk margin: {m.disk_margin}{_within(m.disk_margin.alpha_range)}")
     lines.append(f"band: {m.band_rad_s[0]:.6g} to {m.band_rad_s[1]:.6g} rad/s; method: {m.method}")
     return [*lines, evidence, *(f"note: {note}" for note in m.notes)]

@@ -117,10 +117,13 @@ class DiskMargin:
         The smallest of |2 (1 + L)/(1 - L)|.
     frequency_rad_s : float
         Where it is reached.
+    alpha_range : tuple of float or None
+        Measured data: where it lies between the points and within the noise.
     """
 
     alpha: float
     frequency_rad_s: float
+    alpha_range: tuple[float, float] | None = None
 
     @property
     def deg(self) -> float:

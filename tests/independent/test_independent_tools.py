@@ -20,7 +20,6 @@ from flint import arb, arb_poly, ctx, fmpq_poly
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.exact_fraction import exact_fraction
 from actuator_lti.margins import stability_margins
-from actuator_lti.margins.loop import rational_loop
 
 _AGREE = 1e-6
 _LARGEST = 40
@@ -49,7 +48,7 @@ def benchmark_loops(ctrlsys: Any) -> Iterator[tuple[str, control.StateSpace]]:
 
 def exact_modulus_margin(loop: control.StateSpace) -> float:
     """Smallest |1 + L| from every stationary point of |N + D|^2/|D|^2, certified."""
-    fraction = exact_fraction(loop, rational_loop(loop))
+    fraction = exact_fraction(loop)
     num, den = fraction.warped() if loop.isdtime(strict=True) else (fraction.num, fraction.den)
 
     def square(p: fmpq_poly) -> fmpq_poly:

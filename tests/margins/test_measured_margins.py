@@ -248,3 +248,44 @@ def test_values_lost_in_noise_give_no_gain_margin() -> None:
 def test_unusable_noise(call: Callable[..., MeasuredResponse], message: str) -> None:
     with pytest.raises(InputError, match=message):
         call(control.frd([1.0, 0.5], [1.0, 2.0]))
+
+
+def nearest(L: Response) -> tuple[float, float]:
+    """Smallest |1 + L| and |2 (1 + L)/(1 - L)| of the exact response over the band."""
+    y = L(np.geomspace(*BAND, 300_001))
+    return float(np.abs(1 + y).min()), float((2 * np.abs((1 + y) / (1 - y))).min())
+
+
+@pytest.mark.parametrize("measured", [quiet, noisy, repeated, coherent])
+def test_modulus_and_disk_ranges_hold_the_truth(measured: Callable[..., MeasuredResponse]) -> None:
+    rng = np.random.default_rng(8)
+    wrong, told = [], 0
+    for k in range(25):
+        L = light_plant(rng)
+        m = stability_margins(measured(rng, L))
+        assert m.modulus_range is not None
+        assert m.disk_margin is not None
+        assert m.disk_margin.alpha_range is not None
+        for true, (low, high) in zip(nearest(L), (m.modulus_range, m.disk_margin.alpha_range), strict=True):
+            told += low > 0.0
+            if not low * (1 - 1e-3) <= true <= high * (1 + 1e-3):
+                wrong.append((k, true, low, high))
+    assert len(wrong) <= 1, wrong
+    assert told >= 12
+
+
+def test_noise_widens_the_ranges_of_modulus_and_disk_margin() -> None:
+    exact = stability_margins(A1)
+    data = control.frd(A1, np.geomspace(0.2, 8, 300))
+    ranges = []
+    for sigma in (0.0, 0.01, 0.02):
+        m = stability_margins(MeasuredResponse.with_noise(data, sigma) if sigma else data)
+        assert m.modulus_range is not None
+        assert m.modulus_range[0] <= exact.modulus_margin <= m.modulus_range[1]
+        assert m.disk_margin.alpha_range[0] <= exact.disk_margin.alpha <= m.disk_margin.alpha_range[1]
+        assert f"in [{m.modulus_range[0]:.4g}, {m.modulus_range[1]:.4g}]" in str(m)
+        ranges.append(m.modulus_range)
+    none, one, two = (high - low for low, high in ranges)
+    assert none < 0.01
+    assert one > 0.02
+    assert two > 1.7 * one

@@ -1,4 +1,4 @@
-"""Roots of polynomials of high degree: each in a square of its own, none left out, real ones known as real."""
+"""Roots of polynomials of high degree: each in a square of its own, none left out, real ones marked."""
 
 import numpy as np
 import pytest

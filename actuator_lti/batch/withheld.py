@@ -1,0 +1,65 @@
+"""Which of many designs keep their figures: those whose loop double precision can follow.
+
+An unstable inner loop that runs many times within one update of the outer one leaves entries of 1e12 and more
+in the outer loop's matrices, which nearly cancel in its response. Every crossover of such a design, and the
+response at some angles between, must stand out from its own rounding errors; else the design has no figures.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_lti.batch._figures import (
+    FIRST_GAIN,
+    FIRST_PHASE,
+    GAIN_CROSSOVERS,
+    LISTED,
+    PHASE_CROSSOVERS,
+    STABLE,
+)
+from actuator_lti.margins.trust import told_from_zero
+
+_GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
+_MOST_ERROR = 1e-10  # relative, of the response at a crossover: the margins are then good to 1e-8
+_BETWEEN = (0.03, 0.3, 1.0, 2.5)
+
+
+def withhold(A: np.ndarray, B: np.ndarray, C: np.ndarray, poles: np.ndarray, rows: np.ndarray) -> None:
+    """Take the figures away that rounding decides: NaN in all columns, counts 0.
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (count, n, n), (count, n), (count, n)
+        Open loops.
+    poles : ndarray, shape (count, 4, n)
+        Real and imaginary parts of the open loop's, then of the closed loop's.
+    rows : ndarray, shape (count, columns)
+        Figures, changed in place.
+    """
+    with np.errstate(invalid="ignore"):
+        fast = np.hypot(poles[:, 0], poles[:, 1]).max(axis=1, initial=0.0) > _GROWTH
+    chosen = np.flatnonzero(fast)
+    if chosen.size:
+        lost = chosen[_lost(A[chosen], B[chosen], C[chosen], rows[chosen])]
+        rows[lost] = np.nan
+    none = np.isnan(rows[:, STABLE])
+    rows[np.ix_(none, [GAIN_CROSSOVERS, PHASE_CROSSOVERS])] = 0.0
+
+
+def _lost(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    count = len(A)
+    lists = [rows[:, first : first + 2 * LISTED : 2] for first in (FIRST_GAIN, FIRST_PHASE)]
+    angles = np.hstack([*lists, np.broadcast_to(_BETWEEN, (count, len(_BETWEEN)))])
+    asked = ~np.isnan(angles)
+    points = np.exp(1j * np.where(asked, angles, 1.0))
+    with np.errstate(all="ignore"):
+        told = np.array([_told(*design) for design in zip(A, B, C, points, strict=True)])
+    return ~((told >= 1.0 / _MOST_ERROR) | ~asked).all(axis=1)
+
+
+def _told(A: np.ndarray, B: np.ndarray, C: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """How many of its own rounding errors the response of one design is; 0 where it has a pole there."""
+    try:
+        return told_from_zero(A, B, C, np.zeros(()), points)
+    except np.linalg.LinAlgError:
+        return np.zeros(points.shape)
