@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
+from analyses.validation.bench import on_the_bench
+from analyses.validation.from_rest import nonlinear_parts
 from nonlinear import LIMITERS
 
 FREQUENCIES, ROUNDS = 14, 9
@@ -97,7 +99,7 @@ def check_border(
         Encoder counts are left out together with the friction: they are no part of the linear loop.
     """
     if not friction_on:
-        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+        design = on_the_bench(design)
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])
@@ -141,9 +143,11 @@ def _not_linear(design: Design, friction_on: bool) -> str:
     """Say why the border need not be that of the linear loop; empty where it must be."""
     if friction_on:
         return "dry friction shifts the border"
-    if design.friction.viscous(1) != design.friction.viscous(-1):
-        return "viscous friction differs by direction, so that no single linear loop describes the drive"
-    return ""
+    left_out = ("dry friction", "offset torque", "friction of the load")
+    parts = [word for word in nonlinear_parts(design) if word not in left_out]
+    if not parts:
+        return ""
+    return f"{', '.join(parts)}: no single linear loop describes the drive"
 
 
 def _bisect(

@@ -42,6 +42,9 @@ NEAR = 0.01  # relative width of the bracket from which on the frequency seen is
 OFF_FREQUENCY = 1e-2  # relative: so far off, the windows are fitted anew
 ATTEMPTS = 3  # at a border, each with more time to settle
 LONGER = 4
+FADED = 0.3  # of its size: what is left of an oscillation that keeps up, after twice the wait, is more
+UNSTEADY = "the position controller remembers, and the drive cannot stand: no run begins in its steady state"
+SLOW = "a slow motion that dies out hides the border: not told apart within the time given"
 DECEIVED = 3.0  # widths of the bracket that a border may move when it is measured again
 GAIN_RANGE = 1e3
 LONGEST_DELAY_SAMPLES = 2000.0
@@ -103,11 +106,18 @@ class Search:
         return self.settle_ticks + 2 * int(self._window().ticks[0])
 
     def row(self, value: float) -> Rows:
-        """The rig at one value, with a faint impulse at the point in its first sample."""
+        """The rig at one value, with a faint kick at the point at first."""
         setup = self.setup
         row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
-        row.series(setup.point, IMPULSE, self.kick)
+        row.series(setup.point, self._burst() if self.smooth else IMPULSE, self.kick)
         return row
+
+    def _burst(self) -> Floats:
+        """Some periods of the expected oscillation, swelling and dying away: other modes are hardly moved."""
+        turn = 2.0 * np.pi * self.frequency_hz * self.setup.design.controller.period_s
+        t = np.arange(int(np.ceil(2.0 * np.pi * BURST / turn)) + 1)
+        shape = np.sin(np.pi * t / max(t.size - 1, 1)) ** 2
+        return np.append(shape * np.sin(turn * t + AHEAD), 0.0)
 
     @property
     def controlled(self) -> bool:
@@ -125,16 +135,16 @@ class Search:
 
     def growth(self, result: BatchResult) -> Floats:
         """Growth of the oscillation from window to window as a logarithm; +-inf where it is plain."""
-        last, earlier = (self._size(result, k) for k in (0, 1))
+        last, earlier = (self.size(result, k) for k in (0, 1))
         with np.errstate(divide="ignore", invalid="ignore"):
             found = np.log(last / earlier)
-        nothing = NOTHING_RIDING if self.setup.ride.delicate else NOTHING
+        nothing = NOTHING_RIDING if self.setup.ride.speed_rad_s else NOTHING
         gone = (last <= nothing * self.kick) | ~np.isfinite(found)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.delicate)
         return np.where(burst, inf, np.where(gone, -inf, found))
 
-    def _size(self, result: BatchResult, last: int) -> Floats:
+    def size(self, result: BatchResult, last: int) -> Floats:
         """Size in a window: of the fundamental, or from crest to crest where no frequency is expected."""
         if self.smooth:
             return np.abs(result.phasor(self.setup.before, 1, last))
@@ -156,6 +166,8 @@ class Search:
         return (result.column("cycles") + turn / (2.0 * np.pi)) / seconds
 
 
+BURST = 8  # periods of the kick
+AHEAD = 0.7  # rad, its phase: at half the sampling frequency a sine itself is nothing
 IMPULSE = np.array([1.0, 0.0])
 
 
@@ -203,6 +215,8 @@ class _Hunt:
     found: bool | None = None
     spoiled: str = ""
     shift: float | None = None
+    size: float = 0.0
+    faded: bool = False
 
     def take(self, result: BatchResult) -> None:
         """Keep the first interval in which decay turns into growth."""
@@ -218,6 +232,7 @@ class _Hunt:
         if k > 0:
             self.low, self.growths = float(self.values[k - 1]), (float(growth[k - 1]), self.growths[1])
             self.frequency_hz = float(hertz[k - 1])
+            self.size = float(self.search.size(result, 0)[k - 1])
         if k < growth.size:
             self.high, self.growths = float(self.values[k]), (self.growths[0], float(growth[k]))
         near = [j for j in (k - 2, k + 1) if 0 <= j < growth.size and np.isfinite(growth[j])]
@@ -246,6 +261,8 @@ class _Hunt:
         if not self.found:
             return Border(None, bracket, None, self.runs)
         width = abs(log(self.high / self.low))
+        if self.deceived:
+            return Border(None, bracket, None, self.runs, SLOW)
         if not self.search.smooth:
             return Border(
                 exp(0.5 * log(self.low * self.high)), bracket, self.frequency_hz, self.runs, "", width
@@ -265,11 +282,14 @@ class _Hunt:
         if isfinite(growth) and b > a:
             self.shift = growth / (b - a) * abs(log(self.high / self.low))
             self.runs += 1
+        self.faded = float(self.search.size(result, 0)[0]) < FADED * self.size
 
     @property
     def deceived(self) -> bool:
         """Whether what looked like growth was something else that had not died out yet."""
-        return self.shift is not None and abs(self.shift) > DECEIVED * abs(log(self.high / self.low))
+        return self.faded or (
+            self.shift is not None and abs(self.shift) > DECEIVED * abs(log(self.high / self.low))
+        )
 
     def longer(self) -> _Hunt:
         """The same hunt with more time to settle."""
@@ -288,7 +308,7 @@ class _Hunt:
         leak = off * width / (b - a)  # of a period that a window does not hold, over the slope of the growth
         if len(points) < 3 or any(y[1] <= x[1] for x, y in pairwise(points)):
             return line, 0.125 * width + leak
-        curve = _through(points)
+        curve = min(max(_through(points), min(ends)), max(ends))
         return curve, abs(curve - line) + leak
 
 
@@ -368,6 +388,9 @@ def _measure_again(hunts: list[_Hunt], threads: int | None) -> None:
 def _control(hunts: list[_Hunt], threads: int | None) -> None:
     """Run the nominal drives: where one meets a limit or reverses, that says nothing of growth later."""
     ones = [hunt for hunt in hunts if hunt.search.controlled]
+    for hunt in ones:
+        hunt.spoiled = "" if hunt.search.setup.steady_start else UNSTEADY
+    ones = [hunt for hunt in ones if not hunt.spoiled]
     if not ones:
         return
     parts = [hunt.search.rows(np.array([hunt.nominal()])) for hunt in ones]

@@ -113,6 +113,12 @@ def _run(design: Design, found: Ride, amplitude: float, hertz: float, ticks: int
     row = Rows.of(design, friction_on=found.friction_on, limits_on=False)
     found.load(row)
     row["twist_start"] = found.twist_rad
+    if not found.speed_rad_s and found.twist_rad and design.controller.position is not None:
+        angle = design.ratio_to_coupling * found.twist_rad  # the output stands at zero
+        row["angle_start"] = angle
+        if design.controller.position.sensor == "motor":
+            row.step("bias", angle / design.total_ratio, -1.0)
+    row["friction_feedforward"] = 0.0  # the sign of the command's motion: no part of a linear response
     row["ticks"], row["record_every"] = ticks, base
     row.sine("command", amplitude, hertz)
     if found.speed_rad_s:
@@ -150,4 +156,12 @@ def _read(
         reason = f"{acting[0]} limit"
     elif found.friction_on and speed.min() <= 0.0:
         reason = "speed reversal"
+    elif found.coupling_Nm and _parted(run, n - samples):
+        reason = "the coupling comes free"
     return _Point(amplitude, last / amplitude, change, reason)
+
+
+def _parted(run: Trajectory, since: int) -> bool:
+    """Whether the coupling's torque changes its sign in the last window."""
+    torque = run.coupling_torque_Nm
+    return torque is not None and bool((torque[since:] <= 0.0).any())

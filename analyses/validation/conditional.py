@@ -255,7 +255,11 @@ def _standing(design: Design) -> float:
     if motor.resistance_ohm is not None and control.current is None:
         per_unit /= motor.resistance_ohm
     dry = friction.dry_Nm(0.0) * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
-    return 2.0 * dry / (per_unit * gain) / design.total_ratio
+    dry += max((point.torque_Nm for point in friction.points), default=0.0)
+    if design.load.friction is not None:
+        dry += design.load.friction.dry_torque_Nm / design.ratio_to_coupling
+    play = 0.0 if design.coupling is None else design.coupling.play_rad / design.ratio_behind_coupling
+    return 2.0 * dry / (per_unit * gain) / design.total_ratio + play
 
 
 def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Rows:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from analyses.validation.borders import CYCLES, Border, Kind, Search, find_borders
+from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.rig import Rig
 from analyses.validation.tolerance import allowed
 from nonlinear import Rows
@@ -23,8 +23,11 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 SETTLE_CYCLES = 20
-LONGEST_SETTLE_TICKS = 5_000
+LONGEST_SETTLE_TICKS = 5_000  # at first; what then contradicts is looked at again
+AGAIN = 16  # times the wait
+LONGEST_AGAIN_TICKS = 100_000
 LONGEST_BLIND_TICKS = 20_000  # nobody knows what to wait for: several of the slowest time constants
+GRID, DIPS = 1000, 6  # frequencies looked at, and how many of the nearest approaches to -1 are refined
 FAR = 300.0  # margins beyond this factor count as none
 
 
@@ -135,7 +138,25 @@ def confirm_margins(
 ) -> tuple[Confirmation, ...]:
     """Put all questions to the simulator together; see `stage_questions`, `point_questions`."""
     borders = find_borders([q.search for q in questions], threads=threads, progress=progress)
-    return tuple(question.answer(border) for question, border in zip(questions, borders, strict=True))
+    found = [question.answer(border) for question, border in zip(questions, borders, strict=True)]
+    return tuple(_doubted(questions, found, threads))
+
+
+def _doubted(
+    questions: Sequence[Question], found: list[Confirmation], threads: int | None
+) -> list[Confirmation]:
+    """Look again, with a longer wait, for what contradicts: a slow motion may look like growth."""
+    odd = [k for k, item in enumerate(found) if not item.passed or item.border.unknown == SLOW]
+    if not odd:
+        return found
+    searches = []
+    for k in odd:
+        search = questions[k].search
+        wait = min(AGAIN * search.settle_ticks, max(LONGEST_AGAIN_TICKS, search.settle_ticks))
+        searches.append(replace(search, settle_ticks=wait))
+    for k, border in zip(odd, find_borders(searches, threads=threads), strict=True):
+        found[k] = questions[k].answer(border)
+    return found
 
 
 def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_ticks: int) -> list[Question]:
@@ -187,11 +208,15 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
         z = np.exp(1j * omega * loop.period_s)
         return np.abs(1.0 + gain * np.atleast_1d(loop.open_loop(z)) * np.exp(-1j * omega * delay_s))
 
-    grid = np.log(np.geomspace(1e-4, 0.999, 250) * 0.5 / loop.period_s)
-    k = int(np.argmin(distance(grid)))
-    ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
-    nearest = minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded")
-    return float(np.exp(nearest.x))
+    grid = np.log(np.geomspace(1e-4, 0.999, GRID) * 0.5 / loop.period_s)
+    values = distance(grid)
+    dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
+    found = []
+    for k in dips:  # a narrow one is deeper than the grid shows
+        ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
+        found.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
+    return float(np.exp(min(found, key=lambda item: float(item.fun)).x))
 
 
 def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:

@@ -81,6 +81,8 @@ class Measured:
     point_error : ndarray, shape (K,)
         Relative error of each point of the sweep: what two windows differ by, carried on to the end of the
         transient.
+    no_dc : str
+        Why the value at zero frequency is not known; then what is related to it is nothing.
     """
 
     bandwidth: Reading
@@ -94,6 +96,7 @@ class Measured:
     step: StepMeasured
     sweep: Sweep
     point_error: Floats
+    no_dc: str = ""
 
 
 def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int) -> Measured:
@@ -108,11 +111,10 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
         Waited for before a point of the sweep; length of the step response.
     """
     step = step_response(setup, step_ticks)
-    if step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0:
-        raise NotMeasured(f"the step that gives the value at zero frequency: {step.reason or 'no motion'}")
+    lost = step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0
     if not sweep.valid.any():
         raise NotMeasured(f"no frequency could be measured: {most_frequent(sweep.reason)}")
-    dc = step.final_value
+    dc = 1.0 if lost else step.final_value
     fine = refined(setup, sweep, [*_brackets(sweep, dc), *_dips(sweep, dc)], settle_ticks)
     wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
     fine = refined(setup, fine, wide, settle_ticks)
@@ -140,7 +142,13 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
         step=step,
         sweep=fine,
         point_error=own,
+        no_dc=f"the step that gives the value at zero frequency: {step.reason or 'no motion'}"
+        if lost
+        else "",
     )
+
+
+BESIDE = 2  # points on either side
 
 
 def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
@@ -149,10 +157,15 @@ def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
     A transient of the time constant tau that changes by d from one window W to the next has
     ``d/(1 - exp(-W/tau))`` to go.
     """
+    from scipy.ndimage import maximum_filter1d
+
     tick_s = setup.design.controller.period_s
     window = coherent(sweep.frequency_hz, tick_s, setup.base_ticks).ticks
     slowest = max(step_ticks / SETTLE_TIME_CONSTANTS, 1.0)
-    return sweep.unsteadiness / -np.expm1(-window / slowest) + ROUNDING
+    own = sweep.unsteadiness
+    if own.size > 2 * BESIDE:  # a transient that swings may hide from one point, not from those beside it
+        own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)
+    return own / -np.expm1(-window / slowest) + ROUNDING
 
 
 def _decibel(value: Reading, more_db: float = 0.0) -> Reading:
@@ -288,9 +301,10 @@ def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
 
 
 def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
-    """Run the drive with a step and without; times and difference at the updates of the point, and what limits.
+    """Run the drive with a step and without; times and difference at the updates of the point.
 
-    What the start leaves to settle is in both.  The last is the largest difference of the output angle.
+    What the start leaves to settle is in both.  Then what limited it, and the largest difference of the
+    output angle.
     """
     n, runs = setup.hold_ticks, []
     for height in (0.0, size):

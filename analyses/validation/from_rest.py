@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, inf
 
 import numpy as np
 import numpy.typing as npt
@@ -70,9 +70,10 @@ def _reason(design: Design, result: BatchResult, k: int) -> str:
 def nonlinear_parts(design: Design) -> list[str]:
     """What a motion about rest meets that no linear loop holds, in words."""
     friction, load, place = design.friction, design.load, design.controller.position
-    behind, coupling = load.friction, design.coupling
+    behind, coupling, profile = load.friction, design.coupling, design.command
     there = {
-        "dry friction": friction.dry_Nm(0.0) > 0.0 or bool(friction.points),
+        "dry friction": friction.dry_Nm(0.0) > 0.0,
+        "friction map": bool(friction.points),
         "offset torque": friction.offset_torque_Nm != 0.0,
         "viscous friction that differs by direction": friction.viscous(1) != friction.viscous(-1),
         "friction of the load": behind is not None
@@ -81,6 +82,7 @@ def nonlinear_parts(design: Design) -> list[str]:
         "friction of the load's moment": friction.load_coefficient > 0.0 and load.moment_slope_Nm_rad != 0.0,
         "play": coupling is not None and coupling.play_rad > 0.0,
         "gravity": load.gravity is not None,
+        "profile of the command": min(profile.rate_rad_s, profile.acceleration_rad_s2) < inf,
         "friction feed-forward": place is not None and place.friction_feedforward != 0.0,
         "counts of an encoder": not (design.angle_quantum_rad is None and design.output_quantum_rad is None),
         "noise of the instruments": not design.instruments.ideal,
@@ -134,6 +136,8 @@ def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep) -> li
     parts = nonlinear_parts(design)
     if not np.isfinite(sweep.described).any() and bool((sweep.stick_fraction > 0.0).any()):
         parts = ["dry friction holds the rotor"]
+    if design.controller.position_loop.every > 1:
+        parts.append("seen between the samples of the position loop as well")
     reason = ", ".join([*parts, acting] if acting else parts)
     condition = "response to the command (with feed-forward), from rest, sine clear of every limit"
     spread = float(sweep.unsteadiness.max())

@@ -10,21 +10,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log, log10
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
 from analyses.loop_figures import LoopFigures
 from analyses.validation.borders import LONGEST_DELAY_SAMPLES
 from analyses.validation.confirm import Confirmation
 from analyses.validation.figures import Measured, hertz, most_frequent
 from analyses.validation.reading import Reading
-from analyses.validation.response import SweepErrors
+from analyses.validation.response import Sweep, SweepErrors, linear_response
 from analyses.validation.tolerance import PREDICTED, allowed
 
 SMALL = "feedback loop, small signal"
 NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
 NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
 DECIBEL = 20.0 / log(10.0)  # dB per unit of a small relative change
+COMMAND_SURE = 10.0  # changes between windows: a transient slower than the window has more to go
 ROUND = 1e-9  # of a tolerance: the rounding of its own sum
 
 
@@ -115,7 +118,10 @@ def loop_entries(
         peaks = figures.peaks
         rows.append(entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak))
         T = peaks.complementary_db
-        rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak))
+        if found.no_dc:
+            rows.append(not_judged(name, "complementary_peak", "dB", T, None, found.no_dc))
+        else:
+            rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak))
     rows = [_unless_hidden(row, figures, found) for row in rows]
     rows += _step_entries(name, figures, found)
     return [replace(row, condition=words) if row.condition == SMALL else row for row in rows]
@@ -186,6 +192,8 @@ def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     band = figures.bandwidth
     if band is None:
         return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth.value, _why(figures))]
+    if found.no_dc:
+        return [not_judged(name, "bandwidth", "Hz", hertz(band.minus3db_rad_s), None, found.no_dc)]
     if band.resonance_peak_db > NO_DC_DB:
         why = "the loop has no gain at zero frequency that bandwidth and resonance could be related to"
         return [not_judged(name, "bandwidth", "Hz", None, None, why)]
@@ -236,6 +244,24 @@ def _step_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
             least=sample,
         ),
     ]
+
+
+def command_entry(design: Design, sweep: Sweep, system: Any) -> Entry:
+    """The response to the command, with feed-forward and filters, at its worst point."""
+    loop = design.controller.outermost
+    words = "response to the command (with feed-forward), small signal"
+    valid = sweep.valid
+    if not valid.any():
+        why = f"no frequency could be measured: {most_frequent(sweep.reason)}"
+        return not_judged(loop, "response_command", "%", 0.0, None, why, words)
+    off = np.abs(sweep.closed_loop[valid] / linear_response(system, sweep.frequency_hz[valid]) - 1.0)
+    may = allowed(COMMAND_SURE * sweep.unsteadiness[valid], 1.0)
+    k = int(np.argmax(off / may))
+    hertz = sweep.frequency_hz[valid][k]
+    where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"
+    passed = bool(off[k] <= may[k])
+    row = (100.0 * float(off[k]), 100.0 * float(may[k]))
+    return Entry(loop, "response_command", "%", words, 0.0, *row, passed, where)
 
 
 QUANTITY = {

@@ -85,6 +85,8 @@ class Validation:
     conditional : Conditional or None
     rest_sweep : RestSweep or None
     rest_steps : RestSteps or None
+    command : Sweep or None
+        Response to the command.
     large_signals, friction, specification : results or None
         Of `analyses.large_signal`, `analyses.friction_effects`, `analyses.specification`.
     seconds : mapping of str to float
@@ -106,6 +108,7 @@ class Validation:
     specification: Specification | None
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = ()
+    command: Sweep | None = None
 
     @property
     def failed(self) -> tuple[Entry, ...]:
@@ -113,17 +116,24 @@ class Validation:
         return tuple(row for row in self.ledger if row.passed is False)
 
     @property
+    def judged(self) -> bool:
+        """Whether there is a prediction that could be judged."""
+        return any(row.passed is not None for row in self.ledger)
+
+    @property
     def passed(self) -> bool:
-        """Whether all predictions hold, and no command within full deflection makes the drive diverge."""
+        """Whether predictions were judged, all hold, and no command within full deflection diverges."""
         unstable = any(not loop.figures.stable for loop in self.loops.values())
         diverges = self.conditional is not None and self.conditional.found
         border = None if self.large_signals is None else self.large_signals.border
         off = border is not None and border.passed is False
-        return not (self.failed or unstable or diverges or off)
+        return self.judged and not (self.failed or unstable or diverges or off)
 
     def __str__(self) -> str:
         judged = [row for row in self.ledger if row.passed is not None]
         held = sum(row.passed is True for row in judged)
+        if not judged:
+            return f"{self.design.name}: nothing judged: no linear prediction could be compared"
         words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
         if self.conditional is not None and self.conditional.found:

@@ -149,6 +149,7 @@ class Rig:
         self.ride.load(row)
         row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
         row["twist_start"] = self.ride.twist_rad
+        row["angle_start"] = self.twisted
         row["load_speed_start"] = self.ride.speed_rad_s / self.design.ratio_to_coupling
         wanted, point = self.ride.voltage_V, "u"
         row["voltage_start"] = wanted
@@ -188,11 +189,23 @@ class Rig:
 
     def _position(self, row: Rows, wanted: float) -> None:
         """Let the command run with the drive, the motor behind it by what the controller needs."""
-        behind = wanted / row.value("position_gain")
-        if self.design.controller.position_loop.sensor == "output":
-            behind -= self.design.ratio_to_coupling * self.ride.twist_rad
-        row["angle_start"] = -behind
+        row["angle_start"] = self.twisted - wanted / row.value("position_gain")
+        seen = 0.0 if self.design.controller.position_loop.sensor == "output" else self.twisted
+        if self.ride.speed_rad_s == 0.0:
+            row.step("bias", seen / self.design.total_ratio, -1.0)
+            return
+        row["angle_start"] -= seen
         row.ramp("bias", self.ride.speed_rad_s / self.design.total_ratio)
+
+    @property
+    def twisted(self) -> float:
+        """Motor angle at which the output stands at zero."""
+        return self.design.ratio_to_coupling * self.ride.twist_rad
+
+    @property
+    def steady_start(self) -> bool:
+        """Whether the steady state is known that a run begins in."""
+        return not (self.outer == "position" and remembers(self.design) and self.ride.speed_rad_s != 0.0)
 
     @staticmethod
     def _constant(row: Rows, point: str, value: float) -> None:

@@ -7,17 +7,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf, pi
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Command, Design, Instruments
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
+from analyses.validation.bench import on_the_bench
 from analyses.validation.budget import Budget, OutOfTime
+from analyses.validation.commanded import command_sweep
 from analyses.validation.conditional import Conditional, conditional_stability
 from analyses.validation.confirm import (
     Confirmation,
@@ -28,13 +31,20 @@ from analyses.validation.confirm import (
 )
 from analyses.validation.figures import NotMeasured, hertz, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
-from analyses.validation.ledger import Entry, loop_entries, not_judged, point_entries
+from analyses.validation.ledger import (
+    Entry,
+    command_entry,
+    loop_entries,
+    not_judged,
+    point_entries,
+)
 from analyses.validation.release import AmplitudeMargin, release_margins
-from analyses.validation.response import linear_response, sweep_errors
+from analyses.validation.response import Sweep, linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.riding import has_to_stand, on_its_stand, ride
+from analyses.validation.riding import has_to_stand, may_stand, on_its_stand, ride
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
+from analyses.validation.steady import steady_entry
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tones import tone_sweep
 from nonlinear import Rows
@@ -54,6 +64,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 ABOUT = (0.98, 1.0, 1.02)  # frequencies about each figure, beside the grid
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
 PER_DECADE = 6  # frequencies of a sweep, at least
+ANSWERS = 12  # frequencies of the response to the command
 BELOW = 20.0  # the sweep begins so far below the lowest figure
 
 
@@ -115,8 +126,9 @@ class _Work:
     figures: dict[str, LoopFigures] = field(default_factory=dict)
     settle: dict[str, int] = field(default_factory=dict)
     held: Loop | None = None
+    answer_loops: Any = None
     done: int = 0
-    STEPS = 9
+    STEPS = 11
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
@@ -149,6 +161,12 @@ class _Work:
             confirmed = self._within(0.5, "margins in time", self._confirm, ())
         with self.timed("break points"):
             points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
+        with self.timed("response to the command"):
+            answer = self._within(0.2, "response to the command", self._answer, None) if stable else None
+        with self.timed("constant speed"):
+            steady = (
+                self._within(0.1, "constant speed", self._steady, None) if self.settle and stable else None
+            )
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -171,7 +189,12 @@ class _Work:
             loops[name] = _with_confirmations(loop, own)
         return Validation(
             design=self.design,
-            ledger=tuple(self._ledger(loops, points, rest_steps, rest_sweep)),
+            ledger=(
+                *self._ledger(loops, points, rest_steps, rest_sweep),
+                *self._answered(answer),
+                *([] if steady is None else [steady]),
+            ),
+            command=answer,
             loops=loops,
             points=points,
             amplitude_margins=released,
@@ -356,6 +379,48 @@ class _Work:
         """Figures of the response to the command, with feed-forward and filters."""
         return loop_figures(self.loops.present["position"], self.loops.reference_to_output)
 
+    @cached_property
+    def _steered(self) -> Design:
+        """The drive on the bench with its command filter; a faint command does not reach the profile."""
+        filtered = replace(self.design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+        return replace(self.linear, command=filtered)
+
+    def _answer(self) -> Sweep | None:
+        """The response to the command at frequencies about its own figures."""
+        from actuator_lti.loops import assemble_loops
+
+        design, response = self._steered, self.loops.reference_to_output
+        if response is None:
+            return None
+        # where it stands here, it has the slope of friction at rest, not that of its ride
+        self.answer_loops = assemble_loops(self._model_steered) if may_stand(design) else self.loops
+        system = self.answer_loops.reference_to_output
+        base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
+        settle = settling_ticks_of(system, base, design.name)
+        top = HIGHEST / (base * design.controller.period_s)
+        marks = [x for name in self.figures for x in self._marks(name)]
+        marks += [1.0 / (2.0 * pi * design.command.filter_time_s)] if design.command.filter_time_s else []
+        middle = [x for x in marks if x < 0.5 * top] or [0.05 * top]
+        low = max(min(middle) / 3.0, LOWEST * top)
+        asked = np.geomspace(low, min(3.0 * max(middle), top), ANSWERS)
+        return command_sweep(design, asked, settle)
+
+    def _steady(self) -> Entry:
+        return steady_entry(self.linear, on_the_bench(self.model), max(self.settle.values()))
+
+    @cached_property
+    def _model_steered(self) -> Design:
+        filtered = replace(self.model.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+        bench = on_the_bench(self.model)
+        bench = on_its_stand(bench) if has_to_stand(self.linear) else bench
+        return replace(bench, command=filtered)
+
+    def _answered(self, sweep: Sweep | None) -> list[Entry]:
+        """The worst point of the response to the command."""
+        if sweep is None:
+            return []
+        return [command_entry(self.design, sweep, self.answer_loops.reference_to_output)]
+
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
         design, settle = self.design, self.settle["position"]
@@ -425,17 +490,6 @@ class _Work:
         if steps is not None:
             rows += rest_entries(self.design, self._commanded, steps, sweep)
         return rows
-
-
-def on_the_bench(design: Design) -> Design:
-    """A drive as its loops are tested: ideal instruments, and the command taken as it is."""
-    return replace(
-        design,
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
-        instruments=Instruments(),
-        command=Command(),
-    )
 
 
 def _with_confirmations(loop: LoopValidation, confirmed: tuple[Confirmation, ...]) -> LoopValidation:

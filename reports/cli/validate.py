@@ -40,8 +40,9 @@ def validate(
 ) -> None:
     """Check every linear prediction against the nonlinear simulation.
 
-    Exit status 1 if a prediction fails where it should hold, or if a command within full deflection makes the
-    drive diverge. Predictions that cannot hold (friction, a limit) are shown with the reason.
+    Exit status 1 if a prediction fails where it should hold, if a command within full deflection makes the
+    drive diverge, or if nothing could be judged. Predictions that cannot hold (friction, a limit) are shown
+    with the reason.
     """
     from analyses.isolation import isolated
     from analyses.validation import QUICK, Settings
@@ -118,7 +119,8 @@ def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ..
     print_blocks(tables, found.notes)
     for path in paths:
         print_line(str(path))
-    print_line(f"{'PASS' if found.passed else 'FAIL'}  {found}")
+    verdict = "PASS" if found.passed else "FAIL" if found.judged else "NOTHING JUDGED"
+    print_line(f"{verdict}  {found}")
     print_line(f"{sum(found.seconds.values()):.1f} s")
 
 
@@ -133,6 +135,7 @@ def _ledger(rows: Any, caption: str) -> dict[str, Any]:
         doc.column("measured", "Simulated", format="sig:5"),
         doc.column("unit", ""),
         doc.column("difference", "Difference", format="sig:2"),
+        doc.column("tolerance", "Allowed", format="sig:2"),
         doc.column("verdict", "Verdict"),
         doc.column("why", "Under, because"),
     ]

@@ -9,6 +9,7 @@ from typing import Any
 from analyses.validation.confirm import Confirmation
 from analyses.validation.release import AmplitudeMargin
 from analyses.validation.result import Validation
+from analyses.validation.tolerance import allowed
 from reports import document as doc
 from reports.findings import Finding
 from reports.numbers import significant
@@ -65,18 +66,23 @@ def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) 
             for item in items
             if item.difference is not None
         ],
-        "tolerance": items[0].tolerance,
+        "tolerance": _allowed(items),
         "released": _series(released),
     }
     worst = max((abs(item.difference) for item in items if item.difference is not None), default=0.0)
     caption = (
         "Left: margin found in time relative to the linear margin, largest difference "
         f"{significant(worst, 2)} "
-        f"(allowed {items[0].tolerance:g}). Right: the same margins after release from rest at small, medium "
-        "and "
-        "large deviations, limits active, with and without dry friction."
+        f"(allowed up to {_allowed(items):.2g}, from its own error). Right: the same margins after release "
+        "from rest at small, medium and large deviations, limits active, with and without dry friction."
     )
     return doc.figure("confirmation", data, caption=caption, alt=caption)
+
+
+def _allowed(items: Sequence[Confirmation]) -> float:
+    """The widest tolerance of a margin that was found, relative."""
+    errors = (item.error for item in items if item.difference is not None)
+    return float(f"{allowed(max(errors, default=0.0), 1.0):.2g}")
 
 
 def _remarks(released: Sequence[AmplitudeMargin]) -> list[str]:

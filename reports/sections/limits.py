@@ -20,6 +20,9 @@ NAMES = {
     "acceleration": "acceleration limit",
     "current": "peak current",
     "voltage": "voltage",
+    "torque-command": "limit in front of the torque filters",
+    "overload": "overload protection",
+    "profile": "profile of the command",
 }
 
 

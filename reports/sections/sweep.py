@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.result import LoopValidation, PointValidation, Validation
+from analyses.validation.tolerance import allowed
 from reports import document as doc
 from reports.document import rounded
 from reports.numbers import significant
 
-GAIN_DB, PHASE_DEG = 0.01, 0.1  # what the measurement must meet up to a third of Nyquist
 NAMES = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 
 
@@ -33,6 +34,18 @@ def worst_below_third(loop: LoopValidation) -> tuple[float, float]:
     low = _low(loop)
     gain, phase = (np.abs(x[low]) for x in (loop.open_errors.gain_db, loop.open_errors.phase_deg))
     return float(gain.max(initial=0.0)), float(phase.max(initial=0.0))
+
+
+def allowed_below_third(loop: LoopValidation) -> tuple[float, float]:
+    """What the measurement itself may be off by there, in dB and deg (`analyses.validation.tolerance`)."""
+    assert loop.measured is not None
+    may = float(allowed(loop.measured.point_error[_low(loop)].max(initial=0.0), 1.0))
+    return 20.0 * may / np.log(10.0), float(np.degrees(may))
+
+
+def agrees(loop: LoopValidation) -> bool:
+    """Whether the open loop agrees up to a third of Nyquist."""
+    return all(x <= y for x, y in zip(worst_below_third(loop), allowed_below_third(loop), strict=True))
 
 
 def _low(loop: LoopValidation) -> np.ndarray:
@@ -59,9 +72,7 @@ def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
         "limits "
         "of the drive are active; the amplitudes stay below them."
     )
-    good = all(
-        worst_below_third(x)[0] <= GAIN_DB and worst_below_third(x)[1] <= PHASE_DEG for x in shown.values()
-    )
+    good = all(agrees(loop) for loop in shown.values())
     worst = [worst_below_third(loop) for loop in shown.values()]
     gain, phase = (max((pair[k] for pair in worst), default=0.0) for k in (0, 1))
     result = (
@@ -88,13 +99,13 @@ def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
         _panel("open loop L", loop.open_loop, sweep.open_loop),
         _panel("closed loop T", loop.closed_loop, sweep.closed_loop),
     ]
-    third = 0.5 / sweep.period_s / 3.0
+    third, may = 0.5 / sweep.period_s / 3.0, allowed_below_third(loop)
     data = {
         "frequency_hz": rounded(f),
         "valid_to_hz": third,
         "panels": panels,
-        "tolerance_db": GAIN_DB,
-        "tolerance_deg": PHASE_DEG,
+        "tolerance_db": rounded([may[0]], 3)[0],
+        "tolerance_deg": rounded([may[1]], 3)[0],
     }
     gain, phase = worst_below_third(loop)
     caption = (
@@ -182,6 +193,8 @@ def _decibels(values: np.ndarray) -> np.ndarray:
 def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
     """Make the section of the sweep from rest."""
     scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
+    moved = np.abs(sweep.described) > 0.0  # of NaN, too: no
+    sweep = replace(sweep, described=np.where(moved, sweep.described, np.nan))
     series = [
         ("measured from rest", sweep.measured, True),
         ("sliding loop", sweep.sliding, False),
@@ -199,7 +212,8 @@ def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
             for label, values, points in series
         ],
     }
-    off = sweep.measured / sweep.described
+    still = (sweep.measured == 0.0) | (sweep.described == 0.0)
+    off = np.where(still, np.nan, sweep.measured) / np.where(still, np.nan, sweep.described)
     gain = float(np.nanmax(np.abs(20.0 * np.log10(np.abs(off)))))
     phase = float(np.nanmax(np.abs(np.degrees(np.angle(off)))))
     low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale

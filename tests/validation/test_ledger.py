@@ -11,6 +11,7 @@ import pytest
 from actuator_lti import InputError, load_design
 from analyses.validation import QUICK, Settings, Validation, validate
 from analyses.validation.ledger import Entry, entry, not_judged
+from analyses.validation.reading import Reading
 from analyses.validation.riding import ride, riding_at
 from reports.cli.main import main
 from reports.sections.validation import section
@@ -97,16 +98,16 @@ def test_without_friction_and_limits_steps_from_rest_are_judged() -> None:
 
 
 def test_a_failure_is_a_failure() -> None:
-    assert entry("position", "bandwidth", "Hz", 10.0, 10.02, 0.01).passed is False
-    assert entry("position", "bandwidth", "Hz", 10.0, 10.005, 0.01).passed is True
-    assert entry("position", "bandwidth", "Hz", 10.0, None, 0.01).passed is False
-    assert entry("position", "gain_margin", "dB", None, 3.0, 0.01).passed is False
-    assert entry("position", "gain_margin", "dB", float("inf"), None, 0.01).passed is True
+    assert entry("position", "bandwidth", "Hz", 10.0, Reading(10.02, 0.01 / 3.0)).passed is False
+    assert entry("position", "bandwidth", "Hz", 10.0, Reading(10.005, 0.01 / 3.0)).passed is True
+    assert entry("position", "bandwidth", "Hz", 10.0, Reading(None, 0.01 / 3.0)).passed is False
+    assert entry("position", "gain_margin", "dB", None, Reading(3.0, 0.01 / 3.0)).passed is False
+    assert entry("position", "gain_margin", "dB", float("inf"), Reading(None, 0.01 / 3.0)).passed is True
     assert not_judged("position", "overshoot", "%", 1.0, 2.0, "a limit").passed is None
 
 
 def test_a_failed_entry_fails_the_validation(found: Validation) -> None:
-    bad = entry("position", "bandwidth", "Hz", 10.0, 10.02, 0.01)
+    bad = entry("position", "bandwidth", "Hz", 10.0, Reading(10.02, 0.01 / 3.0))
     worse = replace(found, ledger=(*found.ledger, bad))
     assert worse.failed == (bad,)
     assert not worse.passed

@@ -55,6 +55,21 @@ def friction_doubled(design: Design) -> Design:
     return replace(design, friction=replace(friction, viscous_Nms_rad=2.0 * friction.viscous_Nms_rad))
 
 
+def dry_friction_doubled(design: Design) -> Design:
+    friction = design.friction
+    return replace(design, friction=replace(friction, dry_torque_Nm=2.0 * friction.dry_torque_Nm))
+
+
+def command_filter(design: Design) -> Design:
+    return replace(design, command=replace(design.command, filter_time_s=1e-4))
+
+
+def feedforward(design: Design) -> Design:
+    control = design.controller
+    position = replace(control.position_loop, feedforward=0.01)
+    return replace(design, controller=replace(control, position=position))
+
+
 def sign_of_back_emf(design: Design) -> Design:
     return motor(design, back_emf_constant_Vs_rad=-1.0)
 
@@ -74,6 +89,9 @@ CAUGHT_BY: tuple[tuple[Callable[[Design], Design], set[str]], ...] = (
     (friction_doubled, {"bandwidth_90deg", "resonance_peak", "complementary_peak", "settling_time"}),
     (sign_of_back_emf, {"bandwidth", "computing_delay_margin", "resonance"}),
     (integral_time, {"overshoot", "delay_margin"}),
+    (dry_friction_doubled, {"steady_current"}),
+    (command_filter, {"response_command"}),
+    (feedforward, {"response_command"}),
 )
 
 
