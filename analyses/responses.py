@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.errors import NumericalError
+
 if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
 
@@ -51,11 +53,20 @@ def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
     system : python-control system or DelaySystem
     omega_rad_s : ndarray, shape (K,)
         Positive; at most Nyquist for a sampled system.
+
+    Notes
+    -----
+    Where the phase cannot be followed (an undamped spring: a zero or pole on the axis), it is that of the
+    points, made continuous from one to the next.
     """
     from actuator_lti.phase import unwrapped_phase_deg
 
     values = response_at(system, omega_rad_s)
-    return Curve(omega_rad_s, values, np.asarray(unwrapped_phase_deg(system, omega_rad_s)))
+    try:
+        phase = np.asarray(unwrapped_phase_deg(system, omega_rad_s))
+    except NumericalError:
+        phase = np.degrees(np.unwrap(np.angle(values)))
+    return Curve(omega_rad_s, values, phase)
 
 
 def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:

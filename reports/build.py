@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from analyses.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
-FURTHER = ("failures", "duty", "corners")
+FURTHER = ("failures", "duty", "cycles", "corners")
 """Sections that a report has only where they are asked for, as they take their time."""
 
 

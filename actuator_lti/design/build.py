@@ -73,7 +73,10 @@ class Builder:
         try:
             value = self.quantity(text, field)
         except InputError as error:
-            raise self.refuse(path, text, error.message) from None
+            upside = _upside_down(text) if field.path == "motor.back_emf_constant" else None
+            if upside is None:
+                raise self.refuse(path, text, error.message) from None
+            value = self._number(path, upside, field)
         if field.kind == "integer" and value != int(value):
             raise self.refuse(path, text, "allowed: a whole number")
         if not field.accepts(value):
@@ -224,3 +227,14 @@ class Builder:
             parameters=FrozenMap(self.parameters),
             **parts,
         )
+
+
+def _upside_down(text: Any) -> str | None:
+    """The back-EMF constant of a speed constant, as many data sheets have it: ``"83.4 rpm/V"``."""
+    for unit, turned in (("rad/(V*s)", "V*s/rad"), ("m/(V*s)", "V*s/m")):
+        try:
+            value = parse_quantity(text, unit)
+        except InputError:
+            continue
+        return f"{1.0 / value!r} {turned}" if value > 0.0 else None
+    return None

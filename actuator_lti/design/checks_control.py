@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isfinite, pi
+from math import degrees, isfinite, pi
 
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.errors import InputError
@@ -187,18 +187,30 @@ def _command(design: Design, refuse: Refuse) -> None:
     given = {key: value for key, value in profile.items() if isfinite(value)}
     if given and design.controller.position is None:
         key, value = next(iter(given.items()))
-        raise refuse(f"command.{key}", f"{value:g}", "allowed with a position loop")
+        raise refuse(f"command.{key}", _written(design, key, value), "allowed with a position loop")
     for key, outer in (("acceleration", "rate"), ("jerk", "acceleration")):
         if key in given and outer not in given:
-            raise refuse(f"command.{key}", f"{given[key]:g}", f"needs command.{outer}")
+            raise refuse(f"command.{key}", _written(design, key, given[key]), f"needs command.{outer}")
     for key, limit in (("rate", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
         if key in given and given[key] * ratio > limit * (1 + 1e-9):
             name = {"rate": "speed", "acceleration": "acceleration"}[key]
-            raise refuse(
-                f"command.{key}",
-                f"{given[key]:.6g}",
-                f"faster than limits.{name}; allowed: at most {limit / ratio:.6g} at the output",
-            )
+            most = f"{limit / ratio:.6g} {_unit(design, key)}"
+            if design.axis == "rotary":
+                most += f" ({degrees(limit / ratio):.6g} {_unit(design, key).replace('rad', 'deg')})"
+            words = f"faster than limits.{name}; allowed: at most {most} at the output"
+            raise refuse(f"command.{key}", _written(design, key, given[key]), words)
+
+
+def _unit(design: Design, key: str) -> str:
+    """SI unit of a profile's limit."""
+    power = {"rate": "", "acceleration": "^2", "jerk": "^3"}[key]
+    return ("m/s" if design.axis == "linear" else "rad/s") + power
+
+
+def _written(design: Design, key: str, value: float) -> str:
+    """A profile's limit as the file has it, else in SI."""
+    parameter = design.parameters.get(f"command.{key}")
+    return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
 
 
 def _gravity(design: Design, refuse: Refuse) -> None:

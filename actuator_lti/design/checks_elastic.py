@@ -61,7 +61,12 @@ def _self_locking(design: Design, where: str) -> None:
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:
-    """A rigid self-locking drive whose load friction is too small to lock it."""
+    """A rigid self-locking drive that cannot lock its load, and a spring that nothing damps."""
+    behind = design.load.friction
+    if design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
+        free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
+        if free:
+            yield "coupling.damping: 0, and no load.friction: with the motor at rest the load rings for ever"
     least = 1.0 / design.total_ratio
     loaded = design.load.moment_max_Nm > 0.0
     rigid = design.coupling is None and design.load.path == "self-locking"

@@ -68,7 +68,7 @@ _MOTOR = (
     _positive("motor.torque_constant", "torque_constant_Nm_A", "{torque}/A", "kM", "torque per ampere",
               example="5.9 mN*m/A"),
     _positive("motor.back_emf_constant", "back_emf_constant_Vs_rad", "V*s/{angle}", "kE",
-              "back-EMF per rad/s", example="5.9 mV*s/rad"),
+              "back-EMF per rad/s; a speed constant, 83.4 rpm/V, is turned over", example="5.9 mV*s/rad"),
     _choice("motor.constants", "constants", ("dc", "rms-line", "peak-phase"),
             "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
             "line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L per phase)"),

@@ -11,7 +11,7 @@ import typer
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
     "Linear loops": ("margins", "stiffness", "corners", "report", "pdf"),
-    "Nonlinear checks": ("simulate", "validate", "failures", "duty"),
+    "Nonlinear checks": ("simulate", "validate", "failures", "duty", "cycles"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
     "Variants and history": ("compare", "montecarlo", "tune", "nightly"),

@@ -35,7 +35,7 @@ AlsoOption = Annotated[
     typer.Option(
         "--also",
         metavar="SECTION",
-        help="Add what takes its time: failures, duty, corners, or all (repeatable).",
+        help="Add what takes its time: failures, duty, cycles, corners, or all (repeatable).",
     ),
 ]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
@@ -56,7 +56,7 @@ def report(
 
     The page needs no network and opens from disk. With --json the document also goes to standard output.
     With --include the results of identify and correlate become sections of it; with --also
-    failure cases, duty cycle and corners.
+    failure cases, duty cycle, limit cycles and corners.
     """
     from reports.build import FURTHER, design_report, further_sections, write_report
     from reports.cli.errors import leave_with

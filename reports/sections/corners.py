@@ -45,12 +45,14 @@ def summary(result: Corners) -> str:
     if not failed:
         return f"Every loop is stable and every requirement met at all {len(result.corners)} corners."
     share = f"{len(failed)} of {len(result.corners)} corners"
-    return f"Not every requirement is met at {share}: {'; '.join(failed)}."
+    return f"Not every loop is stable and every requirement met at {share}: {'; '.join(failed)}."
 
 
 def unmet(corner: Corner) -> str:
     """Name what a corner fails."""
-    loops = [f"{name} loop not stable" for name, one in corner.figures.items() if not one.stable]
+    doubts = {name: one.margins.stable for name, one in corner.figures.items() if not one.stable}
+    known = {None: "not known to be stable", False: "not stable"}
+    loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
     return ", ".join([*loops, *(one.id for one in corner.verdicts if one.passed is False)])
 
 

@@ -1,0 +1,98 @@
+"""What the analysis of limit cycles returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from actuator_lti.design.model import Design
+from analyses.friction_effects.cycles import Settling
+
+Cause = Literal["play", "quantisation"]
+Verdict = Literal["confirmed", "refuted"]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A limit cycle by describing function.
+
+    Attributes
+    ----------
+    cause : {"play", "quantisation"}
+    with_friction : bool
+        Whether the drive's dry friction, by its own describing function, is in it.
+    output_rad : float
+        Amplitude of the output, peak.
+    inner_rad : float
+        Amplitude of what the nonlinearity sees: the twist at the coupling, or the sensor's angle.
+    frequency_hz : float
+    stable : bool
+        Whether motion near it comes nearer; ``False``: the border between dying out and growing.
+    state : dict of str to complex
+        Its shape by state of the loop, at this amplitude.
+    """
+
+    cause: Cause
+    with_friction: bool
+    output_rad: float
+    inner_rad: float
+    frequency_hz: float
+    stable: bool
+    state: dict[str, complex]
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A foreseen cycle against the simulator, started in its shape at several sizes.
+
+    Attributes
+    ----------
+    ratio : float or None
+        Amplitude of the output over the foreseen one: of a stable cycle where the motion ends, of an unstable
+        one the size from which it grows; ``None``: refuted.
+    frequency_hz : float or None
+        Where the motion ends, of a stable one.
+    """
+
+    cycle: Cycle
+    ratio: float | None
+    frequency_hz: float | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """In one word."""
+        return "refuted" if self.ratio is None else "confirmed"
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What a step ends in, the drive as it is."""
+
+    load_Nm: float
+    settling: Settling
+
+
+@dataclass(frozen=True)
+class LimitCycles:
+    """Cycles of one design.
+
+    Attributes
+    ----------
+    confirmations : tuple of Confirmation
+        Every foreseen cycle.
+    rests : tuple of Rest
+        Steps of two sizes at every load of the design, waited for.
+    looked_for : tuple of str
+        The causes that the design has.
+    """
+
+    design: Design
+    confirmations: tuple[Confirmation, ...]
+    rests: tuple[Rest, ...]
+    looked_for: tuple[str, ...]
+
+    @property
+    def hunting(self) -> Rest | None:
+        """The largest cycle that a step of the drive as it is ended in; None: it rests."""
+        swings = [one for one in self.rests if one.settling.hunting]
+        return max(swings, key=lambda one: one.settling.hunting_rad or 0.0, default=None)

@@ -1,0 +1,112 @@
+"""Foresee limit cycles, start the simulator in their shape, and wait what the drive as it is ends in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.friction_effects.cycles import settle, simulate_row
+from analyses.large_signal.steady_start import PLACES
+from analyses.limit_cycles.foreseen import cycles_of_play, cycles_of_quantisation, without_nonlinearities
+from analyses.limit_cycles.result import Confirmation, Cycle, LimitCycles, Rest
+from nonlinear import Rows
+
+SCALES = np.geomspace(0.4, 2.5, 41)
+CYCLES_WATCHED = 24
+_STARTS = {**PLACES, "W": "load_speed_start", "twist": "twist_start"}
+
+
+def limit_cycles(design: Design) -> LimitCycles:
+    """Limit cycles of play and of quantisation, and what steps of the drive as it is end in.
+
+    Cycles of play are foreseen without dry friction and with it; those of dry friction alone are
+    `analyses.friction_effects`.
+
+    Raises
+    ------
+    InputError
+        For a drive without a position loop.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> limit_cycles(load_design("fin")).looked_for
+    ('play', 'quantisation')
+    """
+    if design.controller.position is None:
+        raise InputError("limit cycles: needs a drive with a position loop")
+    has_play = design.coupling is not None and design.coupling.play_rad > 0.0
+    quantised = design.output_quantum_rad is not None and design.controller.position.sensor == "output"
+    foreseen = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
+    foreseen += cycles_of_quantisation(design)
+    full = design.validation.full_deflection_rad
+    rests = tuple(
+        Rest(load, settle(design, load, share * full))
+        for load in design.validation.loads_Nm
+        for share in (min(design.validation.amplitude_fractions), 1e-3)
+    )
+    causes = (("play", has_play), ("quantisation", quantised))
+    looked_for = tuple(name for name, there in causes if there)
+    return LimitCycles(design, tuple(confirm(design, cycle) for cycle in foreseen), rests, looked_for)
+
+
+def confirm(design: Design, cycle: Cycle) -> Confirmation:
+    """Start in the cycle's shape at many sizes; find where motion turns from growing to dying out, or back.
+
+    Of several such sizes the one nearest to the foreseen counts.
+    """
+    tried = _tried(design, cycle)
+    window = round(3.0 / (cycle.frequency_hz * design.controller.period_s))
+    rows = Rows.of(tried, len(SCALES), friction_on=cycle.with_friction, limits_on=False)
+    rows.step("command", _centre(design, cycle))
+    for name, value in cycle.state.items():
+        if name in _STARTS and (tried.coupling is not None or name not in ("W", "twist")):
+            rows[_STARTS[name]] = SCALES * value.real
+    rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
+    rows.window(window, 3, 0)
+    rows["ticks"] = CYCLES_WATCHED // 3 * window
+    result = rows.run()
+    low, high = result.span("output_angle_rad")
+    size = 0.5 * (high - low)
+    grows = ~result.ok | (size > SCALES * cycle.output_rad)
+    turns = np.flatnonzero((grows[1:] != grows[:-1]) & (grows[:-1] == cycle.stable))
+    if not turns.size:
+        return Confirmation(cycle, None, None)
+    ratios = np.sqrt(SCALES[turns] * SCALES[turns + 1])
+    nearest = int(np.argmin(np.abs(np.log(ratios))))
+    frequency = simulate_row(rows.take(int(turns[nearest])), window)
+    return Confirmation(cycle, float(ratios[nearest]), frequency)
+
+
+def _centre(design: Design, cycle: Cycle) -> float:
+    """The command about which the cycle swings: half a count below the edge, as the mean of the sensor is."""
+    q = design.output_quantum_rad
+    return -0.5 * q if cycle.cause == "quantisation" and q is not None else 0.0
+
+
+def _tried(design: Design, cycle: Cycle) -> Design:
+    """The drive with the one nonlinearity that the cycle is of, and friction where it is in it."""
+    if cycle.cause == "quantisation":
+        return without_nonlinearities(design)
+    return replace(
+        design,
+        friction=replace(design.friction, load_coefficient=0.0),
+        encoder=replace(design.encoder, counts_per_rev=None),
+        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+    )
+
+
+def _speed_command(design: Design, cycle: Cycle) -> float:
+    """The speed command before the start, where the drive holds one."""
+    if design.controller.velocity is None:
+        return 0.0
+    if "hold_w_ref" in cycle.state:
+        return cycle.state["hold_w_ref"].real
+    behind = design.controller.position_loop.sensor == "output" and design.coupling is not None
+    angle = cycle.state["th"]
+    if behind:
+        angle = angle - design.ratio_to_coupling * cycle.state["twist"]
+    return -design.controller.position_loop.gain * angle.real

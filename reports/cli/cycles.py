@@ -1,0 +1,84 @@
+"""`actuator-lti cycles`: limit cycles of play and of a quantised sensor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports.cli.drive import SetOption, load_drive
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
+
+if TYPE_CHECKING:
+    from analyses.limit_cycles import LimitCycles
+
+
+def cycles(
+    design: DesignArgument = DEFAULT_DESIGN, changes: SetOption = None, as_json: JsonOption = False
+) -> None:
+    """Foresee limit cycles of play and of a quantised output sensor, and seek them in the simulator.
+
+    Each is foreseen by describing function in the exact sampled loop, then the simulator is started in its
+    shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are waited for. The exit status
+    is 1 where such a step ends in a cycle. In the report: --also cycles.
+    """
+    from analyses.limit_cycles import limit_cycles
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
+    from reports.sections.cycles import summary
+
+    found = limit_cycles(load_drive(design, changes))
+    if as_json:
+        print_json(_json(found))
+    else:
+        for line in [f"{found.design.name}: limit cycles", *_lines(found), summary(found)]:
+            print_line(line)
+    leave_with(found.hunting is None)
+
+
+def _json(found: LimitCycles) -> dict[str, Any]:
+    """SI, at the output."""
+    return {
+        "design": found.design.name,
+        "looked_for": list(found.looked_for),
+        "foreseen": [
+            {
+                "cause": one.cycle.cause,
+                "with_friction": one.cycle.with_friction,
+                "attracting": one.cycle.stable,
+                "amplitude": one.cycle.output_rad,
+                "frequency_hz": one.cycle.frequency_hz,
+                "simulated_amplitude": None if one.ratio is None else one.ratio * one.cycle.output_rad,
+                "simulated_hz": one.frequency_hz,
+            }
+            for one in found.confirmations
+        ],
+        "steps": [
+            {
+                "load": one.load_Nm,
+                "step": one.settling.amplitude_rad,
+                "hunting": one.settling.hunting,
+                "limited": one.settling.limited,
+                "amplitude": one.settling.hunting_rad,
+                "frequency_hz": one.settling.hunting_hz,
+            }
+            for one in found.rests
+        ],
+    }
+
+
+def _lines(found: LimitCycles) -> list[str]:
+    from reports.sections.cycles import CAUSES
+    from reports.sections.large_signal import output_unit
+
+    scale, unit = output_unit(found.design)
+    lines = []
+    for one in found.confirmations:
+        cycle = one.cycle
+        kind = "attracting" if cycle.stable else "border"
+        friction = "with" if cycle.with_friction else "without"
+        seen = "refuted by simulation"
+        if one.ratio is not None:
+            seen = f"simulated ±{scale * one.ratio * cycle.output_rad:.3g} {unit}"
+            seen += "" if one.frequency_hz is None else f" at {one.frequency_hz:.3g} Hz"
+        size = f"±{scale * cycle.output_rad:.3g} {unit} at {cycle.frequency_hz:.3g} Hz"
+        lines.append(f"  {CAUSES[cycle.cause]}, {friction} dry friction: {kind} cycle of {size}, {seen}")
+    return lines

@@ -1,0 +1,118 @@
+"""Limit cycles of play and quantisation: foreseen by describing function, then sought by simulation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reports import document as doc
+from reports.findings import Finding
+from reports.sections.large_signal import load_unit, output_unit
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.limit_cycles import Confirmation, LimitCycles, Rest
+
+CAUSES = {"play": "play", "quantisation": "quantised output sensor"}
+
+
+def of_design(design: Design) -> dict[str, Any]:
+    """Make the section of a report."""
+    from analyses.limit_cycles import limit_cycles
+
+    return section(limit_cycles(design))
+
+
+def section(result: LimitCycles) -> dict[str, Any]:
+    """Make the section from `analyses.limit_cycles.limit_cycles`."""
+    scale, unit = output_unit(result.design)
+    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    intro = (
+        "Play acts for a sinusoidal twist as a softer coupling, a sensor's count for a small swing about its "
+        "edge as a relay. A cycle is foreseen where the sampled loop with that gain keeps an oscillation's "
+        "size, then the simulator is started in its shape at many sizes. Cycles of dry friction alone stand "
+        "under Dry friction at small signals."
+    )
+    blocks: list[dict[str, Any]] = []
+    if result.confirmations:
+        blocks.append(_foreseen(result, fine, small))
+    else:
+        causes = (
+            " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
+        )
+        blocks.append(doc.text(f"No limit cycle of {causes} is foreseen."))
+    blocks.append(_rests(result, fine, small))
+    words = summary(result)
+    severity: Any = "info" if result.hunting is None else "warn"
+    return doc.section(
+        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=severity,
+        findings=[Finding(severity=severity, text=words, where="cycles")],
+    )  # fmt: skip
+
+
+def summary(result: LimitCycles) -> str:
+    """Say whether the drive as it is comes to rest."""
+    scale, unit = output_unit(result.design)
+    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    swing, count = result.hunting, len(result.confirmations)
+    seen = sum(one.verdict == "confirmed" for one in result.confirmations)
+    tail = f"; {seen} of {count} foreseen cycles confirmed" if count else "; none is foreseen"
+    if swing is None:
+        return f"The drive as it is comes to rest after every step{tail}."
+    one = swing.settling
+    size = f"±{fine * (one.hunting_rad or 0.0):.3g} {small} at {one.hunting_hz:.3g} Hz"
+    at = f"{swing.load_Nm:g} {load_unit(result.design)}" + (", a limit acting" if one.limited else "")
+    return f"The drive as it is does not come to rest: {size} under {at}{tail}."
+
+
+def _foreseen(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
+    columns = [
+        doc.column("cause", "Cause"),
+        doc.column("friction", "Dry friction"),
+        doc.column("kind", "Kind"),
+        doc.column("size", "Foreseen, peak", small, format="sig:3"),
+        doc.column("hz", "at", "Hz", format="sig:3"),
+        doc.column("seen", "Simulated", small, format="sig:3"),
+        doc.column("seen_hz", "at", "Hz", format="sig:3"),
+        doc.column("verdict", "Verdict"),
+    ]
+    note = (
+        "Attracting: motion near it ends in it. Border: smaller motion dies out, larger grows. Friction left "
+        "out or by its own describing function, as the column says; no limit acts."
+    )
+    rows = [_row(one, fine) for one in result.confirmations]
+    return doc.table("Foreseen limit cycles, at the output", columns, rows, note)
+
+
+def _row(one: Confirmation, fine: float) -> dict[str, Any]:
+    cycle = one.cycle
+    return {
+        "cause": CAUSES[cycle.cause],
+        "friction": "in it" if cycle.with_friction else "left out",
+        "kind": "attracting" if cycle.stable else "border",
+        "size": fine * cycle.output_rad,
+        "hz": cycle.frequency_hz,
+        "seen": None if one.ratio is None else fine * one.ratio * cycle.output_rad,
+        "seen_hz": one.frequency_hz,
+        "verdict": one.verdict,
+    }
+
+
+def _rests(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
+    columns = [
+        doc.column("load", "Load", load_unit(result.design), format="short:4"),
+        doc.column("step", "Step", small, format="sig:3"),
+        doc.column("end", "Ends"),
+        doc.column("size", "Swing, peak", small, format="sig:3"),
+        doc.column("hz", "at", "Hz", format="sig:3"),
+    ]
+    rows = [_rest_row(one, fine) for one in result.rests]
+    note = "The drive as it is: dry friction, play, quantisation and limits at work."
+    return doc.table("What steps end in", columns, rows, note)
+
+
+def _rest_row(rest: Rest, fine: float) -> dict[str, Any]:
+    one = rest.settling
+    swing = None if one.hunting_rad is None else fine * one.hunting_rad
+    end = "at rest" if not one.hunting else "in a cycle of its limits" if one.limited else "in a cycle"
+    row = {"load": rest.load_Nm, "step": fine * one.amplitude_rad, "end": end, "size": swing}
+    return {**row, "hz": one.hunting_hz, "_status": "warn" if one.hunting else None}

@@ -1,0 +1,122 @@
+"""Drives written as their data sheets have them."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+import pytest
+
+from actuator_lti.design import read_design_text, warnings_of, with_overrides
+from actuator_lti.drive.facts import capability
+from actuator_lti.errors import InputError
+from analyses.loop_survey import survey_loops
+from reports.sections import forms
+
+FLAT = """
+[design]
+name = "flat"
+[motor]
+resistance = "1.22 ohm"
+inductance = "0.705 mH"
+torque_constant = "114 mN*m/A"
+back_emf_constant = "83.4 rpm/V"
+rotor_inertia = "1210 g*cm^2"
+[[gear]]
+name = "harmonic"
+ratio = 100
+[coupling]
+stiffness = "1.6e4 N*m/rad"
+[load]
+inertia = "0.5 kg*m^2"
+path = "back-drivable"
+[friction]
+dry_torque = "30 mN*m"
+viscous = "2e-4 N*m*s/rad"
+[limits]
+voltage = "48 V"
+[control]
+period = "100 us"
+computing_delay = "100 us"
+[control.current]
+gain = "1.5 V/A"
+integral_time = "0.6 ms"
+[control.velocity]
+gain = "0.15 A*s/rad"
+integral_time = "50 ms"
+[control.position]
+gain = "15 1/s"
+every = 4
+[validation]
+full_deflection = "30 deg"
+"""
+SERVO = """
+[design]
+name = "servo"
+[motor]
+constants = "rms-line"
+resistance = "4.6 ohm"
+inductance = "13 mH"
+torque_constant = "0.93 N*m/A"
+back_emf_constant = "59.9 V/krpm"
+rotor_inertia = "0.59 kg*cm^2"
+[friction]
+dry_torque = "0.02 N*m"
+viscous = "1e-5 N*m*s/rad"
+[limits]
+voltage = "320 V"
+[control]
+period = "62.5 us"
+computing_delay = "31.25 us"
+[control.current]
+gain = "25 V/A"
+integral_time = "3 ms"
+[control.velocity]
+gain = "0.04 A*s/rad"
+[validation]
+full_deflection = "90 deg"
+"""
+
+
+def test_a_speed_constant_is_a_back_emf_constant_upside_down() -> None:
+    design = read_design_text(FLAT, "flat")
+    assert design.motor.back_emf_constant_Vs_rad == pytest.approx(60.0 / (2 * pi * 83.4), rel=1e-12)
+    assert design.parameters["motor.back_emf_constant"].text == "83.4 rpm/V"
+    with pytest.raises(InputError, match=r"within 10 %"):
+        with_overrides(design, {"motor.back_emf_constant": "70 rpm/V"})
+    for wrong in ("-83.4 rpm/V", "83.4 rpm/A", "0 rpm/V"):
+        with pytest.raises(InputError, match=r"motor\.back_emf_constant"):
+            with_overrides(design, {"motor.back_emf_constant": wrong})
+
+
+def test_behind_a_screw_a_speed_constant_is_that_of_the_rotary_motor() -> None:
+    """p = 5 mm/2 pi: kE of the axis is kE of the motor over p."""
+    linear = FLAT.replace('name = "flat"', 'name = "flat"\naxis = "linear"')
+    linear = linear.replace('[[gear]]\nname = "harmonic"\nratio = 100', '[screw]\nlead = "5 mm"')
+    linear = (
+        linear.replace("1.6e4 N*m/rad", "2e7 N/m").replace("0.5 kg*m^2", "20 kg").replace("30 deg", "30 mm")
+    )
+    design = read_design_text(linear, "flat")
+    kE = 60.0 / (2 * pi * 83.4)
+    assert design.motor.back_emf_constant_Vs_rad == pytest.approx(kE / (5e-3 / (2 * pi)), rel=1e-12)
+
+
+def test_an_ac_servo_runs_as_fast_as_its_bus_allows() -> None:
+    """U = R i + sqrt(2) k_rms w with i = sqrt(3/2) I_rms, and the torque of friction at that speed."""
+    design = read_design_text(SERVO, "servo")
+    w = capability(design).output_rate_rad_s
+    kE = sqrt(2.0) * 59.9 / (1000 * 2 * pi / 60)
+    torque = 0.02 + 1e-5 * w
+    assert 4.6 * torque / (0.93 / sqrt(1.5)) + kE * w == pytest.approx(320.0, rel=1e-9)
+
+
+def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
+    """Without damping the antiresonance is a zero on the axis, whose phase no following can cross."""
+    design = read_design_text(FLAT, "flat")
+    assert any(one.startswith("coupling.damping: 0, and no load.friction") for one in warnings_of(design))
+    survey = survey_loops(design)
+    made = forms.section(survey.forms, survey.refused)
+    assert made["blocks"][0]["kind"] == "figure"
+    assert not any(
+        one.startswith("coupling.damping")
+        for one in warnings_of(with_overrides(design, {"coupling.damping": "5 N*m*s/rad"}))
+    )
