@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument
+from reports.cli.drive import SetOption, load_drive
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 from reports.cli.targets import folder_for_results
 
 app = typer.Typer(help="The running drive outside of Python: C99 or FMU.", no_args_is_help=True)
@@ -18,30 +19,36 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite files that
 @app.command("c")
 def c(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: Annotated[
         Path,
         typer.Option("--out", metavar="DIR", help="Folder for the files.", callback=folder_for_results),
     ] = Path("drive-c"),
     single: Annotated[bool, typer.Option("--single", help="float in place of double.")] = False,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
     from actuator_lti.atomic import write_together
-    from actuator_lti.design import load_design
     from nonlinear.export import c_export
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
 
-    texts = c_export(load_design(design), single_precision=single)
+    texts = c_export(load_drive(design, changes), single_precision=single)
     for name in texts:
         refuse_existing(out / name, force)
     write_together({out / name: text.encode() for name, text in texts.items()})
-    print_line(f"{out}: {', '.join(texts)}")
+    if as_json:
+        files = [str(out / name) for name in texts]
+        print_json({"schema": "actuator-lti/export-c", "version": 1, "files": files})
+    else:
+        print_line(f"{out}: {', '.join(texts)}")
 
 
 @app.command("fmu")
 def fmu(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write; default NAME.fmu.")
     ] = None,
@@ -52,17 +59,17 @@ def fmu(
     ] = None,
     plain: Annotated[bool, typer.Option("--plain", help="Without the margin report inside.")] = False,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
     from actuator_lti.atomic import write_bytes
-    from actuator_lti.design import load_design
     from nonlinear.export import PLATFORMS, fmu_bytes
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
     from reports.export_documents import export_documents
     from reports.provenance import package_version
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     target = out or Path(f"{drive.name}.fmu")
     refuse_existing(target, force)
     platforms = tuple(dict.fromkeys(platform or PLATFORMS))
@@ -74,4 +81,8 @@ def fmu(
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)
+    if as_json:
+        about = {"file": str(target), "fmi": version, "platforms": platforms, "bytes": len(data)}
+        print_json({"schema": "actuator-lti/export-fmu", "version": 1, **about})
+        return
     print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
