@@ -22,8 +22,8 @@ templates_path = ["_templates"]
 default_role = "literal"
 highlight_language = "text"
 myst_heading_anchors = 3
-# Tutorials with figures are notebooks, run anew at each build in a folder that is gone afterwards. Pages whose
-# point is a command and its exit status use the directives of run_code, which check that status.
+# Tutorials with figures are notebooks, run anew at each build in a folder that is gone afterwards. Pages
+# whose point is a command and its exit status use the directives of run_code, which check that status.
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_raise_on_error = True
