@@ -36,10 +36,21 @@ def stiffness(
 def _verdict(found: Stiffness) -> str:
     """Whether the simulator confirms the linear stiffness, and how well."""
     if not found.checks:
-        return "dynamic stiffness, nothing to check it by"
+        return (
+            "self-locking, no moment moves the output"
+            if _rigid(found)
+            else "no stiffness was put to the simulator"
+        )
     most = max(check.difference for check in found.checks)
     said = "confirms" if found.agrees else "does not confirm"
     return f"an injected moment {said} the dynamic stiffness (relative difference up to {most:.1e})"
+
+
+def _rigid(found: Stiffness) -> bool:
+    """Whether the output holds against any moment."""
+    from math import isinf
+
+    return all(isinf(curve.static_Nm_rad) for curve in found.curves)
 
 
 def _known(value: float | None) -> float | None:
