@@ -338,6 +338,7 @@ def _rearrange(
     C1, C2 = _block(a.C1, b.C1), _block(a.C2, b.C2)
     D11, D12 = _block(a.D11, b.D11), _block(a.D12, b.D12)
     D21, D22 = _block(a.D21, b.D21), _block(a.D22, b.D22)
+    labels = [*(a.state_labels if a.nstates else ()), *(b.state_labels if b.nstates else ())]
     algebra = np.eye(D11.shape[0]) - D11 @ loop
     if np.linalg.cond(algebra) > 1e12:
         raise InputError("feedback: an algebraic loop without a solution (1 + L(infinity) = 0)")
@@ -355,4 +356,5 @@ def _rearrange(
         D21 @ De,
         D22 + D21 @ Ze,
         np.concatenate([a.delays_s, b.delays_s]),
+        **({"states": labels} if labels and len(set(labels)) == len(labels) else {}),
     )

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from actuator_lti.margins.results import StabilityMargins
 
 # The colours of the reports (`reports.charts.paint`): those of Okabe and Ito, darkened for white paper.
+__all__ = [
+    "plot_bode", "plot_cells", "plot_nyquist", "plot_onset", "plot_run", "plot_step", "style",
+]  # fmt: skip
+
 COLOURS = ("#0072b2", "#c46200", "#00805f", "#8e4585", "#c0392b", "#3a8fc4", "#7a5c1e", "#1f2933", "#66727f")
 RED, GREEN, INK, MUTED = "#c0392b", "#00805f", "#1f2933", "#66727f"
 STYLE: dict[str, Any] = {
@@ -229,6 +233,7 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     ----------
     run : nonlinear.Trajectory
     axes : four of matplotlib's axes, optional
+        See `nonlinear.Trajectory.plot`.
     """
     angle, speed, current, voltage = _panels(axes, 4, figsize=(6.4, 7.2))
     linear = run.axis == "linear"

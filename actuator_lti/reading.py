@@ -179,6 +179,14 @@ def _hint(text: str, error: Exception) -> str:
     line = lines[int(place[1]) - 1]
     if len(line) > _HINT_CHARACTERS:
         return ""
+    if "\u201c" in line or "\u201d" in line or "\u201e" in line:
+        return '; use straight quotes: "'
+    if re.search(r";\s*(#.*)?$", line):
+        return "; no semicolon at the end of a line"
+    if text.lstrip()[:1] in "{[" and text.lstrip()[:2] not in ("[[",) and ":" in line:
+        return "; this looks like JSON, TOML is wanted"
+    if re.match(r"[^=\[#]*[,;\t][^=\[#]*$", lines[0]):
+        return "; this looks like a table of numbers, TOML is wanted"
     if found := _COMMA.match(line):
         return f"; use a decimal point: {found[1]} = {found[2].replace(',', '.')}"
     if found := _UNQUOTED.match(line):

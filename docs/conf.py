@@ -16,12 +16,20 @@ project = "actuator-lti"
 version = release = _project["version"]
 project_copyright = "the authors; MIT license"
 
-extensions = ["myst_parser", "numpydoc", "sphinx.ext.autosummary", "run_code", "generated_pages"]
+extensions = ["myst_nb", "numpydoc", "sphinx.ext.autosummary", "run_code", "generated_pages"]
 exclude_patterns = ["_ext", "_templates"]
 templates_path = ["_templates"]
 default_role = "literal"
 highlight_language = "text"
 myst_heading_anchors = 3
+# Tutorials with figures are notebooks, run anew at each build in a folder that is gone afterwards. Pages
+# whose point is a command and its exit status use the directives of run_code, which check that status.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
+nb_execution_show_tb = True
+nb_merge_streams = True
 
 autosummary_generate = True
 autosummary_ignore_module_all = False

@@ -19,6 +19,20 @@ from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 
+__all__ = [
+    "Command",
+    "chirp",
+    "hold",
+    "multisine",
+    "ramp",
+    "recorded",
+    "sampled",
+    "sine",
+    "step",
+    "stepped_sine",
+    "triangle",
+]
+
 Floats = npt.NDArray[np.float64]
 
 

@@ -14,6 +14,8 @@ import numpy.typing as npt
 from actuator_lti.errors import InputError
 from nonlinear.commands import Command, sampled
 
+__all__ = ["LoadMoment", "constant", "proportional", "series"]
+
 Floats = npt.NDArray[np.float64]
 
 

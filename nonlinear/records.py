@@ -49,6 +49,15 @@ def _place(column: str | int, header: list[str], where: str) -> int:
     return column
 
 
+def _hint(cell: str) -> str:
+    """What a cell that is no number most likely is."""
+    if ";" in cell or "\t" in cell:
+        return "; separate the columns with commas, and write numbers with a decimal point"
+    return (
+        "; this looks like TOML, a CSV file is wanted" if "=" in cell or cell.startswith(("#", "[")) else ""
+    )
+
+
 def _column(rows: list[list[str]], place: int, where: str) -> Floats:
     out = np.empty(len(rows) - 1)
     for k, row in enumerate(rows[1:]):
@@ -57,6 +66,6 @@ def _column(rows: list[list[str]], place: int, where: str) -> Floats:
         except (ValueError, IndexError) as error:
             cell = row[place] if place < len(row) else ""
             raise InputError(
-                f"line {k + 2}, column {place + 1} = {shown(cell)}: must be a number", where
+                f"line {k + 2}, column {place + 1} = {shown(cell)}: must be a number{_hint(cell)}", where
             ) from error
     return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from rich.box import SIMPLE_HEAD
@@ -19,21 +20,30 @@ COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WORDS = {True: ("pass", "✓ met"), False: ("fail", "✗ not met"), None: ("info", "– not judged")}
 
 
-def print_blocks(blocks: Sequence[Mapping[str, Any] | Table], notes: Sequence[str] = ()) -> None:
+@dataclass(frozen=True)
+class SideBySide:
+    """Tables of the same rows as one: a line a figure, a column a row of the blocks."""
+
+    title: str
+    blocks: Sequence[Mapping[str, Any]]
+
+
+def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
     """Print the tables and verdicts among the blocks; figures are for pages."""
     out = console()
     for block in blocks:
-        if isinstance(block, Table):
-            out.print(block)
+        if isinstance(block, SideBySide):
+            laid = _side_by_side(block)
+            out.print(laid if _fits(laid, out) else _one_by_one(block))
         else:
             _print(block, out)
     for note in dict.fromkeys(notes):
         out.print(Text(f"note: {note}", style="yellow"))
 
 
-def print_verdict(passed: bool, words: str) -> None:
-    """Print the first line of an answer: whether all is well, and why."""
-    line = Text().append("PASS" if passed else "FAIL", style=COLOURS["pass" if passed else "fail"])
+def print_verdict(passed: bool, words: str, *, failed: str = "FAIL") -> None:
+    """Print the first line of an answer: whether all is well (else the word ``failed``), and why."""
+    line = Text().append("PASS" if passed else failed, style=COLOURS["pass" if passed else "fail"])
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
@@ -109,14 +119,44 @@ def stacked_verdicts(block: Mapping[str, Any]) -> Text:
     return text.append("\n")
 
 
-def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> Table:
+def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> SideBySide:
+    """Tables of the same rows as one, laid out when it is printed; stacked where that is too wide."""
+    return SideBySide(title, blocks)
+
+
+def _names(side: SideBySide) -> list[str]:
+    """The rows of the blocks: each becomes a column."""
+    rows = {str(row[block["columns"][0]["key"]]): None for block in side.blocks for row in block["rows"]}
+    return list(rows)
+
+
+def _one_by_one(side: SideBySide) -> Text:
+    """Write the columns of a side by side table one below the other, a figure after the other."""
+    text = Text().append(side.title, style="bold")
+    for name in _names(side):
+        text.append(f"\n{name}: ")
+        said = []
+        for block in side.blocks:
+            first, *columns = block["columns"]
+            for row in block["rows"]:
+                if str(row[first["key"]]) == name:
+                    said += [(column, _cell(row.get(column["key"]), column["format"])) for column in columns]
+        there = [(column, cell) for column, cell in said if cell.plain.strip() not in ("", "–")]
+        for number, (column, cell) in enumerate(there):
+            own = column["label"] not in ("", "at")
+            text.append("; " if number and own else " " if number else "")
+            text.append(f"{column['label']} ".lower() if own else f"{column['label']} ".lstrip())
+            text.append_text(cell).append(f" {column['unit']}".rstrip())
+    return text.append("\n")
+
+
+def _side_by_side(side: SideBySide) -> Table:
     """Lay tables of the same rows out as one: a line a figure, a column a row of the blocks."""
-    made = _empty(title)
+    made = _empty(side.title)
     made.add_column("")
-    rows = {row[block["columns"][0]["key"]]: None for block in blocks for row in block["rows"]}
-    for name in rows:
-        made.add_column(Text(str(name)), justify="right")
-    for block in blocks:
+    for name in _names(side):
+        made.add_column(Text(name), justify="right")
+    for block in side.blocks:
         for column in block["columns"][1:]:
             own = [row.get(column["key"]) for row in block["rows"]]
             made.add_row(Text(_label(column)), *(_cell(value, column["format"]) for value in own))

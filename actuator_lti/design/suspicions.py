@@ -134,6 +134,13 @@ def _loads(design: Design) -> Iterator[str]:
             f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
             "at its peak current without losses"
         )
+    needed = max(design.friction.dry_Nm(largest, direction) for direction in (1, -1))
+    given = None if holding is None else holding / design.total_ratio
+    if design.load.path != "back-drivable" and given is not None and needed > given:
+        yield (
+            f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
+            f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
+        )
     for load in design.validation.loads_Nm:
         if abs(load) > largest:
             yield f"validation.loads: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"

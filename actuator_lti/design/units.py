@@ -271,7 +271,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         raise InputError(f"{error}; allowed: {example}") from None
     if not compatible(found, wanted):
         missing = "has no unit" if not written else _kind_of(written, found)
-        raise InputError(f"wrong dimension, {missing}; allowed: {example}{_advice(found, wanted, number)}")
+        wrong = "wrong dimension, " if written else ""
+        raise InputError(f"{wrong}{missing}; allowed: {example}{_advice(found, wanted, number)}")
     value = scaled(number, found.factor)
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")

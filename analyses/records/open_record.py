@@ -56,6 +56,8 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return _described(path, max_rows)
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
     spec, why = _spec_of_file(path, suffix)
     record = read_record(path, spec, max_rows)
     inputs = tuple(
@@ -67,6 +69,13 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
 def _described(path: Path, max_rows: int) -> Record:
     data = read_toml(path)
     table = Table(data, "", str(path))
+    if "file" not in data:
+        kind = "a design" if {"motor", "design"} & set(data) else "a TOML file"
+        raise InputError(
+            f'{kind}, and no record; allowed: CSV, Parquet or MATLAB, or a TOML with file = "log.csv"'
+            " (a design goes behind --design)",
+            where=str(path),
+        )
     file = path.parent / table.text("file")
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
     return replace(read_record(file, spec, max_rows), name=file.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -64,6 +64,20 @@ def about(
     from reports.cli import time_limit
 
     time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
+
+
+def options_by_name() -> dict[str, str]:
+    """Long option of every command, by the name of the argument that it becomes."""
+    found: dict[str, str] = {}
+    todo: list[Any] = [typer.main.get_command(build())]
+    for command in todo:
+        todo.extend(getattr(command, "commands", {}).values())
+        for parameter in command.params:
+            option = next((word for word in parameter.opts if word.startswith("--")), None)
+            if option is not None:
+                found[parameter.name] = option
+                found[option[2:].replace("-", "_")] = option
+    return found
 
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:

@@ -18,6 +18,7 @@ from reports.cli.options import (
 
 if TYPE_CHECKING:
     from analyses.study import Study
+    from analyses.variants import Comparison
 
 StudyArgument = Annotated[
     str | None, typer.Argument(metavar="STUDY", help="Study file (--example prints one), or a design.")
@@ -65,7 +66,7 @@ def compare(
     from reports.cli.progress import progress
     from reports.sections.compare import overview, sections
     from reports.study_pages import study_document, write_pages
-    from reports.terminal import print_blocks
+    from reports.terminal import print_blocks, print_verdict
 
     plan = _study(study, change or [])
     assert plan.base.design is not None
@@ -86,13 +87,28 @@ def compare(
     )
     with progress("drawing figures", quiet=quiet) as drawing:
         page, data = write_pages(made, out, "compare", progress=drawing)
+    untrue = any(entry.passed is False for one in found.all for entry in one.ledger)
+    passed = bool(made["verdict"]["passed"] and not found.refused and not untrue)
     if as_json:
         print_json(made)
     else:
+        print_verdict(passed, _verdict(found, untrue))
         print_blocks([overview(found)])
         print_line(f"{page}\n{data}")
-    untrue = any(entry.passed is False for one in found.all for entry in one.ledger)
-    leave_with(made["verdict"]["passed"] and not found.refused and not untrue)
+    leave_with(passed)
+
+
+def _verdict(found: Comparison, untrue: bool) -> str:
+    """Which designs meet their requirements, in one sentence."""
+    failing = [one.variant.name for one in found.all if any(v.passed is False for v in one.verdicts)]
+    said = (
+        f"{', '.join(failing)}: a requirement is not met"
+        if failing
+        else "every requirement of every design met"
+    )
+    refused = [variant.name for variant in found.refused]
+    said += f"; no design: {', '.join(refused)}" if refused else ""
+    return said + ("; a prediction is not confirmed by the simulator" if untrue else "")
 
 
 def _print_example() -> None:

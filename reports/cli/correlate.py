@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import JsonOption, QuietOption
 from reports.cli.targets import folder_for_results
 
@@ -65,6 +66,7 @@ ChirpOption = Annotated[
 def correlate(
     design: DesignPlace,
     records: RecordsArgument,
+    changes: SetOption = None,
     out: FolderOption = None,
     command: CommandOption = None,
     error_limit: ErrorOption = None,
@@ -103,7 +105,6 @@ def correlate(
     if predict is not None:
         _predict(records, predict, out, as_json, quiet)
         return
-    from actuator_lti.design import load_design
     from analyses.correlation import correlate_record
     from analyses.records import open_record
     from reports.cli.errors import leave_with
@@ -112,7 +113,7 @@ def correlate(
     from reports.cli.progress import progress
     from reports.sections import correlation as pages
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     results = []
     for record in named_apart([open_record(path) for path in records]):
         with progress(f"simulating {record.name}", quiet=quiet) as bar:

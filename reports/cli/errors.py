@@ -26,6 +26,8 @@ INTERRUPTED = 130
 # typer's own usage errors, whichever click it carries: BadParameter -> UsageError -> ClickException.
 _USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 
+_NO_NUMBER = "Input should be a valid number, unable to parse string as a number"
+
 
 def leave_with(passed: bool) -> None:
     """End the command with status 1 where a requirement or verdict failed.
@@ -66,7 +68,7 @@ def _run(call: Callable[[], object]) -> int:
         status = call()
         sys.stdout.flush()
     except InputError as error:
-        return _say(str(error), BAD_INPUT)
+        return _say(_by_option(error), BAD_INPUT)
     except NumericalError as error:
         return _say(f"numerical failure: {error}", NO_RESULT)
     except BrokenPipeError:
@@ -89,6 +91,19 @@ def _run(call: Callable[[], object]) -> int:
     return status if isinstance(status, int) else DONE
 
 
+def _by_option(error: InputError) -> str:
+    """Name the option where the message begins with the Python argument behind it: ``duration_s = ...``."""
+    from reports.cli.app import options_by_name
+
+    name, equals, rest = str(error).partition(" = ")
+    if error.where is not None or not equals or not name.isidentifier():
+        return str(error)
+    options = options_by_name()
+    short = name.removesuffix("_Nm").removesuffix("_s").removesuffix("_rad")
+    option = options.get(name) or options.get(short)
+    return f"{option} {rest}" if option else str(error)
+
+
 def _say(line: str, status: int) -> int:
     """Print one line on standard error and hand the status on."""
     words = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
@@ -101,6 +116,7 @@ def _usage_line(error: BaseException) -> str:
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "actuator-lti"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
+    message = message.replace(_NO_NUMBER, "allowed: a number with a decimal point, without unit")
     return f"{message} (see {command} --help)"
 
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument
+from reports.cli.drive import SetOption, load_drive
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite files that
 @app.command("c")
 def c(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: Annotated[
         Path,
         typer.Option("--out", metavar="DIR", help="Folder for the files.", callback=folder_for_results),
@@ -37,25 +39,30 @@ def c(
     single: Annotated[bool, typer.Option("--single", help="float in place of double.")] = False,
     check: CheckOption = True,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
     from actuator_lti.atomic import write_together
-    from actuator_lti.design import load_design
     from nonlinear.export import c_export
     from reports.cli.errors import leave_with
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
     from reports.export_check import check_text
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     texts = c_export(drive, single_precision=single)
     for name in texts:
         refuse_existing(out / name, force)
     found = _checked(drive) if check else None
     texts["README.md"] += "\n" + check_text(found, single_precision=single)
     write_together({out / name: text.encode() for name, text in texts.items()})
-    print_line(f"{out}: {', '.join(texts)}")
-    leave_with(_said(found))
+    if as_json:
+        about = {"files": [str(out / name) for name in texts]}
+        print_json({"schema": "actuator-lti/export-c", "version": 1, **about, **_check_json(found)})
+    else:
+        print_line(f"{out}: {', '.join(texts)}")
+        _say(found)
+    leave_with(found is None or not found.failed)
 
 
 def _checked(drive: Design) -> CodeCheck:
@@ -66,20 +73,25 @@ def _checked(drive: Design) -> CodeCheck:
         return check_code(drive)
 
 
-def _said(found: CodeCheck | None) -> bool:
-    """Print what the check has found; whether all is well."""
+def _say(found: CodeCheck | None) -> None:
+    """Print what the check has found."""
     from reports.cli.output import print_line
     from reports.export_check import summary
 
-    if found is None:
-        return True
-    print_line(summary(found))
-    return not found.failed
+    if found is not None:
+        print_line(summary(found))
+
+
+def _check_json(found: CodeCheck | None) -> dict[str, Any]:
+    from reports.export_check import summary
+
+    return {} if found is None else {"check": {"passed": not found.failed, "result": summary(found)}}
 
 
 @app.command("fmu")
 def fmu(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write; default NAME.fmu.")
     ] = None,
@@ -91,18 +103,18 @@ def fmu(
     plain: Annotated[bool, typer.Option("--plain", help="Without reports inside, and no check.")] = False,
     check: CheckOption = True,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
     from actuator_lti.atomic import write_bytes
-    from actuator_lti.design import load_design
     from nonlinear.export import PLATFORMS, fmu_bytes
     from reports.cli.errors import leave_with
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
     from reports.export_documents import export_documents
     from reports.provenance import package_version
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     target = out or Path(f"{drive.name}.fmu")
     refuse_existing(target, force)
     platforms = tuple(dict.fromkeys(platform or PLATFORMS))
@@ -115,5 +127,10 @@ def fmu(
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)
-    print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
-    leave_with(_said(found))
+    if as_json:
+        about = {"file": str(target), "fmi": version, "platforms": platforms, "bytes": len(data)}
+        print_json({"schema": "actuator-lti/export-fmu", "version": 1, **about, **_check_json(found)})
+    else:
+        print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
+        _say(found)
+    leave_with(found is None or not found.failed)

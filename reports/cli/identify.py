@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import JsonOption, QuietOption
 from reports.cli.targets import folder_for_results, refuse_existing
+
+if TYPE_CHECKING:
+    from actuator_lti.design import Design
 
 FilesArgument = Annotated[
     list[Path] | None,
@@ -145,6 +149,7 @@ def identify(
     play: PlayOption = None,
     period: PeriodOption = None,
     design: DesignOption = None,
+    changes: SetOption = None,
     fix: FixOption = None,
     accept: AcceptOption = False,
     residual_limit: LimitOption = 20.0,
@@ -202,6 +207,7 @@ def identify(
         out=out,
         as_json=as_json,
         quiet=quiet,
+        changes=tuple(changes or ()),
     )
     if friction not in ("symmetric", "per-direction", "map"):
         raise InputError(f"--friction {friction}: symmetric, per-direction or map")
@@ -210,7 +216,8 @@ def identify(
     elif bool(given) == (virtual_bench is not None):
         raise InputError("give one of: a campaign file, records, --virtual-bench DIR")
     elif virtual_bench is not None:
-        _bench(virtual_bench, design or "ilr33-amber", seed, force, as_json, quiet)
+        drive = load_drive(design or "ilr33-amber", changes)
+        _bench(virtual_bench, design or "ilr33-amber", drive, seed, force, as_json, quiet)
     elif frequency_response:
         identify_frequency.run(given, play, period, common)
     elif identify_campaign.is_campaign(given):
@@ -240,8 +247,9 @@ def _print_example() -> None:
     print_line(textwrap.dedent(text).strip())
 
 
-def _bench(folder: Path, name: str, seed: int, force: bool, as_json: bool, quiet: bool) -> None:
-    from actuator_lti.design import load_design
+def _bench(
+    folder: Path, name: str, drive: Design, seed: int, force: bool, as_json: bool, quiet: bool
+) -> None:
     from analyses.virtual_bench import simulate_bench
     from analyses.virtual_bench_files import write_bench
     from analyses.virtual_bench_instruments import measure_bench
@@ -249,7 +257,6 @@ def _bench(folder: Path, name: str, seed: int, force: bool, as_json: bool, quiet
     from reports.cli.progress import progress
 
     refuse_existing(folder / "campaign.toml", force)
-    drive = load_design(name)
     with progress("simulating the runs", quiet=quiet) as bar:
         runs = simulate_bench(drive, seed=seed, progress=bar)
     logs, errors = measure_bench(runs, seed)

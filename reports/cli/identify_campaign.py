@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def is_campaign(paths: Sequence[Path]) -> bool:
 
 def run(path: Path, common: Common, count: int, criterion: str) -> None:
     """Identify from a campaign, print or write the result, and end with the verdict's status."""
-    from actuator_lti.design import load_design, read_design_text, write_design
+    from actuator_lti.design import read_design_text, write_design
     from analyses.campaign_design import suggest_runs
     from analyses.identification.campaign import campaign_items, identify_campaign
     from analyses.identification.campaign_resimulation import steady_current_error
@@ -41,7 +42,8 @@ def run(path: Path, common: Common, count: int, criterion: str) -> None:
     from reports.sections import identification as pages
 
     listed = load_campaign(path)
-    drive = load_design(_beside(listed.design, path) if common.design is None else common.design)
+    name = _beside(listed.design, path) if common.design is None else common.design
+    drive = load_drive(name, common.changes)
     asked = fixed_values(drive, common.fixed)
     with progress("reading records", quiet=common.quiet) as bar:
         imported = import_campaign(listed, progress=bar)

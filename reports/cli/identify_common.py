@@ -23,6 +23,7 @@ class Common:
     out: Path | None
     as_json: bool
     quiet: bool
+    changes: tuple[str, ...] = ()
 
 
 def fixed_values(design: Design, texts: Sequence[str]) -> dict[str, float]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
 def run(paths: Sequence[Path], play: Path | None, period_s: float | None, common: Common) -> None:
     """Identify from a frequency response, print or write the result, end with the verdict's status."""
-    from actuator_lti.design import load_design
     from actuator_lti.errors import InputError
     from analyses.identification.frequency_bench import identify_frequency
     from analyses.records import open_record
@@ -24,7 +24,7 @@ def run(paths: Sequence[Path], play: Path | None, period_s: float | None, common
 
     if len(paths) != 1:
         raise InputError("--frequency-response takes one record (and --play RECORD for the play)")
-    drive = load_design(common.design or "ilr33-amber")
+    drive = load_drive(common.design or "ilr33-amber", common.changes)
     result = identify_frequency(
         drive,
         open_record(paths[0]),

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
 
 def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: Mapping[str, Any]) -> None:
     """Identify from records, print or write the result, and end with the verdict's status."""
-    from actuator_lti.design import load_design
     from analyses.identification.bench import BenchSettings, identify_bench
     from analyses.records import open_record
     from reports.cli.errors import leave_with
@@ -22,7 +22,7 @@ def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: 
     from reports.cli.progress import progress
     from reports.sections import dynamic_identification as pages
 
-    drive = load_design(common.design or "emps")
+    drive = load_drive(common.design or "emps", common.changes)
     settings = BenchSettings(
         fixed=fixed_values(drive, common.fixed), residual_limit=common.residual_limit, **options
     )

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from reports.cli.options import JsonOption
+
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Design file to write.")]
 FromOption = Annotated[
     str | None,
@@ -26,17 +28,21 @@ def init(
     source: FromOption = None,
     kind: KindOption = None,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write a commented design file to start one's own drive from."""
     from actuator_lti.atomic import write_text
     from actuator_lti.design import read_design_text
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
 
     refuse_existing(file, force)
     text = _renamed(_source_text(source if kind is None else _of_kind(kind, source)), file.stem)
     read_design_text(text, str(file))
     write_text(file, text)
+    if as_json:
+        print_json({"schema": "actuator-lti/init", "version": 1, "file": str(file)})
+        return
     print_line(f"wrote {file}; next: actuator-lti report {file}")
 
 

@@ -15,6 +15,7 @@ from reports.cli.options import (
     JsonOption,
     LoadOption,
     OperatingPointOption,
+    on_axis,
 )
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ def margins(
     from reports.sections.names import load_unit
 
     drive = load_drive(design, changes)
+    load = on_axis(load, drive)
     for warning in warnings_of(drive):
         print_warning(f"{drive.name}: {warning}")
     loops = assemble_loops(

@@ -19,6 +19,7 @@ from reports.cli.options import (
     SchedulerOption,
     TlsOption,
     WorkersOption,
+    on_axis,
 )
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ def montecarlo(
     from reports.cli.progress import progress
 
     drive = load_drive(design, changes)
+    load = on_axis(load, drive)
     table = None if from_samples is None else read_table(from_samples, _varying(drive))
     check = None if step is None else StepCheck(_angle(step, drive), duration, load)
     settings = MonteCarloSettings(samples, seed, operating_point, load, check, table, worst)  # type: ignore[arg-type]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ CompleteOption = Annotated[
 @app.command("export")
 def export(
     design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
     out: TargetOption = None,
     per: PerOption = None,
     complete: CompleteOption = False,
@@ -53,14 +55,13 @@ def export(
     from dataclasses import replace
 
     from actuator_lti.atomic import write_text
-    from actuator_lti.design import load_design
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import write_settings_toml
     from actuator_lti.design.settings_xml import settings_xml
     from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
 
-    drive = load_design(design)
+    drive = load_drive(design, changes)
     if per is not None:
         drive = replace(drive, objects=replace(drive.objects, velocity_gain_factor=calibration(per)))
     result = export_objects(drive, complete=complete or None)

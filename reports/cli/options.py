@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from reports.cli.targets import folder_for_results
+
+if TYPE_CHECKING:
+    from actuator_lti.design import Design
 
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
@@ -22,6 +25,31 @@ OutOption = Annotated[
 ]
 
 
+class Load(float):
+    """A load as it was written: its value in SI, and the unit where one was given."""
+
+    unit: str = ""
+
+
+def on_axis(load: float, drive: Design) -> float:
+    """A load of the command line, once the drive is known.
+
+    Raises
+    ------
+    InputError
+        For a torque on a linear axis, or a force on a rotary one.
+    """
+    from actuator_lti.errors import InputError
+
+    linear, unit = drive.axis == "linear", getattr(load, "unit", "")
+    if unit and unit != ("N" if linear else "N*m"):
+        kind, wanted = ("force", '"40 N"') if linear else ("torque", '"4 N*m"')
+        raise InputError(
+            f"--load: {unit} does not fit the axis of {drive.name}; allowed: a {kind}, such as {wanted}"
+        )
+    return float(load)
+
+
 def read_load(text: str) -> float:
     """A load with or without its unit: N m (linear axis: N) where it has none."""
     from actuator_lti.design.units import parse_quantity
@@ -33,9 +61,12 @@ def read_load(text: str) -> float:
         pass
     for unit in ("N*m", "N"):
         try:
-            return parse_quantity(text, unit)
+            load = Load(parse_quantity(text, unit))
         except InputError as found:
             message = found.message
+        else:
+            load.unit = unit
+            return load
     reason = message.partition("; allowed")[0]
     raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
 

@@ -7,22 +7,27 @@ from typing import Annotated
 
 import typer
 
+from reports.cli.options import JsonOption
+
 ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
 FileOption = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
 ]
 
 
-def pdf(report: ReportArgument, out: FileOption = None) -> None:
+def pdf(report: ReportArgument, out: FileOption = None, as_json: JsonOption = False) -> None:
     """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
     from actuator_lti.errors import InputError
     from analyses.isolation import drain
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json, print_line
     from reports.document import load
     from reports.pdf import write_pdf
 
     path = write_pdf(load(report), out or report.with_suffix(".pdf"))
-    print_line(str(path))
+    if as_json:
+        print_json({"schema": "actuator-lti/pdf", "version": 1, "file": str(path)})
+    else:
+        print_line(str(path))
     damaged = drain()
     if damaged:
         raise InputError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from reports.cli.drive import SetOption, load_drive
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption, QuietOption
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption, QuietOption, on_axis
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -97,6 +97,7 @@ def simulate(
     from reports.cli.progress import progress
 
     drive = load_drive(design, changes)
+    load = on_axis(load, drive)
     wanted = build_command(
         drive,
         command,

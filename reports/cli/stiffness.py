@@ -21,14 +21,36 @@ def stiffness(
     from analyses.stiffness import stiffness as analyse
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
+    from reports.terminal import print_verdict
 
     found = analyse(load_drive(design, changes))
     if as_json:
         print_json(_json(found))
     else:
+        print_verdict(found.agrees, f"{found.design.name}: {_verdict(found)}")
         for line in _lines(found):
             print_line(line)
     leave_with(found.agrees)
+
+
+def _verdict(found: Stiffness) -> str:
+    """Whether the simulator confirms the linear stiffness, and how well."""
+    if not found.checks:
+        return (
+            "self-locking, no moment moves the output"
+            if _rigid(found)
+            else "no stiffness was put to the simulator"
+        )
+    most = max(check.difference for check in found.checks)
+    said = "confirms" if found.agrees else "does not confirm"
+    return f"an injected moment {said} the dynamic stiffness (relative difference up to {most:.1e})"
+
+
+def _rigid(found: Stiffness) -> bool:
+    """Whether the output holds against any moment."""
+    from math import isinf
+
+    return all(isinf(curve.static_Nm_rad) for curve in found.curves)
 
 
 def _known(value: float | None) -> float | None:

@@ -62,7 +62,7 @@ def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> Non
     from reports.cli.progress import progress
     from reports.sections import tuning
     from reports.study_pages import study_document, write_pages
-    from reports.terminal import print_blocks
+    from reports.terminal import print_blocks, print_verdict
 
     part = tuning.section(result)
     title = f"{result.before.title or result.before.name}: tuning"
@@ -74,7 +74,7 @@ def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> Non
     if as_json:
         print_json(made)
         return
-    print_line(part["intro"])
+    print_verdict(result.feasible, f"{result.before.name}: {part['result']}")
     keys = ("path", "unit", "before", "rounded", "object", "steps", "object_unit")
     table = tuning.gains(result)
     short = {**table, "columns": [c for c in table["columns"] if c["key"] in keys]}

@@ -107,7 +107,7 @@ def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ..
     """Print the ledger, the conditional stability, and the verdict."""
     from reports.cli.output import print_line
     from reports.sections.validation import by_loop, loop_name
-    from reports.terminal import print_blocks
+    from reports.terminal import print_blocks, print_verdict
 
     tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
     sections = {part["id"]: part for part in made["sections"]}
@@ -116,11 +116,10 @@ def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ..
 
         tables.append(doc.text(sections["conditional"]["result"]))
         tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
+    print_verdict(found.passed, str(found), failed="FAIL" if found.judged else "NOTHING JUDGED")
     print_blocks(tables, found.notes)
     for path in paths:
         print_line(str(path))
-    verdict = "PASS" if found.passed else "FAIL" if found.judged else "NOTHING JUDGED"
-    print_line(f"{verdict}  {found}")
     print_line(f"{sum(found.seconds.values()):.1f} s")
 
 

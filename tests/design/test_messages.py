@@ -1,12 +1,18 @@
 """What a mistyped value is answered with: one line that says what to write instead."""
 
+import json
+from pathlib import Path
+
 import pytest
 
+from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.key_reference import key_reference
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
+from nonlinear import commands, simulate
+from reports.cli.main import main
 
 AMBER = load_design("ilr33-amber")
 
@@ -71,3 +77,115 @@ def test_the_key_reference_has_every_key_once() -> None:
     assert len(paths) == len(set(paths)) > 100
     assert all(entry.description for entry in key_reference("linear"))
     assert {entry.unit for entry in key_reference("linear")} >= {"kg", "N", "m/s"}
+
+
+def shown(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
+    """Exit status and standard error of a command; never a traceback."""
+    status = main(words)
+    said = capsys.readouterr().err
+    assert "Traceback" not in said
+    return status, said
+
+
+FILES = {
+    "empty.toml": ("", "is empty; allowed: a design file"),
+    "comma.toml": ('[motor]\nresistance = "0,6 ohm"\n', None),
+    "quotes.toml": ("[motor]\nresistance = “55 mohm”\n", "use straight quotes"),
+    "semicolon.toml": ('[motor];\nresistance = "1 ohm"\n', "no semicolon at the end of a line"),
+    "table.toml": ("time_s;ref\n0;1\n0,001;2\n", "this looks like a table of numbers, TOML is wanted"),
+    "json.toml": ('{"motor": 1}', "this looks like JSON, TOML is wanted"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_file_that_is_no_design_is_told_what_it_looks_like(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, words = FILES[name]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    status, said = shown(["margins", str(tmp_path / name)], capsys)
+    assert status == 2
+    assert said.count("\n") == 1
+    assert name in said
+    if words is not None:
+        assert words in said
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["margins", "--load", "4 kg"], '"kg" is the unit of a mass; allowed: a torque such as "4 N*m"'),
+        (["margins", "--load", "4,5"], 'use a decimal point: "4.5"'),
+        (["margins", "--load", "4 N"], "--load: N does not fit the axis of ilr33-amber; allowed: a torque"),
+        (
+            ["margins", "emps", "--load", "4 N*m"],
+            "--load: N*m does not fit the axis of emps; allowed: a force",
+        ),
+        (["simulate", "emps", "--load", "4 N*m"], "--load: N*m does not fit the axis of emps"),
+        (["simulate", "--duration", "1e9"], "--duration 1e+09: 10000000000000 ticks of one run; allowed"),
+        (["simulate", "--duration", "nan"], "--duration nan: must be a finite number"),
+        (
+            ["simulate", "--amplitude", "0,5"],
+            "'--amplitude': allowed: a number with a decimal point, without unit",
+        ),
+        (["margins", "--form", "sampld"], "--form 'sampld': one of sampled, continuous, ideal"),
+        (["margins", "--operating-point", "slide"], "--operating-point 'slide': one of sliding"),
+        (["margins", "--set", "control.period=0.1"], "has no unit; allowed: a number with a unit like s"),
+        (["margins", "--set", "motor.resistance"], "allowed: KEY=VALUE"),
+        (["margin"], "Did you mean 'margins'?"),
+    ],
+)
+def test_the_command_line_names_its_options(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status, found = shown(words, capsys)
+    assert status == 2
+    assert found.count("\n") == 1
+    assert said in found
+
+
+def test_python_names_its_arguments() -> None:
+    with pytest.raises(InputError, match=r"^form = 'sampld': one of sampled, continuous, ideal$"):
+        assemble_loops(AMBER, form="sampld")
+    with pytest.raises(InputError, match=r"^duration_s = nan: must be"):
+        simulate(AMBER, commands.step(0.01), float("nan"))
+
+
+def test_a_load_with_its_unit_is_the_load(capsys: pytest.CaptureFixture[str]) -> None:
+    found = []
+    for words in ("4 N*m", "4", "4000 mN*m"):
+        assert main(["margins", "--load", words, "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["load_Nm"])
+    assert found == pytest.approx([4.0] * 3, rel=1e-12)
+
+
+@pytest.mark.parametrize("command", [["identify"], ["correlate", "emps"], ["simulate", "--record"]])
+def test_records_that_are_none(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    design, table, empty = tmp_path / "d.toml", tmp_path / "s.csv", tmp_path / "e.csv"
+    design.write_text(write_design(AMBER), encoding="utf-8")
+    table.write_text("time_s;reference_deg\n0;1\n0,001;2\n", encoding="utf-8")
+    empty.write_text("", encoding="utf-8")
+    twice = [str(design)] * (2 if command == ["identify"] else 1)
+    status, said = shown([*command, *twice], capsys)
+    assert status == 2
+    assert "a design, and no record" in said or "this looks like TOML, a CSV file is wanted" in said
+    status, said = shown([*command, str(empty)], capsys)
+    assert status == 2
+    assert "is empty" in said or "a header line and at least one row" in said
+    status, said = shown([*command, str(table)], capsys)
+    assert said.count("\n") == 1
+    assert status == 2
+    if command[0] == "simulate":
+        assert "separate the columns with commas, and write numbers with a decimal point" in said
+
+
+def test_a_moment_that_the_drive_cannot_move_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
+    status, said = shown(["margins", "--set", "load.moment_max=4000 N*m"], capsys)
+    assert status == 0
+    assert "warning: ilr33-amber: load.moment_max: 4000 N*m holds the drive fast" in said
+    most = (5.9e-3 * 12.0 - 2.25e-3) / 1.34e-3  # where C0 + CM M is kM i_peak
+    for moment, warned in ((0.99 * most, False), (1.01 * most, True)):
+        design = with_overrides(AMBER, {"load.moment_max": f"{moment} N*m"})
+        assert any("holds the drive fast" in line for line in warnings_of(design)) is warned
