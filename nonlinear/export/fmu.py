@@ -49,6 +49,7 @@ def fmu_bytes(
     platforms: Sequence[str] = PLATFORMS,
     *,
     documents: Mapping[str, bytes] | None = None,
+    picture: bytes | None = None,
     tool: str = "actuator-lti",
 ) -> bytes:
     """The unit as one file; the same input gives the same bytes with the same compilers.
@@ -62,6 +63,8 @@ def fmu_bytes(
         Binaries to compile; ziglang's compiler is needed for those of another system.
     documents : mapping of str to bytes
         Files of the documentation folder, by name.
+    picture : bytes, optional
+        PNG of the model: ``model.png`` (FMI 2.0), ``documentation/diagram.png`` (FMI 3.0).
     tool : str
         Name and version for the model description.
 
@@ -70,11 +73,7 @@ def fmu_bytes(
     InputError
         For an unknown version or platform, or without a compiler.
     """
-    if version not in (2, 3):
-        raise InputError(f"fmi = {version}: allowed: 2 or 3")
-    for platform in platforms:
-        if platform not in PLATFORMS:
-            raise InputError(f"platform = {platform!r}: allowed: {', '.join(PLATFORMS)}")
+    refuse_unknown(version, platforms)
     trace = trace_keys(design)
     variables = variables_of(design, trace)
     texts = _sources(design, trace, version)
@@ -91,7 +90,24 @@ def fmu_bytes(
     if version == 3:
         files["sources/buildDescription.xml"] = build_description(names)
     files |= {f"documentation/{name}": data for name, data in (documents or {}).items()}
+    if picture is not None:
+        files["model.png" if version == 2 else "documentation/diagram.png"] = picture
     return _zipped(files)
+
+
+def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
+    """Refuse a version or a platform that there is not.
+
+    Raises
+    ------
+    InputError
+        With what is allowed.
+    """
+    if version not in (2, 3):
+        raise InputError(f"fmi = {version}: allowed: 2 or 3")
+    for platform in platforms:
+        if platform not in PLATFORMS:
+            raise InputError(f"platform = {platform!r}: allowed: {', '.join(PLATFORMS)}")
 
 
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:

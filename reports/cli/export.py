@@ -107,23 +107,26 @@ def fmu(
 ) -> None:
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
     from actuator_lti.atomic import write_bytes
-    from nonlinear.export import PLATFORMS, fmu_bytes
+    from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.cli.targets import refuse_existing
     from reports.export_documents import export_documents
+    from reports.model_picture import model_png
     from reports.provenance import package_version
 
     drive = load_drive(design, changes)
     target = out or Path(f"{drive.name}.fmu")
     refuse_existing(target, force)
     platforms = tuple(dict.fromkeys(platform or PLATFORMS))
+    refuse_unknown(version, platforms)
     found = _checked(drive) if check and not plain else None
     data = fmu_bytes(
         drive,
         version,  # type: ignore[arg-type]
         platforms,
         documents={} if plain else export_documents(drive, found),
+        picture=model_png(drive),
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)

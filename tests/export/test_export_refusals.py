@@ -1,0 +1,117 @@
+"""What an export refuses: one line, status 2, nothing half-written."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+import nonlinear.export.build as build
+from nonlinear import native
+from nonlinear.export.build import system_compiler
+from reports.cli.main import main
+
+NOISY = '[instruments]\ncurrent_noise = "0.1 A"\n'
+needs_compiler = pytest.mark.skipif(
+    system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"
+)
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The line that a refused command says."""
+    assert main(arguments) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert "Traceback" not in said.err
+    return said.err
+
+
+@pytest.mark.parametrize("command", [["c", "emps", "--no-check"], ["fmu", "emps", "--plain"]])
+@needs_compiler
+def test_a_folder_that_cannot_be_written(
+    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file in the place of a folder stops the super-user too; ``/proc`` takes no new files from anyone."""
+    (tmp_path / "file").write_text("mine")
+    more = ["--platform", "linux64"] if command[0] == "fmu" else []
+    name = "drive.fmu" if command[0] == "fmu" else "drive"
+    for folder in (tmp_path / "file", Path("/proc/1")):
+        line = refused(["export", *command, *more, "--out", str(folder / name)], capsys)
+        assert str(folder) in line
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_one_file_that_exists_and_no_other_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "main.c").write_text("mine")
+    line = refused(["export", "c", "emps", "--no-check", "--out", str(tmp_path)], capsys)
+    assert "main.c: exists already" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["main.c"]
+    assert (tmp_path / "main.c").read_text() == "mine"
+
+
+def test_no_compiler_for_a_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "system_compiler", lambda: None)
+    monkeypatch.setattr(build, "zig_command", lambda: None)
+    for platform, said in (("linux64", "gcc or clang, or pip install"), ("win64", "allowed: pip install")):
+        out = tmp_path / "drive.fmu"
+        line = refused(
+            ["export", "fmu", "emps", "--plain", "--platform", platform, "--out", str(out)], capsys
+        )
+        assert f"no C compiler for {platform}" in line
+        assert said in line
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_compiler_that_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "cc"
+    broken.write_text("#!/bin/sh\necho 'drive.c:1: error: out of order' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setattr(build, "compiler_for", lambda _: [str(broken)])
+    out = tmp_path / "drive.fmu"
+    line = refused(["export", "fmu", "emps", "--plain", "--platform", "linux64", "--out", str(out)], capsys)
+    assert "error: out of order" in line
+    assert not out.exists()
+
+
+def test_what_single_precision_cannot_say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from actuator_lti.design.shipped import shipped_path
+
+    design = tmp_path / "noisy.toml"
+    design.write_text(shipped_path("ilr33-amber").read_text(encoding="utf-8") + NOISY)
+    out = tmp_path / "c"
+    line = refused(["export", "c", str(design), "--single", "--out", str(out)], capsys)
+    assert "noise and jitter need double precision" in line
+    assert not out.exists()
+    assert main(["export", "c", str(design), "--no-check", "--out", str(out)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--fmi", "4"], "fmi = 4: allowed: 2 or 3"),
+        (["--platform", "vax"], "platform = 'vax': allowed: linux64, win64"),
+    ],
+)
+def test_unknown_versions_and_platforms(
+    more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "drive.fmu"
+    assert said in refused(["export", "fmu", "emps", "--out", str(out), *more], capsys)
+    assert not out.exists()
+
+
+def test_the_library_without_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(build, "system_compiler", lambda: None)
+    monkeypatch.setattr(native, "_FOLDER", tmp_path)
+    with pytest.raises(Exception, match="no C compiler; allowed: gcc or clang, or leave it to numba"):
+        native.build()
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,54 @@
+"""The picture of a unit: every part of the design is in it, and every design has one."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import replace
+
+import matplotlib.image
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.shipped import shipped_designs
+from nonlinear.export.build import system_compiler
+from nonlinear.export.fmu import fmu_bytes
+from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
+
+
+@pytest.mark.parametrize("name", shipped_designs())
+def test_every_stage_and_gear_has_its_box(name: str) -> None:
+    design = load_design(name)
+    svg = model_svg(design)
+    stages = {s for s in ("position", "velocity", "current") if getattr(design.controller, s) is not None}
+    for word in (design.name, "motor", "load", *stages, *(gear.name for gear in design.gears)):
+        assert f">{word}</text>" in svg
+    assert (">coupling</text>" in svg) == (design.coupling is not None)
+    assert "inf" not in svg.replace("information", "")
+
+
+def test_the_coupling_stands_behind_its_gear() -> None:
+    design = load_design("fin")
+    assert [title for title, _ in train_boxes(design)] == ["motor", "spur", "coupling", "load"]
+    inside = replace(design, gears=(*design.gears, replace(design.gears[0], name="belt")))
+    assert inside.coupling is not None
+    inside = replace(inside, coupling=replace(inside.coupling, after="spur"))
+    assert [title for title, _ in train_boxes(inside)] == ["motor", "spur", "coupling", "belt", "load"]
+    motor = replace(inside, gears=(), coupling=replace(inside.coupling, after=None))
+    assert [title for title, _ in train_boxes(motor)] == ["motor", "coupling", "load"]
+
+
+def test_names_cannot_break_the_picture() -> None:
+    design = replace(load_design("fin"), name='a<b>&"c', title="x" * 300)
+    made = matplotlib.image.imread(io.BytesIO(model_png(design)))
+    assert made.shape[:2] == (2 * HEIGHT, 2 * WIDTH)
+    assert made.std() > 0.05  # something is drawn
+
+
+@pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
+def test_units_carry_it() -> None:
+    design = load_design("ctms-motor-position")
+    for version, name in ((2, "model.png"), (3, "documentation/diagram.png")):
+        data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))  # type: ignore[arg-type]
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            assert archive.read(name).startswith(b"\x89PNG")
