@@ -11,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
+from nonlinear.elastic import is_elastic
 from nonlinear.emit.kinds import c_float
 from nonlinear.export.program import header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
@@ -70,15 +71,11 @@ def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str
     Raises
     ------
     InputError
-        For a design with noise in single precision: its random streams need 53 bits.
+        In single precision, for a design with noise (its random streams need 53 bits) or an elastic drive
+        train (its events are located to the rounding of double precision).
     """
-    instruments = design.instruments
-    noisy = any(
-        (instruments.current_noise_A, instruments.angle_noise_rad, instruments.output_angle_noise_rad)
-    )
-    if single_precision and (noisy or instruments.jitter_s):
-        message = "instruments: noise and jitter need double precision; allowed: none of them, or no --single"
-        raise InputError(message, where=design.origin or design.name)
+    if single_precision:
+        _refuse_single(design)
     ours = exported(design)
     texts = {
         "drive.h": header_text(),
@@ -90,6 +87,18 @@ def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str
         texts = {name: single(text) for name, text in texts.items()}
     main = template("main.c").replace("@REAL@", "float" if single_precision else "double")
     return {**texts, "main.c": main, "README.md": readme_text(ours, single_precision)}
+
+
+def _refuse_single(design: Design) -> None:
+    where = design.origin or design.name
+    instruments = design.instruments
+    noise = (instruments.current_noise_A, instruments.angle_noise_rad, instruments.output_angle_noise_rad)
+    if any(noise) or instruments.jitter_s:
+        message = "instruments: noise and jitter need double precision; allowed: none of them, or no --single"
+        raise InputError(message, where=where)
+    if is_elastic(design):
+        message = "coupling, friction.point: an elastic drive train or a friction map needs double precision"
+        raise InputError(f"{message}; allowed: neither, or no --single", where=where)
 
 
 def stage_words(design: Design) -> tuple[str, str]:

@@ -91,6 +91,9 @@ def test_what_single_precision_cannot_say(tmp_path: Path, capsys: pytest.Capture
     line = refused(["export", "c", str(design), "--single", "--out", str(out)], capsys)
     assert "noise and jitter need double precision" in line
     assert not out.exists()
+    line = refused(["export", "c", "fin", "--single", "--out", str(out)], capsys)
+    assert "an elastic drive train or a friction map needs double precision" in line
+    assert not out.exists()
     assert main(["export", "c", str(design), "--no-check", "--out", str(out)]) == 0
 
 
