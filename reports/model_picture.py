@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from html import escape
+from importlib.util import find_spec
 
 from actuator_lti.design.model import Design
 from reports.charts.paint import COLOURS
@@ -22,8 +23,10 @@ _PAGE = """#set page(width: {width}pt, height: {height}pt, margin: 0pt)
 Box = tuple[str, str]
 
 
-def model_png(design: Design) -> bytes:
-    """The picture as PNG, ``model.png`` of a unit."""
+def model_png(design: Design) -> bytes | None:
+    """The picture as PNG, ``model.png`` of a unit; ``None`` where the typesetter is not installed."""
+    if find_spec("typst") is None:  # comes with the extras export and pdf; a unit is valid without a picture
+        return None
     import typst
 
     page = _PAGE.format(width=WIDTH, height=HEIGHT)

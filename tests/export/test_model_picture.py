@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 import zipfile
 from dataclasses import replace
+from importlib.util import find_spec
 
 import matplotlib.image
 import pytest
 
+import reports.model_picture as model_picture
 from actuator_lti import load_design
 from actuator_lti.design.shipped import shipped_designs
 from nonlinear.export.build import system_compiler
@@ -38,13 +40,20 @@ def test_the_coupling_stands_behind_its_gear() -> None:
     assert [title for title, _ in train_boxes(motor)] == ["motor", "coupling", "load"]
 
 
+needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst is not installed")
+
+
+@needs_typesetter
 def test_names_cannot_break_the_picture() -> None:
     design = replace(load_design("fin"), name='a<b>&"c', title="x" * 300)
-    made = matplotlib.image.imread(io.BytesIO(model_png(design)))
+    data = model_png(design)
+    assert data is not None
+    made = matplotlib.image.imread(io.BytesIO(data))
     assert made.shape[:2] == (2 * HEIGHT, 2 * WIDTH)
     assert made.std() > 0.05  # something is drawn
 
 
+@needs_typesetter
 @pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 def test_units_carry_it() -> None:
     design = load_design("ctms-motor-position")
@@ -52,3 +61,8 @@ def test_units_carry_it() -> None:
         data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))  # type: ignore[arg-type]
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             assert archive.read(name).startswith(b"\x89PNG")
+
+
+def test_without_the_typesetter_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_picture, "find_spec", lambda _: None)
+    assert model_png(load_design("fin")) is None
