@@ -12,7 +12,7 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.points import SteadyPoint
-from analyses.identification.surface import PATHS, SurfaceFit
+from analyses.identification.surface_fit import PATHS, SurfaceFit
 from analyses.identification.systematic import effects_of, shared_errors
 from analyses.records.campaign_file import Instruments
 

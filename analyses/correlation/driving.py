@@ -131,11 +131,11 @@ def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[Flo
     comes with the later sample.
     """
     period = driven.design.controller.period_s
-    ticks = np.arange(round(duration_s / period) + 1) * period
+    ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.interp(ticks, time_s, driven.values)
     before = np.clip(np.searchsorted(time_s, ticks + 1e-6 * period, side="right") - 1, 0, len(time_s) - 1)
     step = steps_of(driven.values)[np.minimum(before, len(time_s) - 2)] & (before < len(time_s) - 1)
-    return ticks, np.where(step, driven.values[before], values)
+    return ticks, np.asarray(np.where(step, driven.values[before], values), dtype=np.float64)
 
 
 def steps_of(values: FloatArray) -> NDArray[np.bool_]:

@@ -11,7 +11,8 @@ from analyses.identification.points import steady_points
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.run_checks import check_runs
 from analyses.identification.steady import SteadyCriterion
-from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
+from analyses.identification.surface import fit_surface
+from analyses.identification.surface_fit import NAMES, SurfaceFit
 from analyses.identification.verdict import Item, residual_item, simulated_item, sizes_item
 from analyses.records.campaign_import import ImportedCampaign, SetAside
 from analyses.records.consistency import Finding

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analyses.identification.outliers import with_shared
-from analyses.identification.surface import SurfaceFit
+from analyses.identification.surface_fit import SurfaceFit
 
 FloatArray = NDArray[np.float64]
 Terms = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]

@@ -15,7 +15,7 @@ from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from analyses.identification.joint_model import KEYS, JointModel
 from analyses.identification.output_error import OutputErrorResult
-from analyses.identification.surface import PATHS, SurfaceFit
+from analyses.identification.surface_fit import PATHS, SurfaceFit
 
 FloatArray = NDArray[np.float64]
 

@@ -179,7 +179,8 @@ def _spec(table: Table) -> RecordSpec:
             "signals": _signals(table.table("signals")),
         }
         for name, default in (("bad_rows", "error"), ("missing", "drop"), ("disorder", "error")):
-            parts[name] = table.text(name, default, ("error", "drop"))
+            more = ("interpolate",) if name == "missing" else ()
+            parts[name] = table.text(name, default, ("error", "drop", *more))
         tolerance = table.quantity("resample_tolerance", "")
         if tolerance is not None:
             parts["resample_tolerance"] = tolerance

@@ -16,6 +16,7 @@ from actuator_lti.reading import open_regular
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
+from analyses.records.gaps import filled, several_rates
 from analyses.records.inputs import inputs_of
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
@@ -72,6 +73,7 @@ def read_csv_record(
         raise InputError(f"fewer than two usable rows ({counts})", where=str(path))
     notes = (f"averaged over {rows.factor} rows to bound memory",) if rows.factor > 1 else ()
     signals = {signal.name: np.ascontiguousarray(table[:, k]) for k, signal in enumerate(spec.signals, 1)}
+    signals, made = filled(table[:, 0], signals, spec.resample_tolerance, str(path))
     return Record(
         name=name or path.name,
         time_s=np.ascontiguousarray(table[:, 0]),
@@ -80,7 +82,7 @@ def read_csv_record(
         counts=counts,
         averaged=rows.factor,
         sha256=digest.hexdigest(),
-        notes=notes,
+        notes=(*notes, *made, *several_rates(counts)),
         inputs=inputs_of(spec, account.columns),
         resample_tolerance=spec.resample_tolerance,
     )

@@ -46,6 +46,7 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
         signals.reference = { column = "cmd", unit = "deg" }
         signals.current = { column = "I", unit = "mA", value = "rms" }
         resample_tolerance = "2 %"                     # of the range, where steps are missing or uneven
+        missing = "interpolate"                        # signals at several rates; default "drop" the row
 
     Raises
     ------

@@ -122,7 +122,7 @@ class Record:
         steps = np.diff(self.time_s)
         longest = int(np.argmax(steps))
         gap = float(steps[longest] / self.period_s)
-        errors = {name: _line_error(self.time_s, values, gap) for name, values in self.signals.items()}
+        errors = {name: line_error(self.time_s, values, gap) for name, values in self.signals.items()}
         worst = max(errors, key=lambda name: errors[name])
         note = (
             f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
@@ -135,7 +135,7 @@ class Record:
         return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
 
 
-def _line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
+def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
     """How far straight lines over a gap are from a signal, as a share of its range (95 % point)."""
     span = max(2, round(gap))
     reach = float(np.ptp(values))

@@ -9,6 +9,7 @@ from actuator_lti.errors import InputError
 from analyses.records.record import RESAMPLE_TOLERANCE
 
 Policy = Literal["error", "drop"]
+Missing = Literal["error", "drop", "interpolate"]
 
 MISSING_TEXTS = ("", "nan", "NaN", "NAN", "na", "NA", "N/A", "null", "NULL", "-")
 AC_FORMS = {
@@ -142,7 +143,8 @@ class RecordSpec:
     """Everything needed to read the files of one recorder.
 
     ``bad_rows``: what to do with a row that is no row of numbers (default: refuse the file, with line,
-    column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row).
+    column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row;
+    ``interpolate`` for signals logged at several rates, see `analyses.records.gaps`).
     ``disorder``: what to do when the time does not increase (default: refuse). Dropped rows are counted
     by reason. ``resample_tolerance``: see `Record.resampled`.
     """
@@ -151,7 +153,7 @@ class RecordSpec:
     signals: tuple[SignalColumn, ...]
     format: CsvFormat = CsvFormat()
     bad_rows: Policy = "error"
-    missing: Policy = "drop"
+    missing: Missing = "drop"
     disorder: Policy = "error"
     resample_tolerance: float = RESAMPLE_TOLERANCE
 
@@ -165,5 +167,7 @@ class RecordSpec:
         if twice:
             raise InputError(f"signals.{twice[0]}: given twice")
         for policy in ("bad_rows", "missing", "disorder"):
-            if getattr(self, policy) not in ("error", "drop"):
-                raise InputError(f'{policy} = "{getattr(self, policy)}": "error" or "drop"')
+            allowed = ("error", "drop", "interpolate") if policy == "missing" else ("error", "drop")
+            if getattr(self, policy) not in allowed:
+                told = " or ".join(f'"{one}"' for one in allowed)
+                raise InputError(f'{policy} = "{getattr(self, policy)}": {told}')

@@ -10,6 +10,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.csv_rows import Account, Block
+from analyses.records.gaps import filled, several_rates
 from analyses.records.inputs import inputs_of
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
@@ -48,6 +49,7 @@ def record_of_columns(
         c.name: convert(values[:, k])
         for k, (c, convert) in enumerate(zip(spec.signals, converters, strict=True))
     }
+    signals, notes = filled(time, signals, spec.resample_tolerance, str(path))
     return Record(
         name=name or path.name,
         time_s=time,
@@ -56,6 +58,7 @@ def record_of_columns(
         counts=account.frozen(),
         sha256=digest,
         constants=MappingProxyType(dict(constants or {})),
+        notes=(*notes, *several_rates(account.frozen())),
         inputs=inputs_of(spec, tuple(vectors)),
         resample_tolerance=spec.resample_tolerance,
     )

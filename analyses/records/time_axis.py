@@ -45,7 +45,10 @@ class TimeAxis:
     def _without_missing(
         self, values: FloatArray, lines: NDArray[np.int64]
     ) -> tuple[FloatArray, NDArray[np.int64]]:
-        missing: NDArray[np.bool_] = np.asarray(np.isnan(values).any(axis=1))
+        looked_at = values
+        if self._spec.missing == "interpolate":  # the signals are filled later, the time is not
+            looked_at = values[:, : 0 if self._spec.time.period_s is not None else 1]
+        missing: NDArray[np.bool_] = np.asarray(np.isnan(looked_at).any(axis=1))
         if missing.any() and self._spec.missing == "error":
             raise InputError("a value is missing", where=f"{self._origin}:{lines[missing.argmax()]}")
         return self._keep(~missing, values, lines, "with a missing value")

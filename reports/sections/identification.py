@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from analyses.identification.campaign import CampaignResult
     from analyses.identification.contributions import Contribution
     from analyses.identification.richer import RicherLaws
-    from analyses.identification.surface import SurfaceFit
+    from analyses.identification.surface_fit import SurfaceFit
     from analyses.identification.verdict import Item
 
 SHOWN = (("mN m", 1e3), ("µN m s/rad", 1e6), ("mN m/(N m)", 1e3))

@@ -13,7 +13,7 @@ from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
     from analyses.identification.campaign import CampaignResult
-    from analyses.identification.surface import SurfaceFit
+    from analyses.identification.surface_fit import SurfaceFit
 
 NAMES = ("C0", "Cv", "CM")
 

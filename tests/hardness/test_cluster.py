@@ -152,7 +152,7 @@ def cluster(tmp_path, monkeypatch):
         (tls / name).write_text(getattr(made, key))
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", protocol="tls://", security=made,
-        dashboard_address=None, silence_logs=50,
+        dashboard_address="127.0.0.1:0", silence_logs=50,
     ) as running:  # fmt: skip
         yield running, Engine(scheduler=running.scheduler_address, tls=tls)
 
@@ -205,6 +205,36 @@ def test_a_lost_worker_s_jobs_are_done_again(cluster, tmp_path) -> None:
     night = run_night(study(*jobs), tmp_path / "site", settings, code=CODE, progress=kill_one)
     assert killed
     assert {d.result.status for d in night.designs} == {"pass"}
+
+
+def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_path) -> None:
+    """One of two workers dies while designs are computed; what is found is what one process finds."""
+    import distributed
+
+    from analyses.study import load_study
+    from analyses.variants import compare
+
+    running, remote = cluster
+    (tmp_path / "study.toml").write_text(
+        '[study]\nbase = "ctms-motor-position"\n[[sweep]]\nparameter = "control.position.gain"\n'
+        'values = ["9 V/rad", "12 V/rad", "15 V/rad", "18 V/rad", "21 V/rad"]\n'
+    )
+    plan = load_study(tmp_path / "study.toml")
+    with distributed.Client(running) as client:
+        workers = list(client.run(os.getpid).values())
+    killed = []
+
+    def kill_one(done: int, total: int) -> None:
+        if done >= 2 and not killed:
+            killed.append(workers[0])
+            os.kill(workers[0], signal.SIGKILL)
+
+    found = compare(plan, engine=remote, folder=tmp_path / "designs", progress=kill_one)
+    assert killed
+    assert not found.refused
+    assert len(found.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6
+    here = compare(plan)
+    assert [one.figures for one in found.all] == [one.figures for one in here.all]
 
 
 def test_an_entry_that_comes_damaged_is_not_kept(tmp_path) -> None:

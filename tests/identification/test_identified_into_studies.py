@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,10 @@ import pytest
 from bench_records import columns_of, motion, write
 
 from actuator_lti.design import load_design
+from actuator_lti.design.model import Tolerance
+from actuator_lti.design.parameters import FrozenMap
+from analyses.identification.inverse import fit_records
+from analyses.records import open_record
 from analyses.sampling import sampler_of
 from analyses.tuning.problem import loop_requirements, problem_of
 from reports.cli.main import main
@@ -43,3 +48,18 @@ def test_what_was_identified_is_what_the_studies_draw(
     study = json.loads(capsys.readouterr().out)
     assert not status
     assert study["verdict"]["passed"] is True
+
+
+def test_the_tolerance_of_a_value_that_is_kept_counts_in_those_that_were_found(tmp_path: Path) -> None:
+    """At one constant load M, dry + CM M is all that shows: dry has the error M times that of CM."""
+    record = open_record(write(tmp_path / "a.csv", columns_of(motion(1, load_Nm=3.0), load_Nm=3.0)))
+    base = load_design("ilr33-amber")
+    key, std = "friction.load_coefficient", 2e-4
+    known = replace(base.parameters[key], tolerance=Tolerance(kind="normal", std=std))
+    design = replace(base, parameters=FrozenMap({**base.parameters, key: known}))
+    plain, wide = fit_records(base, [record]), fit_records(design, [record])
+    k = plain.names.index("dry")
+    assert plain.fixed["load_coefficient"].moves["dry"] == pytest.approx(3.0, rel=0.02)
+    added = wide.covariance[k, k] - plain.covariance[k, k]
+    assert np.sqrt(added) == pytest.approx(3.0 * std, rel=0.02)
+    assert "an error of it moves dry by -" in wide.fixed["load_coefficient"].reason

@@ -193,3 +193,31 @@ def test_correlate_begins_with_its_result_and_judges_on_demand(
     assert capsys.readouterr().out.startswith("FAIL  Motor angle of the model within")
     assert not main([*arguments, "--error-limit", "50"])
     assert capsys.readouterr().out.startswith("PASS")
+
+
+def test_signals_at_several_rates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The current every 5 ms among rows of 1 ms: rows are dropped, which is said, or kept."""
+    design = _bare("ctms-motor-position")
+    motor = replace(design.motor, inductance_H=2e-3)
+    current = replace(design, motor=motor)
+    run = simulate(current, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
+    sparse = [f"{value:.9g}" if k % 5 == 0 else "" for k, value in enumerate(run.current_A)]
+    rows = zip(run.time_s, run.motor_angle_rad, sparse, strict=True)
+    text = "time_s,angle_rad,current_A\n" + "".join(f"{t:.6f},{a:.9g},{i}\n" for t, a, i in rows)
+    (tmp_path / "r.csv").write_text(text)
+    (tmp_path / "r.toml").write_text(
+        'file = "r.csv"\nmissing = "interpolate"\ntime = { column = "time_s" }\n'
+        'signals.angle = { column = "angle_rad", unit = "rad" }\n'
+        'signals.current = { column = "current_A", unit = "A" }\n'
+    )
+    (tmp_path / "d.toml").write_text(write_design(_wrong(current)))
+    used = {}
+    for name in ("r.csv", "r.toml"):
+        main(["identify", str(tmp_path / name), "--design", str(tmp_path / "d.toml"), "--json"])
+        found = json.loads(capsys.readouterr().out)
+        used[name] = found["records"][0]["rows_in"]
+        near = 0.01 if name == "r.toml" else 0.05
+        assert found["parameters"]["inertia"]["value"] == pytest.approx(design.inertia_kgm2, rel=near)
+    assert used == {"r.csv": 800, "r.toml": 4000}
+    main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml")])
+    assert 'missing = "interpolate"' in " ".join(capsys.readouterr().out.split())

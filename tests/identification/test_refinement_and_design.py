@@ -18,7 +18,8 @@ from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
 from analyses.identification.steady import SteadyWindow
-from analyses.identification.surface import SurfaceFit, fit_surface
+from analyses.identification.surface import fit_surface
+from analyses.identification.surface_fit import SurfaceFit
 from analyses.identification.to_design import Estimate, design_with_estimate, joint_estimate
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments

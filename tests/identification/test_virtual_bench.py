@@ -12,7 +12,8 @@ from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Design
 from analyses.identification.campaign import CampaignResult, identify_campaign
 from analyses.identification.contributions import contributions
-from analyses.identification.surface import PATHS, fit_surface
+from analyses.identification.surface import fit_surface
+from analyses.identification.surface_fit import PATHS
 from analyses.identification.to_design import design_with_estimate, surface_estimate
 from analyses.records import import_campaign, load_campaign
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
