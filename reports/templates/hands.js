@@ -220,7 +220,8 @@
     for (const title of [...groups.keys()].sort((a, b) => rank(a) - rank(b))) {
       const group = html("details", "group");
       group.open = OPEN.includes(title);
-      group.append(html("summary", "", title), ...groups.get(title));
+      const unused = (row) => (keys.find((key) => key.path === row.dataset.path).value === 0 ? 1 : 0);
+      group.append(html("summary", "", title), ...groups.get(title).sort((a, b) => unused(a) - unused(b)));
       box.append(group);
     }
     const fixed = html("details", "group fixed"), list = html("ul");
@@ -339,8 +340,8 @@
     const unstable = data.loops.filter((name) => now.loops[name].figures && now.loops[name].figures[STABLE] !== 1);
     const words = [];
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail` + (fails.length === old.length ? "." : ` (as designed: ${old.length}).`) : `All ${total} requirements on the loops are met.`);
-    if (data.others) words.push(`${data.others} on the drive as a whole are judged in the report only.`);
+    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail (as designed: ${old.length}).` : `All ${total} requirements on the loops are met.`);
+    if (data.others) words.push(`${data.others} on the whole drive: see the report.`);
     if (refused) words.push(refused);
     line.className = `state ${unstable.length || fails.length ? "fail" : "pass"}`;
     line.textContent = words.join(" ");
