@@ -21,7 +21,7 @@ from nonlinear.export.entries import derive, emitted, init, prepare_sizes
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
-NO_LOOP, TOO_LONG, PERIODIC = 0, -1, -2
+NO_LOOP, TOO_LONG, PERIODIC, ELASTIC = 0, -1, -2, -3
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
@@ -261,6 +261,8 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
     """
+    if p[layout.ELASTIC_DRIVE] > 0.0:  # its contact is not linear
+        return ELASTIC
     linear_row(p, q)
     every = interval(q, stage)
     if every <= 0:

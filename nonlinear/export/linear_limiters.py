@@ -16,6 +16,7 @@ from nonlinear.export.entries import derive, emitted, init, prepare_sizes
 from nonlinear.export.linear import (
     COMMAND,
     CURRENT,
+    ELASTIC,
     MOST,
     PERIODIC,
     TOO_LONG,
@@ -74,6 +75,8 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
 
     The number of states, or what stands in the way.
     """
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        return ELASTIC
     linear_row(p, q)
     stage, every = outer_stage(q), outer_interval(q)
     if every > MOST_TICKS:
