@@ -114,6 +114,12 @@ def interval(q, stage):
 
 
 @emitted
+def too_long(q):
+    """Whether the delay line or the stored angles alone pass MOST, before anything is laid out for them."""
+    return not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST)
+
+
+@emitted
 def listed(q, places):
     """Where the drive remembers something, angles first; how many there are, and how many are angles."""
     count = 2
@@ -273,10 +279,12 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
     prepare_sizes(q)
-    derive(q, s)
+    if too_long(q):
+        return TOO_LONG
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
+    derive(q, s)
     for j in range(n):
         init(q, s)
         put_unit(s, places, j, angles)

@@ -26,6 +26,7 @@ from nonlinear.export.linear import (
     pruned,
     put_inputs,
     put_unit,
+    too_long,
 )
 
 MOST_TICKS = 16  # between two commands
@@ -82,10 +83,12 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
     if every > MOST_TICKS:
         return PERIODIC
     prepare_sizes(q)
-    derive(q, s)
+    if too_long(q):
+        return TOO_LONG
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
+    derive(q, s)
     for j in range(n + 1):
         init(q, s)
         if j < n:

@@ -94,6 +94,7 @@ def _sensitivity() -> Chart:
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0)
     panel = chart.panel()
+    panel.curve((0.0, 1.0), (1.0, 1.0), "command", colour=style.INK, width=1.0)
     _both(panel)
     panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
     panel.x.limits(0.0, 1.0)
