@@ -21,7 +21,7 @@ from nonlinear.export.entries import derive, emitted, init, prepare_sizes
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
-NO_LOOP, TOO_LONG, PERIODIC = 0, -1, -2
+NO_LOOP, TOO_LONG, PERIODIC, ELASTIC = 0, -1, -2, -3
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
@@ -111,6 +111,12 @@ def interval(q, stage):
     if fed and int(q[layout.EVERY_VELOCITY]) > whole:
         whole = int(q[layout.EVERY_VELOCITY])
     return made if whole == made else PERIODIC
+
+
+@emitted
+def too_long(q):
+    """Whether the delay line or the stored angles alone pass MOST, before anything is laid out for them."""
+    return not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST)
 
 
 @emitted
@@ -261,6 +267,8 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
     """
+    if p[layout.ELASTIC_DRIVE] > 0.0:  # its contact is not linear
+        return ELASTIC
     linear_row(p, q)
     every = interval(q, stage)
     if every <= 0:
@@ -271,10 +279,12 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
     prepare_sizes(q)
-    derive(q, s)
+    if too_long(q):
+        return TOO_LONG
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
+    derive(q, s)
     for j in range(n):
         init(q, s)
         put_unit(s, places, j, angles)

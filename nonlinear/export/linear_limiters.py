@@ -16,6 +16,7 @@ from nonlinear.export.entries import derive, emitted, init, prepare_sizes
 from nonlinear.export.linear import (
     COMMAND,
     CURRENT,
+    ELASTIC,
     MOST,
     PERIODIC,
     TOO_LONG,
@@ -25,6 +26,7 @@ from nonlinear.export.linear import (
     pruned,
     put_inputs,
     put_unit,
+    too_long,
 )
 
 MOST_TICKS = 16  # between two commands
@@ -74,15 +76,19 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
 
     The number of states, or what stands in the way.
     """
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        return ELASTIC
     linear_row(p, q)
     stage, every = outer_stage(q), outer_interval(q)
     if every > MOST_TICKS:
         return PERIODIC
     prepare_sizes(q)
-    derive(q, s)
+    if too_long(q):
+        return TOO_LONG
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
+    derive(q, s)
     for j in range(n + 1):
         init(q, s)
         if j < n:

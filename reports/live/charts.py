@@ -94,6 +94,7 @@ def _sensitivity() -> Chart:
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0)
     panel = chart.panel()
+    panel.curve((0.0, 1.0), (1.0, 1.0), "command", colour=style.INK, width=1.0)
     _both(panel)
     panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
     panel.x.limits(0.0, 1.0)
@@ -104,9 +105,9 @@ def _step() -> Chart:
 def _run() -> Chart:
     chart = Chart(width=style.HALF, height=290.0)
     panel = chart.panel()
-    _both(panel)
     panel.curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
-    panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=1.6)
+    panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=2.6, opacity=0.6)
+    _both(panel)
     panel.x.label, panel.y.label = "time, ms", "share of the largest command"
     panel.x.limits(0.0, 1.0)
     panel.y.limits(-0.1, 1.3)

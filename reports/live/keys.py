@@ -10,14 +10,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from actuator_lti.design.access import located, parameter_value, paths_of, stacked
+from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
-from nonlinear._kernels import layout as at
-from nonlinear.export.trace import Tape, Traced
-from nonlinear.parameters import design_row
+from nonlinear.export.page import reaches_row, row_statements
 
 REACH = 5.0  # a slider goes from a fifth of the value to five times it
 UNUSED = "has no influence on the loops or the run that this page follows"
@@ -56,11 +52,8 @@ def followed(design: Design) -> Followed:
             fixed.append({**_named(design, path), "why": reason})
         else:
             free.append(_slider(design, path))
-    tape = Tape(rounding=True)
-    values = {key["path"]: Traced(tape, f"k[{n}]", key["value"]) for n, key in enumerate(free)}
-    row = design_row(stacked(design, values), kind=object)
-    stored = [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
-    return Followed(free=free, fixed=fixed, lines=[*tape.lines, *stored])
+    lines = row_statements(design, {key["path"]: key["value"] for key in free})
+    return Followed(free=free, fixed=fixed, lines=lines)
 
 
 def _reason(design: Design, path: str) -> str:
@@ -71,12 +64,10 @@ def _reason(design: Design, path: str) -> str:
     value = parameter_value(design, path)
     if value < 0.0 or (value == 0.0 and not _top(design, path)):
         return ZERO
-    traced = Traced(Tape(rounding=True), "k", value)
-    try:
-        row: Any = design_row(stacked(design, {path: traced}), kind=object)
-    except TypeError:
+    reaches = reaches_row(design, path)
+    if reaches is None:
         return UNFOLLOWED
-    return "" if any(isinstance(row[n], Traced) for n in np.arange(at.SIZE)) else UNUSED
+    return "" if reaches else UNUSED
 
 
 def _top(design: Design, path: str) -> float:

@@ -8,18 +8,13 @@ from typing import Any
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
-from nonlinear._kernels import layout as at
-from nonlinear.export import linear, linear_limiters
+from nonlinear.export import linear, linear_limiters, page
 from nonlinear.export.c_files import exported
 from reports.live.keys import followed
 from reports.live.text import patches
 
 ELASTIC = "The drive train is elastic, or its friction is a map; the sliders follow rigid drives only."
 OPEN = "The drive has no loop."
-PLACES = {
-    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
-    "current": at.IO_CURRENT, "flags": at.IO_FLAGS, "period": at.PERIOD, "ratio": at.RATIO,
-}  # fmt: skip
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
@@ -31,7 +26,7 @@ def live_model(design: Design) -> dict[str, Any]:
         row = exported(design).row
     except InputError:
         return {"refused": ELASTIC}
-    if row[at.ELASTIC_DRIVE] > 0.0:
+    if page.is_elastic(row):
         return {"refused": ELASTIC}
     found = followed(design)
     text, places = patches(design, found.free)
@@ -42,11 +37,14 @@ def live_model(design: Design) -> dict[str, Any]:
         "fixed": found.fixed,
         "lines": found.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
-        "places": {**PLACES, "outer": at.EVERY_POSITION if design.controller.position else at.EVERY_VELOCITY},
+        "places": {
+            **page.PLACES,
+            "outer": page.EVERY_POSITION if design.controller.position else page.EVERY_VELOCITY,
+        },
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
-        "limiters": [[name, bit] for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)],
+        "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "requirements": _requirements(design),
         "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
@@ -107,10 +105,10 @@ def _limits(design: Design) -> list[list[Any]]:
     control = design.controller
     rated = bool(control.position and control.velocity)
     known: list[tuple[str, int, int, bool, bool]] = [
-        ("speed limit", at.SPEED_LIMIT, linear_limiters.SPEED, False, rated),
-        ("acceleration limit", at.ACCELERATION_LIMIT, linear_limiters.SPEED, True, rated),
-        ("peak current", at.CURRENT_LIMIT, linear_limiters.CURRENT_COMMAND, False,
+        ("speed limit", page.SPEED_LIMIT, linear_limiters.SPEED, False, rated),
+        ("acceleration limit", page.ACCELERATION_LIMIT, linear_limiters.SPEED, True, rated),
+        ("peak current", page.CURRENT_LIMIT, linear_limiters.CURRENT_COMMAND, False,
          control.current is not None and control.outermost != "current"),
-        ("voltage", at.VOLTAGE_LIMIT, linear_limiters.VOLTAGE, False, True),
+        ("voltage", page.VOLTAGE_LIMIT, linear_limiters.VOLTAGE, False, True),
     ]  # fmt: skip
     return [[label, place, signal, rate] for label, place, signal, rate, there in known if there]

@@ -154,6 +154,7 @@
   const same = (a, b) => a.every((value, k) => value === b[k]);
   const share = (key, value) => (key.low > 0 ? Math.log(value / key.low) / Math.log(key.high / key.low) : (value - key.low) / (key.high - key.low));
   const valueAt = (key, part) => (key.low > 0 ? key.low * (key.high / key.low) ** part : key.low + part * (key.high - key.low));
+  const allowed = (key, value) => Number.isFinite(value) && (key.low > 0 ? value > 0 : value >= 0);
   const inUnit = (key, value) => value / key.factor;
   const OPEN = matchMedia("(max-width: 60rem)").matches ? ["control.position", "control.velocity"] : ["control", "control.position", "control.velocity", "control.current"];
   const ORDER = ["control.position", "control.velocity", "control.current", "control", "encoder", "command", "limits", "friction", "load", "supply", "motor", "gear"];
@@ -201,7 +202,7 @@
     range.addEventListener("dblclick", () => { preview(k, key.value); commit(); });
     field.addEventListener("change", () => {
       const typed = Number(field.value.replace(",", ".").replace("−", "-"));
-      if (field.value.trim() !== "" && Number.isFinite(typed)) { preview(k, typed === inUnit(key, key.value) ? key.value : typed * key.factor); commit(); }
+      if (field.value.trim() !== "" && allowed(key, typed * key.factor)) { preview(k, typed === inUnit(key, key.value) ? key.value : typed * key.factor); commit(); }
       else show();
     });
     const was = html("span", "was");
@@ -220,7 +221,8 @@
     for (const title of [...groups.keys()].sort((a, b) => rank(a) - rank(b))) {
       const group = html("details", "group");
       group.open = OPEN.includes(title);
-      group.append(html("summary", "", title), ...groups.get(title));
+      const unused = (row) => (keys.find((key) => key.path === row.dataset.path).value === 0 ? 1 : 0);
+      group.append(html("summary", "", title), ...groups.get(title).sort((a, b) => unused(a) - unused(b)));
       box.append(group);
     }
     const fixed = html("details", "group fixed"), list = html("ul");
@@ -268,8 +270,9 @@
   const fromFragment = () => {
     const text = location.hash;
     if (!text.startsWith("#hands-on?")) return;
-    const told = new Map(text.slice(10).split("&").map((part) => part.split("=")).map(([path, value]) => [decodeURIComponent(path), Number(value)]));
-    values = keys.map((key) => (Number.isFinite(told.get(key.path)) && told.get(key.path) >= 0 ? told.get(key.path) : key.value));
+    let told;
+    try { told = new Map(text.slice(10).split("&").map((part) => part.split("=")).map(([path, value]) => [decodeURIComponent(path), Number(value || NaN)])); } catch { return; }
+    values = keys.map((key) => (allowed(key, told.get(key.path)) ? told.get(key.path) : key.value));
     commit();
     root.scrollIntoView();
   };
@@ -339,8 +342,8 @@
     const unstable = data.loops.filter((name) => now.loops[name].figures && now.loops[name].figures[STABLE] !== 1);
     const words = [];
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail` + (fails.length === old.length ? "." : ` (as designed: ${old.length}).`) : `All ${total} requirements on the loops are met.`);
-    if (data.others) words.push(`${data.others} on the drive as a whole are judged in the report only.`);
+    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail (as designed: ${old.length}).` : `All ${total} requirements on the loops are met.`);
+    if (data.others) words.push(`${data.others} on the whole drive: see the report.`);
     if (refused) words.push(refused);
     line.className = `state ${unstable.length || fails.length ? "fail" : "pass"}`;
     line.textContent = words.join(" ");
@@ -428,7 +431,9 @@
     tell("bode", "chart:axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
     tell("bode", "chart:axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
     tell("sensitivity", "chart:axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
-    tell("step", "chart:axes", { panel: 0, x: [0, part.count * before.loops[name].period * 1e3], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
+    const end = part.count * before.loops[name].period * 1e3;
+    tell("step", "chart:axes", { panel: 0, x: [0, end], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
+    tell("step", "chart:redraw", { panel: 0, curve: "command", x: [0, end], y: [1, 1] });
   };
 
   // --- the run with limits and friction -------------------------------------------------------------------

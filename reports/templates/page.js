@@ -4,7 +4,9 @@
     for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
   };
   const follow = () => {
-    if (location.hash.length > 1) open(document.getElementById(decodeURIComponent(location.hash.slice(1))));
+    let name = location.hash.slice(1);
+    try { name = decodeURIComponent(name); } catch { /* no text of ours */ }
+    if (name) open(document.getElementById(name));
   };
   addEventListener("hashchange", follow);
   follow();

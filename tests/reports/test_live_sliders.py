@@ -78,7 +78,7 @@ def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "",
     page.on("pageerror", lambda error: trouble.append(str(error)))
     page.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != own else None)
     page.goto(own + fragment)
-    page.wait_for_selector("#hands-on[data-ready]", timeout=20_000)
+    page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
     return page
 
 
@@ -209,6 +209,29 @@ def test_undo_redo_reset_and_keyboard(page: Page) -> None:
     settled(page, lambda: page.click('[data-do="reset"]'))
     assert read(page) == before
     assert "#" not in page.url
+
+
+@pytest.mark.parametrize("delay_us", [1e4, 1e15, 1e300])
+def test_a_value_that_is_too_much_is_said_and_undone(page: Page, delay_us: float) -> None:
+    before = read(page)
+    type_value(page, "control.computing_delay", delay_us)
+    assert "too many states for this page" in page.inner_text(".now")
+    settled(page, lambda: page.click('[data-do="undo"]'))
+    assert read(page) == before
+
+
+def test_nonsense_is_not_taken(browser: Browser, page: Page, made: Path) -> None:
+    before = read(page)
+    for words in ("-5", "abc", "", "0", "Infinity"):
+        page.fill('.row[data-path="control.position.gain"] .field', words)
+        page.press('.row[data-path="control.position.gain"] .field', "Enter")
+    assert read(page) == before
+    trouble: list[str] = []
+    nonsense = "#hands-on?control.position.gain=-1&%E0%A4%A=3&control.velocity.gain&no.key=4"
+    other = opened(browser, made, trouble, fragment=nonsense)
+    assert read(other) == before
+    other.context.close()
+    assert trouble == []
 
 
 def test_a_link_carries_the_changes(browser: Browser, page: Page, made: Path) -> None:

@@ -1,0 +1,45 @@
+"""What the live page must know of the rows: places, limiters, and how the row follows from the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from actuator_lti.design.access import parameter_value, stacked
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout as at
+from nonlinear.export.trace import Tape, Traced
+from nonlinear.parameters import design_row
+
+PLACES = {
+    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
+    "current": at.IO_CURRENT, "flags": at.IO_FLAGS, "period": at.PERIOD, "ratio": at.RATIO,
+}  # fmt: skip
+EVERY_POSITION, EVERY_VELOCITY = at.EVERY_POSITION, at.EVERY_VELOCITY
+SPEED_LIMIT, ACCELERATION_LIMIT = at.SPEED_LIMIT, at.ACCELERATION_LIMIT
+CURRENT_LIMIT, VOLTAGE_LIMIT = at.CURRENT_LIMIT, at.VOLTAGE_LIMIT
+LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in the flags
+
+
+def is_elastic(row: Any) -> bool:
+    """Whether a row is that of an elastic drive train, or of one with a friction map."""
+    return bool(row[at.ELASTIC_DRIVE] > 0.0)
+
+
+def reaches_row(design: Design, path: str) -> bool | None:
+    """Whether a key has an influence on the row; None where it cannot be followed."""
+    traced = Traced(Tape(rounding=True), "k", parameter_value(design, path))
+    try:
+        row: Any = design_row(stacked(design, {path: traced}), kind=object)
+    except TypeError:
+        return None
+    return any(isinstance(item, Traced) for item in row)
+
+
+def row_statements(design: Design, keys: Mapping[str, float]) -> list[str]:
+    """The statements from keys, ``k[0]``, ``k[1]``, ... in their order, to the row, in C."""
+    tape = Tape(rounding=True)
+    values = {path: Traced(tape, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
+    row = design_row(stacked(design, values), kind=object)
+    stored = [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
+    return [*tape.lines, *stored]
