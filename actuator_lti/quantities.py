@@ -46,6 +46,11 @@ class Quantity:
         Whether it is one of the step response: stairs of samples, without a slope.
     size : float
         Its usual size: what a distance to a limit of 0 is measured by.
+    heading : str
+        What the tables of a report call its column; empty where they have none.
+    tolerance : float
+        In its unit: a smaller difference between two nights is rounding. A part in a thousand of the figure,
+        where that is more, counts as none in any case.
     """
 
     name: str
@@ -61,6 +66,8 @@ class Quantity:
     timed: bool = False
     size: float = 1.0
     found_by: Literal["loop", "capability", "stiffness"] = "loop"
+    heading: str = ""
+    tolerance: float = 1e-9
 
     def unit_for(self, axis: Axis) -> str:
         """The unit in which this figure is reported."""
@@ -81,26 +88,29 @@ class Quantity:
 
 _LIST = (
     Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down", "gain margin",
-             "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0),
+             "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0,
+             heading="Gain margin", tolerance=0.01),
     Quantity("phase_margin", "deg", "loop", "smallest phase margin", "phase margin",
-             "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0),
+             "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0,
+             heading="Phase margin", tolerance=0.05),
     Quantity("delay_margin", "s", "loop", "smallest delay margin", "delay margin",
-             "margins.delay_margin_s", 1),
+             "margins.delay_margin_s", 1, heading="Delay margin", tolerance=1e-07),
     Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
-             "margins.modulus_margin", 1, closed=False, size=0.5),
+             "margins.modulus_margin", 1, closed=False, size=0.5, heading="Modulus margin"),
     Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
-             "margins.sensitivity_peak_db", -1, closed=False, size=6.0),
+             "margins.sensitivity_peak_db", -1, closed=False, size=6.0, heading="Peak of S", tolerance=0.01),
     Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB", "bandwidth (\N{MINUS SIGN}3 dB)",
-             "bandwidth.minus3db_hz", 1),
+             "bandwidth.minus3db_hz", 1, heading="\N{MINUS SIGN}3 dB"),
     Quantity("bandwidth_90deg", "Hz", "loop", "closed loop -90 deg", "bandwidth (\N{MINUS SIGN}90°)",
-             "bandwidth.minus90deg_hz", 1),
+             "bandwidth.minus90deg_hz", 1, heading="\N{MINUS SIGN}90°"),
     Quantity("resonance_peak", "dB", "loop", "peak of |T| over its value at DC", "resonance peak",
-             "bandwidth.resonance_peak_db", -1, size=6.0),
+             "bandwidth.resonance_peak_db", -1, size=6.0, heading="Resonance", tolerance=0.01),
     Quantity("overshoot", "%", "loop", "of the step of the closed loop", "overshoot",
-             "step.overshoot_percent", -1, timed=True, size=10.0),
-    Quantity("rise_time", "s", "loop", "10 % to 90 %", "rise time", "step.rise_time_s", -1, timed=True),
+             "step.overshoot_percent", -1, timed=True, size=10.0, heading="Overshoot", tolerance=0.05),
+    Quantity("rise_time", "s", "loop", "10 % to 90 %", "rise time", "step.rise_time_s", -1, timed=True,
+             heading="Rise 10–90 %", tolerance=1e-07),
     Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
-             "step.settling_time_s", -1, timed=True),
+             "step.settling_time_s", -1, timed=True, heading="Settling 2 %", tolerance=1e-07),
     Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
              "output_rate_rad_s", 1, "m/s", found_by="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.batch.parameters import Population
-from actuator_lti.batch.withheld import withhold
 from actuator_lti.drive.operating import Operating, OperatingPoint
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
@@ -260,6 +259,8 @@ def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray)
 
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
+    from actuator_lti.batch.withheld import withhold
+
     from ._run import many_loops
 
     A, B, C = _stacked(block, len(rows))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.design.access import located, paths_of, stacked
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.sampling import split_delay
@@ -23,8 +24,6 @@ Values = Mapping[str, np.ndarray]
 
 def variable_paths(design: Design) -> tuple[str, ...]:
     """Every dotted key of a design that is a continuous number and that may vary over many designs."""
-    from actuator_lti.design.access import located, paths_of
-
     return tuple(
         path
         for path in paths_of(design)
@@ -61,8 +60,6 @@ class Population:
     @cached_property
     def stacked(self) -> Design:
         """The design with arrays of shape (count,) in place of the numbers that vary."""
-        from actuator_lti.design.access import stacked
-
         return stacked(self.design, {p: np.asarray(v, dtype=float) for p, v in self.values.items()})
 
     def part(self, chosen: Any) -> Population:
@@ -82,8 +79,6 @@ class Population:
 
     def get(self, path: str, otherwise: float = 0.0) -> np.ndarray | float:
         """The values of a key, its nominal value where it does not vary, or a default."""
-        from actuator_lti.design.access import located
-
         try:
             field, part = located(self.stacked, path)
         except InputError:

@@ -191,7 +191,8 @@ class Builder:
     def objects(self) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         from actuator_lti.design.objects import check_objects
-        from actuator_lti.design.settings_file import checked_factor, object_from
+        from actuator_lti.design.settings_checks import checked_factor
+        from actuator_lti.design.settings_file import object_from
 
         raw = self.document.objects
         if raw is None:

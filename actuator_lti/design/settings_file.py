@@ -8,11 +8,11 @@ from typing import Any
 
 from actuator_lti.design.model import ControllerObject, ControllerObjects
 from actuator_lti.design.object_dictionary import OBJECTS
-from actuator_lti.design.objects import check_objects
+from actuator_lti.design.settings_checks import checked_objects
+from actuator_lti.design.settings_xml import read_settings_xml
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, parse_toml, read_bytes, shown
 
-MAX_OBJECTS = 5000
 _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 
 
@@ -33,8 +33,6 @@ def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -
     """
     where = shown(str(path), 200)[1:-1]
     text = decode(read_bytes(Path(path), "settings file"), where)
-    from actuator_lti.design.settings_xml import read_settings_xml
-
     read = read_settings_xml if text.lstrip().startswith("<") else read_settings_toml
     return read(text, where, velocity_gain_factor)
 
@@ -86,23 +84,6 @@ def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None
     factor = tree.get("velocity_gain_factor", 1.0) if velocity_gain_factor is None else velocity_gain_factor
     values = tuple(object_from(label, raw, where) for label, raw in entries.items())
     return checked_objects(values, factor, where)
-
-
-def checked_factor(factor: Any, where: str) -> float:
-    """The calibration factor of the velocity gain, finite and positive."""
-    if isinstance(factor, bool) or not isinstance(factor, int | float) or not 1e-6 <= factor <= 1e6:
-        raise InputError(
-            f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)", where=where
-        )
-    return float(factor)
-
-
-def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
-    """Settings from their parts, each in its range."""
-    if len(values) > MAX_OBJECTS:
-        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}", where=where)
-    check_objects(values, where)
-    return ControllerObjects(velocity_gain_factor=checked_factor(factor, where), values=values)
 
 
 def write_settings_toml(objects: ControllerObjects) -> str:

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, ParseError, SubElement, indent, regis
 
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.model import ControllerObject, ControllerObjects
-from actuator_lti.design.settings_file import checked_objects
+from actuator_lti.design.settings_checks import checked_objects
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, read_bytes, shown
 

@@ -75,7 +75,10 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
 
 
 def _roots_of_factor(p: fmpz_poly) -> list[acb]:
-    return isolated_roots(p) if p.degree() > _HIGH else [acb(root) for root, _ in p.complex_roots()]
+    if p.degree() > _HIGH:
+        return isolated_roots(p)
+    found: Any = p.complex_roots()
+    return [acb(root) for root, _ in found]
 
 
 def sign_changes(p: fmpz_poly) -> int:

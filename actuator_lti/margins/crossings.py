@@ -12,7 +12,6 @@ from actuator_lti.margins.circles import Circles, on_axis, unwarped, warped
 from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
 from actuator_lti.margins.trust import Doubtful
 
-TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve counts as touching
 _POSSIBLE_TOUCH = 1e-3
 _NEWTON_STEP = 1e-9
 _NEWTON_STEPS = 8

@@ -19,8 +19,8 @@ from actuator_lti.margins.certified_roots import (
     positive_roots,
     split,
 )
-from actuator_lti.margins.crossings import TOUCH
 from actuator_lti.margins.exact_loop import ExactLoop
+from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
 _ACCURATE = 56  # bits of a figure

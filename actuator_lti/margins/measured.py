@@ -69,6 +69,7 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         band_rad_s=(float(omega[0]), float(omega[-1])),
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
+        evidence_reason="measured points: the figures lie in their ranges, stability is not told",
         notes=(*_NOTES, noise, *_hidden(omega, found), *_lost(omega, found), *grazed, *touched),
     )
 

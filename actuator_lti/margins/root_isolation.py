@@ -14,14 +14,17 @@ from itertools import pairwise
 
 import numpy as np
 from flint import acb, acb_poly, arb, ctx, fmpz, fmpz_poly
+from numpy.typing import NDArray
 
-from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.margins.loop import Complex, Mask
 
 _FIRST_BITS, _MOST_BITS = 64, 1 << 13
 _ROUNDS = 120
 _FEW = 1e-14  # relative step at which a position in double precision stands
 _TOLD_BITS = 10  # of p at a point: enough for a step
 _CLOSE_BITS = 512  # positions of roots closer than double precision parts
+
+Indices = NDArray[np.intp]
 
 
 class NotIsolated(ArithmeticError):
@@ -70,7 +73,7 @@ def _positions(coefficients: tuple[fmpz, ...]) -> tuple[acb, ...]:
         return tuple(_parted(steps, z, active))
 
 
-def _repulsion(z: Complex, k: Real) -> Complex:
+def _repulsion(z: Complex, k: Indices) -> Complex:
     """The sum of 1/(z_k - z_j) over all other j."""
     apart = z[k][:, None] - z[None, :]
     apart[np.arange(k.size), k] = np.inf
@@ -145,7 +148,7 @@ class _NewtonSteps:
         self._rounded: dict[int, tuple[acb_poly, acb_poly]] = {}
         self._bits = np.full(p.degree(), _FIRST_BITS)
 
-    def at(self, z: Complex, which: Real) -> Complex:
+    def at(self, z: Complex, which: Indices) -> Complex:
         """The steps of some of the roots."""
         return np.array([complex(self._step(acb(x), k)) for x, k in zip(z, which, strict=True)])
 

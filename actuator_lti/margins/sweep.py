@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.crossings import TOUCH
 from actuator_lti.margins.delay_form import Cells, DelayForm, cells
 from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.margins.trust import TOUCH
 
 RESOLVED = 0.05  # change inside an interval, relative to the value, below which it is not split further
 _MOST = 400_000

@@ -11,6 +11,7 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 EPS = float(np.finfo(float).eps)
 ZERO = 1e8  # L of less than so many of its own rounding errors is zero: true zeros gave 8e5 at most
+TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve counts as touching
 MOST_ERROR = 1e-10  # relative bound of the error of L at a crossing
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Design
+from analyses.linear_states import AT_REST, without_value
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -145,6 +146,8 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
         held["i"] = start / resistance
     held |= {"current.I": voltage} | {name: voltage for name in system.states if name[0] == "u"}
     error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": design.controller.position_loop.gain}
+    if without_value(system.states, held.keys() | error.keys(), AT_REST):
+        return None  # what a filter, say, holds before breakaway is not known here
     rests = (
         system.initial_state({k: v for k, v in held.items() if k in system.states}),
         system.initial_state({k: v for k, v in error.items() if k in system.states}),

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
 from analyses.large_signal.formulas import FULL_TRIANGLE
+from analyses.linear_states import without_value
 from nonlinear import Rows
 
 PLACES = {
@@ -21,6 +23,12 @@ PLACES = {
     "hold_i_ref": "current_command_start",
     "u1": "voltage_start",
 }
+LEFT_AT_REST = (
+    r"W|twist|acc|u\d+",
+    r"(?:speed\d*|estimate|torque\d+|command|position|derivative)\..+",
+    r"hold_\w+|\w+_prev",
+)
+"""States that a run begins at rest: rows have no word for them; the settling time counts their decay."""
 DECAY = math.log(1e3)
 LONGEST_PERIODS = 20_000
 
@@ -71,6 +79,9 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
         seen = (x @ A_b.T + B_b) @ C[th] + D[th, 0]
         output += seen * np.exp(-1j * omega_rad_s * j * Ts) / M
+    unknown = without_value(system.states, PLACES.keys(), LEFT_AT_REST)
+    if unknown:
+        raise NumericalError(f"state {unknown[0]} of the linear drive: no start of a run knows it")
     states = {PLACES[name]: x[:, k] for k, name in enumerate(system.states) if name in PLACES}
     if speed:
         row = system.outputs.index("w_ref")

@@ -8,12 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from actuator_lti.errors import InputError
+from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from reports.nightly.figures import Figure
 from reports.nightly.text import one_line
 
 RELATIVE = 1e-3
 FLOOR = 1e-9  # below it a figure is rounding, whatever its unit
-ABSOLUTE = {"dB": 0.01, "deg": 0.05, "%": 0.05, "samples": 0.01, "s": 1e-7}
+_IN_UNIT = {("s", "ms"): 1e3}
+_BY_HEADING = {quantity.heading: quantity for quantity in QUANTITIES.values() if quantity.heading}
+_BY_UNIT = {quantity.unit: quantity.tolerance for quantity in LOOP_QUANTITIES.values()} | {"samples": 0.01}
 MAX_RULES = 200
 
 
@@ -28,7 +31,7 @@ class Rule:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """The rules of a study in their order; what none matches moves by 0.1 % or a small step of its unit."""
+    """The rules of a study in their order; what none matches moves by what the registry of quantities has."""
 
     rules: tuple[Rule, ...] = ()
 
@@ -44,7 +47,17 @@ class Tolerances:
         for rule in self.rules:
             if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
                 return rule.absolute, rule.relative
-        return ABSOLUTE.get(figure.unit, FLOOR), RELATIVE
+        return _declared(figure), RELATIVE
+
+
+def _declared(figure: Figure) -> float:
+    """The tolerance that the registry of quantities has for a figure: of its column, else of its unit."""
+    quantity = _BY_HEADING.get(figure.name.rpartition(" / ")[2])
+    if quantity is None:
+        return _BY_UNIT.get(figure.unit, FLOOR)
+    if figure.unit in (quantity.unit, ""):
+        return quantity.tolerance
+    return quantity.tolerance * _IN_UNIT.get((quantity.unit, figure.unit), 0.0) or FLOOR
 
 
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:

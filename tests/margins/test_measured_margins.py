@@ -22,6 +22,7 @@ def test_crossings_lie_in_their_brackets_and_figures_in_their_ranges() -> None:
         m = stability_margins(control.frd(A1, np.geomspace(0.2, 8, count)))
         assert m.stable is None
         assert m.verdict == "undecided"
+        assert "measured points" in m.evidence_reason
         (gain,), (phase,) = m.gain_margins, m.phase_margins
         assert gain.bracket_rad_s is not None
         assert gain.ratio_range is not None
