@@ -94,8 +94,8 @@ def test_a_record_holds_the_whole_load() -> None:
 def test_a_simulated_record_correlates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A drive with friction that a load makes: without its load the record would not be met."""
     path, load = tmp_path / "run.csv", tmp_path / "load.csv"
-    load.write_text("t,M\n" + "".join(f"{0.01 * k},{3 * np.sin(0.3 * k)}\n" for k in range(31)))
-    words = "--command multisine --amplitude 0.5 --frequency 5 --to 20 --count 3 --duration 0.2 --load 2"
+    load.write_text("t,M\n" + "".join(f"{0.01 * k},{np.sin(0.3 * k)}\n" for k in range(31)))
+    words = "--command multisine --amplitude 0.5 --frequency 2 --to 6 --count 3 --duration 0.5 --load 1"
     assert run(f"ilr33-amber {words} --load-file {load} --load-slope -5 --csv {path}", capsys)[0] == 0
     assert main(["correlate", "ilr33-amber", str(path), "--json"]) == 0
     found = relative_errors(json.loads(capsys.readouterr().out))
