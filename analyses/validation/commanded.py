@@ -161,7 +161,9 @@ def _read(
         reason = "gravity is not proportional to the angle"
     elif found.coupling_Nm and _parted(run, n - samples):
         reason = "the coupling comes free"
-    return _Point(amplitude, last / amplitude, change, reason)
+    # a speed is commanded at the output, and predicted at the motor
+    commanded = amplitude * (design.total_ratio if design.controller.outermost == "velocity" else 1.0)
+    return _Point(amplitude, last / commanded, change, reason)
 
 
 def _parted(run: Trajectory, since: int) -> bool:

@@ -38,7 +38,11 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     if not found.speed_rad_s:
         why = "the drive has no steady motion within its limits, or its load changes with the angle"
         return not_judged(name, quantity, unit, None, None, why, CONDITION)
-    setup = Rig(design, stages_of(design)[-1], found)
+    rigs = [Rig(design, stage, found) for stage in reversed(stages_of(design))]
+    setup = next((one for one in rigs if one.steady_start), None)
+    if setup is None:
+        why = "the position controller remembers: no run begins in its steady state"
+        return not_judged(name, quantity, unit, None, None, why, CONDITION)
     row = setup.row()
     window = WINDOW * setup.base_ticks
     row["ticks"] = settle_ticks + 2 * window
