@@ -118,8 +118,28 @@ def _judge_loop(
             id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
         )
     value = QUANTITIES[requirement.quantity].read(found)
-    reason = "" if value is not None else "not found in the band of this loop"
+    reason = which_response(requirement.quantity, name)
+    if value is None:
+        reason = "not found in the band of this loop"
     return _verdict(requirement, id, name, value, reason)
+
+
+def which_response(quantity: str, loop: str) -> str:
+    """Which of two responses a figure is taken of, in words; empty for a figure that both share.
+
+    Bandwidth, resonance and step of the position loop are those of the response to the command, with its
+    feed-forward and filters; of an inner loop, those of the feedback loop.
+
+    Examples
+    --------
+    >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
+    ('of the response to the command, feed-forward and filters included', '')
+    """
+    if not QUANTITIES[quantity].reader.startswith(("bandwidth.", "step.")):
+        return ""
+    if loop == "position":
+        return "of the response to the command, feed-forward and filters included"
+    return "of the feedback loop"
 
 
 def _verdict(

@@ -8,7 +8,7 @@ break point, as the injected signal of a `Probe`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, pi
 from os import PathLike
 
@@ -34,6 +34,8 @@ __all__ = [
 ]
 
 Floats = npt.NDArray[np.float64]
+LEAST_SPECTRUM = 16  # samples from which on a spectrum is looked at
+UNEVEN = 1.5  # times the usual interval: a longer one is a hole
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,9 @@ class Command:
     end_s : float
         When it is over; inf where it goes on.
     samples : ndarray or None
-        Times (s) and values of a tabulated command, shape (2, m).
+        Times (s) and values of a tabulated command, shape (2, m); zero before the first of them.
+    held : bool
+        Whether each tabulated value holds until the next; else linear between them.
     """
 
     kind: str
@@ -62,6 +66,46 @@ class Command:
     highest_hz: float = 0.0
     end_s: float = float("inf")
     samples: Floats | None = None
+    held: bool = False
+
+    def later(self, start_s: float) -> Command:
+        """A tabulated command that begins at ``start_s``, and is zero before.
+
+        Examples
+        --------
+        >>> sampled([0.0, 0.001, 0.002], [1.0, 2.0, 3.0]).later(0.001).values(1e-3, 4).tolist()
+        [0.0, 1.0, 2.0, 3.0]
+
+        Raises
+        ------
+        InputError
+            For a start before zero or not finite, or a command that has a start of its own.
+        """
+        _finite(self.kind, start_s=start_s)
+        if start_s < 0.0:
+            raise InputError(f"command {self.kind}: start_s = {start_s:g}: must be 0 or later")
+        if self.samples is None:
+            raise InputError(f"command {self.kind}: its start is an argument of its own")
+        samples = self.samples + np.array([[start_s], [0.0]])
+        return replace(self, samples=samples, end_s=self.end_s + start_s)
+
+    def highest_content(self, nyquist_hz: float) -> float:
+        """Largest line of a tabulated command above a frequency, as a part of its range.
+
+        Of the samples put on an even grid, without their straight line, under a Hann window.
+        """
+        if self.samples is None or self.samples.shape[1] < LEAST_SPECTRUM:
+            return 0.0
+        times, values = self.samples
+        even = np.linspace(times[0], times[-1], times.size)
+        y = np.interp(even, times, values)
+        y = y - np.linspace(y[0], y[-1], y.size)
+        size = float(np.ptp(y))
+        if size == 0.0:
+            return 0.0
+        lines = 4.0 * np.abs(np.fft.rfft(y * np.hanning(y.size))) / y.size
+        above = np.fft.rfftfreq(y.size, even[1] - even[0]) > nyquist_hz
+        return float(lines[above].max(initial=0.0)) / (0.5 * size)
 
     def table(self, period_s: float, ticks: int) -> Floats | None:
         """Values at the ticks of a tabulated command, linear between its points; ``None`` for the others."""
@@ -70,7 +114,11 @@ class Command:
         times, values = self.samples
         count = min(ticks, int(np.ceil(min(times[-1] / period_s, 1e18) - 1e-9)) + 1)
         SIGNAL_ROWS.check(count)
-        return np.interp(np.arange(max(count, 1)) * period_s, times, values)
+        at_ticks = np.arange(max(count, 1)) * period_s
+        if not self.held:
+            return np.interp(at_ticks, times, values, left=0.0)
+        which = np.searchsorted(times, at_ticks * (1.0 + 1e-12) + 1e-9 * period_s, side="right") - 1
+        return np.where(which < 0, 0.0, values[which])
 
     def values(self, period_s: float, ticks: int) -> Floats:
         """Value at each of the first ``ticks`` ticks, as the simulator sees it."""
@@ -201,7 +249,16 @@ def multisine(
     *,
     seed: int = 0,
 ) -> Command:
-    """Sum of equal sines with random phases from ``seed``, scaled to the peak ``amplitude_rad``."""
+    """Sum of equal sines with random phases from ``seed``, scaled to the peak ``amplitude_rad``.
+
+    Every frequency is moved to the next whole number of periods in ``duration_s``, so that the signal is
+    periodic in it; all are turned together so that it begins at zero, rising.
+
+    Raises
+    ------
+    InputError
+        For a frequency of less than one period in the duration, or two that fall together.
+    """
     _finite("multisine", amplitude_rad=amplitude_rad)
     _positive("multisine", duration_s=duration_s, period_s=period_s)
     TONES.check(len(frequencies_hz))
@@ -213,14 +270,56 @@ def multisine(
         _positive("multisine", frequencies_hz=frequency)
     if not len(frequencies_hz):
         raise InputError("command multisine: at least one frequency needed")
-    f = np.asarray(frequencies_hz, dtype=float)
+    periods = np.rint(np.asarray(frequencies_hz, dtype=float) * duration_s)
+    if periods.min() < 1.0:
+        least = float(np.min(np.asarray(frequencies_hz, dtype=float)))
+        message = f"command multisine: {least:g} Hz: less than one period in {duration_s:g} s"
+        raise InputError(f"{message}; a longer duration or a higher frequency is needed")
+    if np.unique(periods).size < periods.size:
+        message = f"command multisine: two frequencies of {periods.size} have the same number of periods"
+        raise InputError(f"{message} in {duration_s:g} s; fewer of them or a longer duration is needed")
+    f = periods / duration_s
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * pi, f.size)
+    phases += 2.0 * pi * f * _first_rise(f, phases, duration_s)
     t = np.arange(round(duration_s / period_s) + 1) * period_s
     values = np.zeros(t.size)
     for frequency, phase in zip(f, phases, strict=True):
         values += np.sin(2.0 * pi * frequency * t + phase)
     values *= amplitude_rad / np.abs(values).max()
     return Command("multisine", at.TABLE, (), float(f.max()), float(t[-1]), np.vstack([t, values]))
+
+
+def _first_rise(frequency_hz: Floats, phases: Floats, duration_s: float) -> float:
+    """A time at which a sum of sines passes zero, rising."""
+    from scipy.optimize import brentq
+
+    def value(t: float) -> float:
+        return float(np.sin(2.0 * pi * frequency_hz * t + phases).sum())
+
+    t = np.linspace(0.0, duration_s, 8 * int(np.ceil(frequency_hz.max() * duration_s)) + 1)
+    seen = np.zeros(t.size)
+    for frequency, phase in zip(frequency_hz, phases, strict=True):
+        seen += np.sin(2.0 * pi * frequency * t + phase)
+    k = int(np.flatnonzero((seen[:-1] < 0.0) & (seen[1:] >= 0.0))[0])
+    return float(brentq(value, t[k], t[k + 1], xtol=1e-15 * duration_s))
+
+
+def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event log") -> Command:
+    """A log of changes: each value holds from its time until the next; times may be uneven.
+
+    Examples
+    --------
+    >>> events([0.0, 0.002, 0.0021], [1.0, 2.0, 3.0]).values(1e-3, 4).tolist()
+    [1.0, 1.0, 2.0, 3.0]
+
+    Raises
+    ------
+    InputError
+        As `sampled`, but for holes.
+    """
+    times, values = _checked(time_s, angle_rad, where)
+    times = times - times[0]
+    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]), held=True)
 
 
 def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "record") -> Command:
@@ -232,6 +331,29 @@ def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "recor
         If times or angles are not finite, do not rise, or have a hole: a gap longer than 1.5 times the
         median interval.
     """
+    times, values = _checked(time_s, angle_rad, where)
+    _without_holes(times, where)
+    times = times - times[0]
+    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]))
+
+
+def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "series") -> Command:
+    """A series whose times count from the beginning of the run; zero before its first row.
+
+    Examples
+    --------
+    >>> on_its_clock([0.002, 0.003], [5.0, 7.0]).values(1e-3, 5).tolist()
+    [0.0, 0.0, 5.0, 7.0, 7.0]
+    """
+    times, array = _checked(time_s, values, where)
+    _without_holes(times, where)
+    if times[-1] < 0.0:
+        raise InputError(f"its last row is at {times[-1]:g} s: must be 0 or later", where)
+    return Command("series", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, array]))
+
+
+def _checked(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str) -> tuple[Floats, Floats]:
+    """Rising finite times and as many finite values."""
     times, values = np.asarray(time_s, dtype=float).ravel(), np.asarray(angle_rad, dtype=float).ravel()
     if times.size != values.size or times.size < 2:
         raise InputError(
@@ -247,24 +369,32 @@ def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "recor
         raise InputError(
             f"time in row {k + 2} = {times[k + 1]:g} s: must be later than {times[k]:g} s", where
         )
+    return times, values
+
+
+def _without_holes(times: Floats, where: str) -> None:
+    gaps = np.diff(times)
     usual = float(np.median(gaps))
-    if gaps.max() > 1.5 * usual:
+    if gaps.max() > UNEVEN * usual:
         k = int(np.argmax(gaps))
         hole = f"hole in time from {times[k]:g} s to {times[k + 1]:g} s (rows {k + 1}, {k + 2})"
-        raise InputError(f"{hole}: intervals up to 1.5 times the usual {usual:g} s are allowed", where)
-    times = times - times[0]
-    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]))
+        allowed = f"intervals up to {UNEVEN:g} times the usual {usual:g} s are allowed"
+        raise InputError(f"{hole}: {allowed}, or a log of changes that are held (--held)", where)
 
 
 def recorded(
     path: str | PathLike[str], *, time_column: str | int = 0, angle_column: str | int = 1, unit: str = "deg",
-    delimiter: str = ",",
+    delimiter: str = ",", held: bool = False,
 ) -> Command:  # fmt: skip
-    """Recorded command from a CSV file with a header line: times in s, angles in deg, rad, mm or m."""
+    """Recorded command from a CSV file with a header line: times in s, angles in deg, rad, mm or m.
+
+    ``held``: a log of changes, each value held until the next (`events`).
+    """
     from nonlinear.records import read_columns
 
     scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0}.get(unit)
     if scale is None:
         raise InputError(f"unit = {unit!r}: must be deg, rad, mm or m", where=str(path))
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
-    return sampled(times, angles * scale, where=str(path))
+    make = events if held else sampled
+    return make(times, angles * scale, where=str(path))

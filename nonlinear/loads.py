@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import InputError
-from nonlinear.commands import Command, sampled
+from nonlinear.commands import Command, on_its_clock
 
 __all__ = ["LoadMoment", "constant", "proportional", "series"]
 
@@ -43,8 +43,11 @@ def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
 
 
 def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadMoment:
-    """Recorded or given moments at times (from 0), linear between them, the last held; holes are refused."""
-    return LoadMoment(series=sampled(time_s, moment_Nm, where=where))
+    """Recorded or given moments, linear between their times, the last held; holes are refused.
+
+    Times count from the beginning of the run: before the first of them there is no load.
+    """
+    return LoadMoment(series=on_its_clock(time_s, moment_Nm, where=where))
 
 
 def as_load(load: float | LoadMoment) -> LoadMoment:

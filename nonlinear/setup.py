@@ -21,6 +21,9 @@ from nonlinear.trajectory import State
 Floats = npt.NDArray[np.float64]
 
 
+CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
+
+
 @dataclass
 class Tables:
     """All time series of one or many runs, end to end; a run knows offsets and lengths."""
@@ -79,6 +82,12 @@ def check_frequency(design: Design, command: Command) -> None:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
         stage = "the drive" if loop is None else f"the {control.outermost} loop"
         raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)
+    content = 0.0 if command.held else command.highest_content(nyquist)
+    if content > CONTENT:
+        stage = "the drive" if loop is None else f"the {control.outermost} loop"
+        words = f"a line of {100.0 * content:.2g} % of its range lies above the Nyquist frequency of {stage}"
+        message = f"command {command.kind}: {words}, {nyquist:g} Hz"
+        raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
 
 
 def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:

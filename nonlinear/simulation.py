@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from os import PathLike
 from threading import Thread
 
@@ -173,7 +174,22 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     done = (int(out[at.OUT_TICKS]) + every - 1) // every
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
-    return wrap(design, row, history, flags, out, STATUS[status], probing, digest)
+    run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
+    return replace(run, load_Nm=_load(row, tables, run))
+
+
+def _load(row: Floats, tables: Floats, run: Trajectory) -> Floats | None:
+    """The moment on the output shaft at the recorded ticks, as the run had it."""
+    length = int(row[at.LOAD_TABLE_LENGTH])
+    if not (length or row[at.LOAD] or row[at.LOAD_SLOPE] or row[at.GRAVITY]):
+        return None
+    y = run.output_angle_rad
+    moment = row[at.LOAD] + row[at.LOAD_SLOPE] * y + row[at.GRAVITY] * np.sin(y + row[at.GRAVITY_ANGLE])
+    if length:
+        first = int(row[at.LOAD_TABLE])
+        ticks = np.arange(y.size) * int(row[at.RECORD_EVERY])
+        moment = moment + tables[first + np.minimum(ticks, length - 1)]
+    return np.asarray(moment, dtype=float)
 
 
 def _call(

@@ -164,6 +164,8 @@ class Trajectory:
         State after the last tick.
     output_speed_rad_s, twist_rad, coupling_torque_Nm : ndarray or None
         Of an elastic drive: speed of the output shaft, twist delta and torque T_s at the coupling's shaft.
+    load_Nm : ndarray or None
+        Moment on the output shaft, all of it; ``None`` where there is none.
     parameters_hash : str
         SHA-256 of the kernel's parameters.
     """
@@ -192,6 +194,7 @@ class Trajectory:
     output_speed_rad_s: Floats | None = None
     twist_rad: Floats | None = None
     coupling_torque_Nm: Floats | None = None
+    load_Nm: Floats | None = None
     parameters_hash: str = ""
 
     @property
@@ -238,8 +241,10 @@ class Trajectory:
         )
         if self.twist_rad is not None:
             names += ("output_speed_rad_s", "twist_rad", "coupling_torque_Nm")
+        if self.load_Nm is not None:
+            names += ("load_Nm",)
         linear = self.axis == "linear"
-        out = {(name.replace("_rad", "_m") if linear else name): getattr(self, name) for name in names}
+        out = {_on(name) if linear else name: getattr(self, name) for name in names}
         for name in self.limits:
             out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
         out["at_rest"] = self.at_rest
@@ -301,3 +306,8 @@ class Trajectory:
             f"output up to {size}, current up to {np.abs(self.current_A).max(initial=0.0):.3g} A, "
             f"limits: {', '.join(used) or 'none'}; {self.events} events, status {self.status})"
         )
+
+
+def _on(name: str) -> str:
+    """A column's name on a linear axis."""
+    return name.replace("load_Nm", "load_force_N").replace("_rad", "_m")

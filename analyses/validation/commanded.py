@@ -23,7 +23,8 @@ from nonlinear import Rows, Trajectory
 Floats = npt.NDArray[np.float64]
 FAINT = 1e-3  # of full deflection, speed, current or voltage
 STEADY = 1e-5  # relative change of the fundamental from one window to the next
-TRIES = 3
+TRIES = 5
+SMALL_ANGLE_RAD = 1e-3  # of the output, with gravity
 SIGNAL = {"position": "output_angle_rad", "velocity": "motor_speed_rad_s", "current": "current_A"}
 
 
@@ -156,9 +157,13 @@ def _read(
         reason = f"{acting[0]} limit"
     elif found.friction_on and speed.min() <= 0.0:
         reason = "speed reversal"
+    elif design.load.gravity is not None and np.ptp(run.output_angle_rad) > SMALL_ANGLE_RAD:
+        reason = "gravity is not proportional to the angle"
     elif found.coupling_Nm and _parted(run, n - samples):
         reason = "the coupling comes free"
-    return _Point(amplitude, last / amplitude, change, reason)
+    # a speed is commanded at the output, and predicted at the motor
+    commanded = amplitude * (design.total_ratio if design.controller.outermost == "velocity" else 1.0)
+    return _Point(amplitude, last / commanded, change, reason)
 
 
 def _parted(run: Trajectory, since: int) -> bool:

@@ -24,8 +24,8 @@ from analyses.validation.reading import (
     value_at,
 )
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig, small_rig
-from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
+from analyses.validation.rig import Rig, producer, small_rig
+from analyses.validation.sweep import LONGEST_SETTLE_TICKS, SETTLE_TIME_CONSTANTS, stepped_sine
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
@@ -165,7 +165,31 @@ def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
     own = sweep.unsteadiness
     if own.size > 2 * BESIDE:  # a transient that swings may hide from one point, not from those beside it
         own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)
-    return own / -np.expm1(-window / slowest) + ROUNDING
+    seen = np.maximum(np.abs(sweep.closed_loop * sweep.amplitude), 1e-300)
+    rounding = angle_rounding(setup, window) / seen
+    return own / -np.expm1(-window / slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
+
+
+def angle_rounding(setup: Rig, window: npt.NDArray[np.int64]) -> Floats:
+    """What rounding of the growing angle leaves in a fundamental in front of the instrument.
+
+    A speed made from angles divides their last bit by the time between them; over the samples of a window
+    that is noise, of which the fundamental keeps ``sqrt(2/N)``.
+    """
+    control, encoder = setup.design.controller, setup.design.encoder
+    velocity = control.velocity
+    if velocity is None or encoder.speed == "ideal" or setup.outer == "current":
+        return np.zeros(window.size)
+    tick_s = control.period_s
+    span = encoder.difference_samples * velocity.every * tick_s
+    per_angle = 1.0 / span if encoder.speed == "difference" else 2.0 * (encoder.bandwidth_rad_s or 0.0)
+    angle = abs(setup.ride.speed_rad_s) * (LONGEST_SETTLE_TICKS + 2.0 * window) * tick_s
+    speed = np.spacing(np.maximum(angle, 1e-300)) * per_angle
+    stage = producer(setup.design, setup.point)
+    gain = 1.0 if stage == "position" else velocity.gain
+    if stage == "current" and control.current is not None:
+        gain *= control.current.gain_V_A
+    return speed * gain * np.sqrt(2.0 * setup.hold_ticks / window)
 
 
 def _decibel(value: Reading, more_db: float = 0.0) -> Reading:

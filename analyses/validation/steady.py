@@ -10,9 +10,11 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
+from analyses.validation.release import full_range
 from analyses.validation.riding import ride, riding_at
 from analyses.validation.rig import Rig, stages_of
 
+ROUNDING = 1e-9  # of the largest current: a drive without friction takes none
 WINDOW = 400  # samples of the slowest loop
 CONDITION = "steady state at a constant speed, with friction"
 
@@ -36,7 +38,11 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     if not found.speed_rad_s:
         why = "the drive has no steady motion within its limits, or its load changes with the angle"
         return not_judged(name, quantity, unit, None, None, why, CONDITION)
-    setup = Rig(design, stages_of(design)[-1], found)
+    rigs = [Rig(design, stage, found) for stage in reversed(stages_of(design))]
+    setup = next((one for one in rigs if one.steady_start), None)
+    if setup is None:
+        why = "the position controller remembers: no run begins in its steady state"
+        return not_judged(name, quantity, unit, None, None, why, CONDITION)
     row = setup.row()
     window = WINDOW * setup.base_ticks
     row["ticks"] = settle_ticks + 2 * window
@@ -49,4 +55,6 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     speed = float(result.mean("motor_speed_rad_s")[0])
     wanted = riding_at(model, speed, found.load_Nm)
     predicted = wanted.voltage_V if source else wanted.current_A
-    return entry(name, quantity, unit, predicted, Reading(last, 3.0 * abs(last - before)), CONDITION)
+    full = design.limits.voltage_V if source else full_range(design)["current"]
+    seen = Reading(last, 3.0 * abs(last - before))
+    return entry(name, quantity, unit, predicted, seen, CONDITION, ROUNDING * full)

@@ -159,14 +159,13 @@ class _Work:
             loops = {name: self._loop(name, loop, share) for name, loop in self._stage_loops().items()}
         with self.timed("margins in time"):
             confirmed = self._within(0.5, "margins in time", self._confirm, ())
+        ready = stable and bool(self.settle)
         with self.timed("break points"):
-            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if stable else {}
+            points = self._within(0.3, "break points", lambda: self._points(confirmed), {}) if ready else {}
         with self.timed("response to the command"):
             answer = self._within(0.2, "response to the command", self._answer, None) if stable else None
         with self.timed("constant speed"):
-            steady = (
-                self._within(0.1, "constant speed", self._steady, None) if self.settle and stable else None
-            )
+            steady = self._within(0.1, "constant speed", self._steady, None) if ready else None
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (

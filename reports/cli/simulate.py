@@ -19,7 +19,9 @@ KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recor
 
 DEFAULT_DURATION_S = 1.0
 
-CommandOption = Annotated[str, typer.Option("--command", metavar="KIND", help=f"One of {KINDS}.")]
+CommandOption = Annotated[
+    str | None, typer.Option("--command", metavar="KIND", help=f"One of {KINDS}; default step.")
+]
 AmplitudeOption = Annotated[
     float,
     typer.Option("--amplitude", help="Peak at the output, deg (mm on a linear axis); a ramp: per second."),
@@ -50,10 +52,14 @@ SlopeOption = Annotated[
     ),
 ]
 LoadFileOption = Annotated[
-    Path | None, typer.Option("--load-file", metavar="CSV", help="Load torque over time: s, N m.")
+    Path | None,
+    typer.Option("--load-file", metavar="CSV", help="Load torque over the time of the run: s, N m."),
 ]
 RecordOption = Annotated[
     Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
+]
+HeldOption = Annotated[
+    bool, typer.Option("--held", help="The record is a log of changes: each value holds until the next.")
 ]
 CsvOption = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write every row as CSV.")]
 ParquetOption = Annotated[Path | None, typer.Option("--parquet", metavar="FILE", help="Write Parquet.")]
@@ -67,7 +73,7 @@ EnergyOption = Annotated[bool, typer.Option("--energy", help="Say where the elec
 def simulate(
     design: DesignArgument = DEFAULT_DESIGN,
     changes: SetOption = None,
-    command: CommandOption = "step",
+    command: CommandOption = None,
     amplitude: AmplitudeOption = 1.0,
     frequency: FrequencyOption = 1.0,
     to: ToOption = None,
@@ -81,6 +87,7 @@ def simulate(
     load_slope: SlopeOption = 0.0,
     load_file: LoadFileOption = None,
     record: RecordOption = None,
+    held: HeldOption = False,
     csv: CsvOption = None,
     parquet: ParquetOption = None,
     plot: PlotOption = None,
@@ -105,6 +112,7 @@ def simulate(
         start,
         seed,
         record,
+        held=held,
         amplitude=amplitude,
         frequency=frequency,
         to=to,
@@ -159,12 +167,13 @@ def unit_scale(drive: Design) -> float:
 
 def build_command(
     drive: Design,
-    kind: str,
+    kind: str | None,
     duration: float,
     start: float,
     seed: int,
     record: Path | None,
     *,
+    held: bool = False,
     amplitude: float,
     frequency: float,
     to: float | None,
@@ -176,7 +185,7 @@ def build_command(
     Raises
     ------
     InputError
-        For an unknown kind, or a recorded command without its file.
+        For an unknown kind, a recorded command without its file, or a record beside another command.
     """
     import numpy as np
 
@@ -187,18 +196,28 @@ def build_command(
     peak = amplitude * unit_scale(drive)
     period = drive.controller.period_s
     last = to if to is not None else 10.0 * frequency
-    if kind == "recorded" or record is not None:
-        if record is None:
-            raise InputError("--command recorded: needs --record CSV")
-        return commands.recorded(record, unit="mm" if drive.axis == "linear" else "deg")
+    if record is not None and kind not in (None, "recorded"):
+        raise InputError(f"--record and --command {kind}: one of them; a record is a command")
+    if held and record is None:
+        raise InputError("--held: needs --record CSV")
+    if start < 0.0 or not start < float("inf"):
+        raise InputError(f"--start {start:g}: must be 0 or later")
+    if record is not None:
+        unit = "mm" if drive.axis == "linear" else "deg"
+        return commands.recorded(record, unit=unit, held=held).later(start)
+    if kind == "recorded":
+        raise InputError("--command recorded: needs --record CSV")
+    kind = kind or "step"
+    if kind == "hold" and start > 0.0:
+        raise InputError(f"--start {start:g}: a hold is there from the first tick on; use --command step")
     if kind in ("stepped-sine", "multisine"):
         if count < 1 or frequency <= 0.0 or last <= 0.0:
             raise InputError(f"--count {count}, --frequency {frequency:g}, --to {last:g}: must be positive")
         TONES.check(count)
         grid = np.geomspace(frequency, last, count)
         if kind == "stepped-sine":
-            return commands.stepped_sine(peak, grid.tolist(), cycles, period)
-        return commands.multisine(peak, grid.tolist(), duration, period, seed=seed)
+            return commands.stepped_sine(peak, grid.tolist(), cycles, period, settle_cycles=0).later(start)
+        return commands.multisine(peak, grid.tolist(), duration - start, period, seed=seed).later(start)
     simple = {
         "hold": lambda: commands.hold(peak),
         "step": lambda: commands.step(peak, start),

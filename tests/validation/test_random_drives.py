@@ -9,10 +9,11 @@ import pytest
 from analyses.isolation import isolated
 from analyses.validation import validate
 from analyses.validation.budget import Budget, OutOfTime
-from tests.validation.random_drives import TRIAL, random_drive
+from tests.validation.random_drives import TRIAL, full_drive, random_drive
 
 RIGID = (1, 2, 3, 16)
 WIDER = (501, 504, 508)
+FULL = (16, 24, 36, 47, 200, 201)  # feed-forward, filters, AC motors, couplings, supplies, torque drives, ...
 
 
 @pytest.mark.parametrize(("seed", "wider"), [*((s, False) for s in RIGID), *((s, True) for s in WIDER)])
@@ -21,6 +22,16 @@ def test_a_random_stable_drive_has_no_false_failure(seed: int, wider: bool) -> N
         found = validate(random_drive(seed, wider=wider), replace(TRIAL, seconds=120.0))
     assert not missing
     assert found.failed == ()
+    assert all(row.reason for row in found.ledger if row.passed is None)
+
+
+@pytest.mark.parametrize("seed", FULL)
+def test_a_random_drive_with_every_feature_has_no_false_failure(seed: int) -> None:
+    with isolated() as missing:
+        found = validate(full_drive(seed), replace(TRIAL, seconds=120.0))
+    assert not missing
+    assert found.failed == ()
+    assert found.judged
     assert all(row.reason for row in found.ledger if row.passed is None)
 
 
