@@ -102,13 +102,14 @@ def _lines(found: Failures) -> list[str]:
     scale, unit = output_unit(found.design)
     asked = found.asked
     lines = [
-        f"{found.design.name}: stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
-        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}"
+        f"{found.design.name}: {summary(found)}",
+        f"  stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
+        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}",
     ]
     for case in found.cases:
         lines += [f"  {NAMES[case.name]}: {case.words}", f"    {_figures(found, case)}"]
     lines += [f"  {NAMES[name]}: not for this drive, as {why}" for name, why in found.left_out.items()]
-    return [*lines, summary(found)]
+    return lines
 
 
 def _figures(found: Failures, case: FailureCase) -> str:
