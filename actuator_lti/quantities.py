@@ -26,16 +26,17 @@ class Quantity:
         As a requirement names it.
     unit, linear_unit : str
         In reports; on a linear axis, where that differs.
-    scope : {"loop", "drive"}
+    scope : {"loop", "drive", "analysis"}
+        ``analysis``: of one design at a time, by `analyses.asked_figures`; studies of many leave it out.
     description : str
         How it is defined, for people who write requirements.
     words : str
         What reports call it.
     reader : str
         Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `found_by` names.
-    found_by : {"loop", "capability", "stiffness"}
-        What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`, or
-        `actuator_lti.loops.stiffness.StiffnessFigures`.
+    found_by : {"loop", "capability", "stiffness", "analysis"}
+        What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
+        `actuator_lti.loops.stiffness.StiffnessFigures`, or `analyses.asked_figures.AskedFigures`.
     better : {1, -1}
         Whether larger or smaller is better.
     absolute : bool
@@ -55,7 +56,7 @@ class Quantity:
 
     name: str
     unit: str
-    scope: Literal["loop", "drive"]
+    scope: Literal["loop", "drive", "analysis"]
     description: str
     words: str
     reader: str
@@ -65,7 +66,7 @@ class Quantity:
     closed: bool = True
     timed: bool = False
     size: float = 1.0
-    found_by: Literal["loop", "capability", "stiffness"] = "loop"
+    found_by: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
     heading: str = ""
     tolerance: float = 1e-9
 
@@ -82,7 +83,7 @@ class Quantity:
                 return None
         if self.absolute:
             return abs(value)
-        angular = self.scope == "drive" and self.unit_for(axis).startswith("deg")
+        angular = self.scope != "loop" and self.unit_for(axis).startswith("deg") and "_rad" in self.reader
         return value * degrees(1.0) if angular else value
 
 
@@ -123,12 +124,30 @@ _LIST = (
              "least dynamic stiffness", "least_stiffness_Nm_rad", 1, "N/m", found_by="stiffness"),
     Quantity("lost_motion", "deg", "drive", "play of the coupling and the twist that friction holds",
              "lost motion", "lost_motion_rad", -1, "m", size=0.1, found_by="stiffness"),
+    Quantity("hard_over_time", "s", "analysis", "from the hard-over of the power stage to failure.stop",
+             "time from hard-over to the stop", "hard_over_time_s", 1, found_by="analysis"),
+    Quantity("failure_deflection", "deg", "analysis", "largest until detection, all failures",
+             "deflection until a failure is detected", "failure_deflection_rad", -1, "m",
+             found_by="analysis"),
+    Quantity("failure_moment", "N*m", "analysis", "largest in the drive train, over all failures",
+             "moment in the train at a failure", "failure_moment_Nm", -1, "N", found_by="analysis"),
+    Quantity("duty_current", "A", "analysis", "rms of the motor current under [duty]",
+             "rms current of the duty", "duty_current_A", -1, found_by="analysis"),
+    Quantity("winding_temperature", "degC", "analysis", "winding under [duty], in the long run",
+             "winding temperature of the duty", "winding_degC", -1, found_by="analysis"),
+    Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; 0 at rest",
+             "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, found_by="analysis"),
+    Quantity("corner_gain_margin", "dB", "analysis", "smallest hot, cold, at the worst tolerances",
+             "gain margin at the corners", "corner_gain_margin_db", 1, size=6.0, found_by="analysis"),
+    Quantity("corner_phase_margin", "deg", "analysis", "smallest hot, cold, at the worst tolerances",
+             "phase margin at the corners", "corner_phase_margin_deg", 1, size=45.0, found_by="analysis"),
 )  # fmt: skip
 
 QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
 """Every quantity that a requirement may name."""
 LOOP_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "loop"}
 DRIVE_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "drive"}
+ANALYSIS_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "analysis"}
 LOOPS = ("current", "velocity", "position")
 """The loops that a requirement may name, innermost first."""
 

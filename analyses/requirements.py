@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
 from analyses.loop_figures import LoopFigures, all_loop_figures
+
+if TYPE_CHECKING:
+    from analyses.asked_figures import AskedFigures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,8 +67,11 @@ def evaluate_requirements(
         from actuator_lti.loops import assemble_loops
 
         figures = all_loop_figures(assemble_loops(design))
+    asked = _AskedOnce(design)
     return tuple(
-        verdict for requirement in design.requirements for verdict in _judge(design, requirement, figures)
+        verdict
+        for requirement in design.requirements
+        for verdict in _judge(design, requirement, figures, asked)
     )
 
 
@@ -73,8 +80,23 @@ def all_pass(verdicts: tuple[RequirementVerdict, ...]) -> bool:
     return not any(verdict.passed is False for verdict in verdicts)
 
 
+class _AskedOnce:
+    """Figures of analyses, run where a requirement names one; imported then: corners judge requirements."""
+
+    def __init__(self, design: Design) -> None:
+        self.design = design
+        self.figures: AskedFigures | None = None
+
+    def __call__(self, name: str) -> tuple[float | None, str]:
+        from analyses.asked_figures import AskedFigures, asked_figure
+
+        if self.figures is None:
+            self.figures = AskedFigures(self.design)
+        return asked_figure(self.figures, name)
+
+
 def _judge(
-    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures]
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: _AskedOnce
 ) -> list[RequirementVerdict]:
     """Judge one requirement wherever it holds."""
     quantity = QUANTITIES.get(requirement.quantity)
@@ -84,6 +106,9 @@ def _judge(
             f"{', '.join(QUANTITIES)}",
             where=design.origin or None,
         )
+    if quantity.scope == "analysis":
+        value, reason = asked(quantity.name)
+        return [_verdict(requirement, requirement.id, None, value, reason)]
     if quantity.scope == "drive":
         found = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
         value = None if math.isnan(found) else found

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["OperatingPoint", "Population", "variable_paths"]
 
 Values = Mapping[str, np.ndarray]
+ASKED = ("validation", "failure", "duty")  # sections of what is asked of a drive, which does not vary
 
 
 def variable_paths(design: Design) -> tuple[str, ...]:
@@ -27,7 +28,8 @@ def variable_paths(design: Design) -> tuple[str, ...]:
     return tuple(
         path
         for path in paths_of(design)
-        if located(design, path)[0].kind == "quantity" and not path.startswith("validation.")
+        if located(design, path)[0].kind == "quantity"
+        and not path.startswith(("validation.", "failure.", "duty."))
     )
 
 

@@ -164,7 +164,8 @@ class Builder:
         quantity = QUANTITIES.get(raw.quantity)
         if quantity is None:
             hint = nearest(raw.quantity, tuple(QUANTITIES)).strip()
-            allowed = f"{hint + '; ' if hint else ''}allowed: {', '.join(QUANTITIES)}"
+            more = f"one of {len(QUANTITIES)}, see Requirement quantities in the documentation"
+            allowed = f"{hint}; allowed: {more}" if hint else f"allowed: {', '.join(QUANTITIES)}"
             raise self.refuse(f"{path}.quantity", raw.quantity, allowed)
         unit = quantity.unit_for(self.structure.axis)
         torque = "N" if self.structure.axis == "linear" else "N*m"

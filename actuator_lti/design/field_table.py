@@ -315,11 +315,33 @@ _VALIDATION = (
     Field(path="validation.loads", attribute="loads_Nm", kind="quantities", unit_template="{torque}",
           low=-BIG, high=BIG, description="load moments to look at"),
 )
+_FAILURE = (
+    _positive("failure.stop", "stop_rad", "{angle}", "", "mechanical stop; default the full deflection",
+              example="25 deg"),
+    _positive("failure.deflection", "deflection_rad", "{angle}", "",
+              "deflection to which the time is taken; default a tenth of the stop", example="2 deg"),
+    _positive("failure.detection_time", "detection_s", "s", "",
+              "from a failure to its detection; default 0.1 s", high=1e4, example="50 ms"),
+    _quantity("failure.load", "load_Nm", "{torque}", "",
+              "moment that pushes the output forward; default none", example="4 N*m"),
+)
+_DUTY = (
+    _positive("duty.amplitude", "amplitude_rad", "{angle}", "",
+              "peak of the sine, output side; default half the full deflection", example="5 deg"),
+    _positive("duty.frequency", "frequency_rad_s", "rad/s", "", "of the sine; default 1 Hz",
+              example="0.5 Hz"),
+    _quantity("duty.load", "load_Nm", "{torque}", "",
+              "moment at the output, all the time; default the largest of validation.loads", example="4 N*m"),
+    _positive("duty.share", "share", "1", "", "share of the time in motion; default 1", high=1.0,
+              example="0.4"),
+    _positive("duty.cycle", "cycle_s", "s", "", "one motion and one rest together; default 10 s",
+              high=1e6, example="60 s"),
+)
 # fmt: on
 
 ALL_FIELDS: tuple[Field, ...] = (
     *_DESIGN, *_MOTOR, *_SCREW, *_GEAR, *_COUPLING, *_LOAD, *_LOAD_FRICTION, *_GRAVITY, *_FRICTION,
     *_FRICTION_POINT, *_ENCODER, *_OUTPUT_ENCODER, *_INSTRUMENTS, *_LIMITS, *_SUPPLY, *_TEMPERATURE,
-    *_COMMAND, *_CONTROL, *_FILTER, *_VALIDATION,
+    *_COMMAND, *_CONTROL, *_FILTER, *_VALIDATION, *_FAILURE, *_DUTY,
 )  # fmt: skip
 """Every key, in the order of a design file."""

@@ -424,6 +424,30 @@ class Temperature:
     thermal_time_s: float | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """What is asked of the failure cases; ``None`` is what `analyses.failures.Asked` takes for it.
+
+    Deflections are those of the output from where it was; the load pushes forward from the start.
+    """
+
+    stop_rad: float | None = None
+    deflection_rad: float | None = None
+    detection_s: float | None = None
+    load_Nm: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DutyCycle:
+    """The duty that the drive has to do for ever; ``None`` is what `analyses.duty.Asked` takes for it."""
+
+    amplitude_rad: float | None = None
+    frequency_rad_s: float | None = None
+    load_Nm: float | None = None
+    share: float | None = None
+    cycle_s: float | None = None
+
+
 def default_deflection(axis: Axis) -> float:
     """Full deflection where a design states none: 10 deg, or 0.01 m on a linear axis."""
     return 0.01 if axis == "linear" else 0.17453292519943295
@@ -556,6 +580,8 @@ class Design:
     command: Command = field(default_factory=Command)
     supply: Supply | None = None
     temperature: Temperature | None = None
+    failure: Failure | None = None
+    duty: DutyCycle | None = None
     instruments: Instruments = field(default_factory=Instruments)
     requirements: tuple[Requirement, ...] = ()
     correlations: tuple[Correlation, ...] = ()

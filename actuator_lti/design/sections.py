@@ -32,6 +32,9 @@ class Section:
         Repeated tables, known by their key ``name`` (gears) or by their number from 1.
     rare : bool
         Whether lists of values pass over it while all its values are the defaults.
+    asked : bool
+        Whether it says what is asked of the drive and not what the drive is: the hash of a design without it
+        does not know it.
     """
 
     path: str
@@ -40,6 +43,7 @@ class Section:
     required: bool = False
     many: Many = ""
     rare: bool = False
+    asked: bool = False
 
     @property
     def template(self) -> str:
@@ -89,6 +93,8 @@ SECTIONS: tuple[Section, ...] = (
     Section("control.velocity.filter", "controller.velocity.filters", model.Filter, many="numbered"),
     Section("control.position", "controller.position", model.PositionLoop),
     Section("validation", "validation", model.Validation),
+    Section("failure", "failure", model.Failure, asked=True),
+    Section("duty", "duty", model.DutyCycle, asked=True),
 )
 """Every section, in the order of a design file."""
 

@@ -227,7 +227,8 @@ def design_hash(design: Design) -> str:
 
     It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
     """
-    top = {section.place for section in SECTIONS if not section.parent}
+    parts = [section for section in SECTIONS if not section.parent]
+    top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}
     content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)

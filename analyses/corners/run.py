@@ -13,6 +13,7 @@ from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.quantities import ANALYSIS_QUANTITIES
 from analyses.corners.result import Asked, Corner, Corners
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import evaluate_requirements
@@ -26,7 +27,8 @@ MARGINS = {"gain_margin": "worst gain margin", "phase_margin": "worst phase marg
 def corners(design: Design, asked: Asked | None = None) -> Corners:
     """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
 
-    Each corner is a design of its own, put through the same loops as the nominal one.
+    Each corner is a design of its own, put through the same loops as the nominal one. Requirements on what an
+    analysis finds (`actuator_lti.quantities.ANALYSIS_QUANTITIES`) are left out.
 
     Examples
     --------
@@ -39,6 +41,8 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
 
 
 def _judged(name: str, words: str, design: Design) -> Corner:
+    kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
+    design = replace(design, requirements=kept)
     figures = all_loop_figures(assemble_loops(design))
     return Corner(name, words, design, figures, evaluate_requirements(design, figures))
 

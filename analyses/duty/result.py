@@ -51,12 +51,18 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, **chosen: float | None) -> Asked:
-        """What is chosen; else half the full deflection at 1 Hz under the largest load, without rest."""
-        usual = {
+        """What is chosen; else [duty] of the design; else half the full deflection under the largest load."""
+        usual: dict[str, float | None] = {
             "amplitude_rad": USUAL_SHARE * design.validation.full_deflection_rad,
             "load_Nm": max(design.validation.loads_Nm, key=abs),
         }
-        return cls(**usual | {name: value for name, value in chosen.items() if value is not None})
+        if design.duty is not None:
+            stated = dict(vars(design.duty))
+            turns = stated.pop("frequency_rad_s")
+            stated["frequency_hz"] = None if turns is None else turns / (2.0 * np.pi)
+            usual |= {name: value for name, value in stated.items() if value is not None}
+        usual |= {name: value for name, value in chosen.items() if value is not None}
+        return cls(**usual)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

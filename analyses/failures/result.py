@@ -56,10 +56,15 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, **chosen: float | None) -> Asked:
-        """What is chosen; the rest from the design: its full deflection is the stop, its first load."""
-        full = chosen.pop("stop_rad", None) or design.validation.full_deflection_rad
-        near = chosen.pop("deflection_rad", None) or NEAR_SHARE * full
-        given = {name: value for name, value in chosen.items() if value is not None}
+        """What is chosen; the rest from [failure] of the design; else its full deflection is the stop."""
+        stated = vars(design.failure) if design.failure is not None else {}
+        given = {
+            name: value
+            for name, value in (stated | {k: v for k, v in chosen.items() if v is not None}).items()
+            if value is not None
+        }
+        full = given.pop("stop_rad", design.validation.full_deflection_rad)
+        near = given.pop("deflection_rad", NEAR_SHARE * full)
         return cls(stop_rad=full, deflection_rad=near, **given)
 
 

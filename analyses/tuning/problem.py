@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
 from analyses.sampling import Factor, correlation_of, semidefinite_root
 
@@ -152,7 +152,7 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     """Requirements on loops: those of the design, replaced by extra ones on the same figure."""
     replaced = {(r.quantity, r.loop) for r in extra}
     kept = [r for r in design.requirements if (r.quantity, r.loop) not in replaced]
-    chosen = tuple(r for r in (*kept, *extra) if r.quantity not in DRIVE_QUANTITIES)
+    chosen = tuple(r for r in (*kept, *extra) if r.quantity in LOOP_QUANTITIES)
     if not chosen:
         raise InputError("no requirement on a loop: nothing to tune for; state margins and bandwidths")
     return chosen

@@ -16,11 +16,14 @@ AmplitudeOption = Annotated[
     str | None,
     typer.Option("--amplitude", metavar="ANGLE", help='Peak, such as "5 deg"; half the full deflection.'),
 ]
-FrequencyOption = Annotated[float, typer.Option("--frequency", metavar="HZ", help="Of the sine.")]
+FrequencyOption = Annotated[float | None, typer.Option("--frequency", metavar="HZ", help="Of the sine; 1.")]
 ShareOption = Annotated[
-    float, typer.Option("--share", help="Share of the time in motion; the drive holds still for the rest.")
+    float | None,
+    typer.Option("--share", help="Share of the time in motion; the drive holds still for the rest; 1."),
 ]
-CycleOption = Annotated[float, typer.Option("--cycle", metavar="S", help="One motion and one rest together.")]
+CycleOption = Annotated[
+    float | None, typer.Option("--cycle", metavar="S", help="One motion and one rest together; 10.")
+]
 DutyLoadOption = Annotated[
     float | None,
     typer.Option(
@@ -34,23 +37,24 @@ def duty(
     design: DesignArgument = DEFAULT_DESIGN,
     changes: SetOption = None,
     amplitude: AmplitudeOption = None,
-    frequency: FrequencyOption = 1.0,
+    frequency: FrequencyOption = None,
     load: DutyLoadOption = None,
-    share: ShareOption = 1.0,
-    cycle: CycleOption = 10.0,
+    share: ShareOption = None,
+    cycle: CycleOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Hold a duty cycle against continuous current, overload protection (I2t) and winding temperature.
 
-    The duty is a sine under a load, for a share of the time. The temperature needs thermal_resistance and
-    thermal_time in [temperature], the protection limits.peak_time. The exit status is 1 where the drive
-    cannot do the duty for ever. In the report: --also duty.
+    The duty is a sine under a load, for a share of the time; what is not given comes from [duty]. The
+    temperature needs thermal_resistance and thermal_time in [temperature], the protection limits.peak_time.
+    The exit status is 1 where the drive cannot do the duty for ever. In the report: --also duty.
     """
     from analyses.duty import Asked
     from analyses.duty import duty as analyse
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.sections.duty import summary
+    from reports.terminal import print_verdict
 
     drive = load_drive(design, changes)
     asked = Asked.of(
@@ -61,7 +65,8 @@ def duty(
     if as_json:
         print_json(_json(found))
     else:
-        for line in [f"{drive.name}: duty cycle", *_lines(found), summary(found)]:
+        print_verdict(found.passed, f"{drive.name}: {summary(found)}")
+        for line in _lines(found):
             print_line(line)
     leave_with(found.passed)
 

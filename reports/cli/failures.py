@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from reports.cli.drive import SetOption, load_drive, output_quantity
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, LoadOption
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, read_load
 
 if TYPE_CHECKING:
     from analyses.failures import FailureCase, Failures
@@ -23,8 +23,16 @@ DeflectionOption = Annotated[
     ),
 ]
 DetectionOption = Annotated[
-    float, typer.Option("--detection", metavar="S", help="Seconds from the failure to its detection.")
+    float | None,
+    typer.Option("--detection", metavar="S", help="Seconds from the failure to its detection; 0.1."),
 ]
+FailureLoadOption = Annotated[
+    float | None,
+    typer.Option(
+        "--load", metavar="LOAD", parser=read_load,
+        help='Moment that pushes the output forward from the start, such as "4 N*m"; none.',
+    ),
+]  # fmt: skip
 WatchedOption = Annotated[
     float, typer.Option("--duration", metavar="S", help="How long each failure is followed.")
 ]
@@ -35,16 +43,16 @@ def failures(
     changes: SetOption = None,
     stop: StopOption = None,
     deflection: DeflectionOption = None,
-    detection: DetectionOption = 0.1,
+    detection: DetectionOption = None,
     duration: WatchedOption = 1.0,
-    load: LoadOption = 0.0,
+    load: FailureLoadOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
 
     Prints for each failure the time to a stated deflection and to the mechanical stop, the deflection until
-    the failure is detected, the largest current and the largest moment in the train. The load pushes forward
-    from the start. In the report: actuator-lti report DESIGN --also failures.
+    the failure is detected, the largest current and the largest moment in the train. What is not given comes
+    from [failure] of the design. In the report: actuator-lti report DESIGN --also failures.
     """
     from analyses.failures import Asked
     from analyses.failures import failures as analyse
@@ -94,13 +102,14 @@ def _lines(found: Failures) -> list[str]:
     scale, unit = output_unit(found.design)
     asked = found.asked
     lines = [
-        f"{found.design.name}: stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
-        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}"
+        f"{found.design.name}: {summary(found)}",
+        f"  stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
+        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}",
     ]
     for case in found.cases:
         lines += [f"  {NAMES[case.name]}: {case.words}", f"    {_figures(found, case)}"]
     lines += [f"  {NAMES[name]}: not for this drive, as {why}" for name, why in found.left_out.items()]
-    return [*lines, summary(found)]
+    return lines
 
 
 def _figures(found: Failures, case: FailureCase) -> str:

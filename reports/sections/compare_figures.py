@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.quantities import drive_cases
+from actuator_lti.quantities import ANALYSIS_QUANTITIES, drive_cases
 from reports import document as doc
 from reports.document import rounded
 from reports.sections.names import LOOPS
@@ -130,6 +130,8 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
     found: dict[str, float | None] = {}
     for verdict in comparison.base.verdicts:
         r = verdict.requirement
+        if r.quantity in ANALYSIS_QUANTITIES:
+            continue  # of one design at a time
         place = verdict.loop or "drive"
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")

@@ -43,6 +43,19 @@ def test_stacked_designs_have_the_figures_of_each_alone() -> None:
             assert together[k] == pytest.approx(many(alone, quantity)[0], rel=1e-9)
 
 
+def test_designs_of_other_structure_are_taken_group_by_group() -> None:
+    """Computing delays of whole and of broken ticks, damping of zero: other states, other zeros."""
+    design = load_design("fin")
+    values = {
+        "control.computing_delay": np.array([0.0, 1e-4, 2e-4, 5e-4]),
+        "coupling.damping": np.array([0.0, 0.05, 0.05, 0.0]),
+    }
+    found = many(Population(design, values, 4), "least_stiffness")
+    for k in range(4):
+        alone = Population(design, {path: array[k : k + 1] for path, array in values.items()}, 1)
+        assert found[k] == pytest.approx(many(alone, "least_stiffness")[0], rel=1e-9)
+
+
 def test_static_stiffness_by_hand() -> None:
     """P on the motor's sensor with an integral in the velocity loop: the spring alone, 400 N m/rad; a rigid
     one comes back."""

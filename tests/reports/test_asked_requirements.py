@@ -1,0 +1,114 @@
+"""Requirements on failures, duty, limit cycles and corners, and the tables that they read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.batch import variable_paths
+from actuator_lti.design import design_hash, load_design, read_design_text, with_overrides, write_design
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.quantities import ANALYSIS_QUANTITIES
+from analyses.corners import corners
+from analyses.duty import Asked as DutyAsked
+from analyses.duty import duty
+from analyses.failures import Asked, failures
+from analyses.limit_cycles import limit_cycles
+from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+from analyses.requirements import evaluate_requirements
+
+TABLES = {
+    "failure.stop": "15 deg",
+    "failure.deflection": "3 deg",
+    "failure.detection_time": "20 ms",
+    "failure.load": "2 N*m",
+    "duty.amplitude": "4 deg",
+    "duty.frequency": "2 Hz",
+    "duty.load": "3 N*m",
+    "duty.share": "0.5",
+    "duty.cycle": "20 s",
+    "temperature.thermal_resistance": "2 K/W",
+}
+
+
+@pytest.fixture(scope="module")
+def fin() -> Design:
+    return with_overrides(load_design("fin"), TABLES)
+
+
+def requirement(quantity: str, **limits: float) -> Requirement:
+    unit = ANALYSIS_QUANTITIES[quantity].unit
+    return Requirement(id=quantity, quantity=quantity, unit=unit, **limits)
+
+
+def test_the_tables_are_read_and_written(fin: Design) -> None:
+    again = read_design_text(write_design(fin), "again")
+    assert (again.failure, again.duty) == (fin.failure, fin.duty)
+    asked, wanted = Asked.of(fin), DutyAsked.of(fin)
+    assert asked.detection_s == pytest.approx(0.02)
+    assert asked.load_Nm == 2.0
+    assert (wanted.frequency_hz, wanted.share, wanted.cycle_s) == (pytest.approx(2.0), 0.5, 20.0)
+    assert Asked.of(fin, load_Nm=1.0).load_Nm == 1.0
+    assert not any(path.startswith(("failure.", "duty.")) for path in variable_paths(fin))
+
+
+def test_what_is_asked_is_in_the_hash_only_where_it_is_asked(fin: Design) -> None:
+    assert design_hash(replace(fin, failure=None)) != design_hash(fin)
+    bare = load_design("fin")
+    assert design_hash(read_design_text(write_design(bare), "again")) == design_hash(bare)
+
+
+def test_every_requirement_reads_its_analysis(fin: Design) -> None:
+    """Each value is that of the analysis asked by itself; limits on either side of it pass and fail."""
+    wanted = {
+        "hard_over_time": failures(fin).case("hard-over").to_stop_s,
+        "failure_deflection": max(one.at_detection_rad for one in failures(fin).cases) * 57.29577951308232,
+        "failure_moment": max(one.peak_moment_Nm for one in failures(fin).cases),
+        "duty_current": duty(fin).rms_A,
+        "winding_temperature": duty(fin).heating.final_degC,  # type: ignore[union-attr]
+        "limit_cycle": 0.0 if limit_cycles(fin).hunting is None else None,
+    }
+    made = []
+    for name, value in wanted.items():
+        assert value is not None
+        side = "minimum" if ANALYSIS_QUANTITIES[name].better > 0 else "maximum"
+        made += [
+            requirement(name, **{side: value * share + shift}) for share, shift in ((1.0, 1e-3), (1.0, -1e-3))
+        ]
+    made = [replace(one, id=f"{one.id}-{k}") for k, one in enumerate(made)]
+    verdicts = evaluate_requirements(replace(fin, requirements=tuple(made)))
+    for one, (name, value) in zip(verdicts[::2], wanted.items(), strict=True):
+        assert one.value == pytest.approx(value, rel=1e-9), name
+    lower = [ANALYSIS_QUANTITIES[name].better > 0 for name in wanted]
+    assert [one.passed for one in verdicts[::2]] == [not one for one in lower]
+    assert [one.passed for one in verdicts[1::2]] == lower
+
+
+def test_margins_at_the_corners() -> None:
+    """The fin is not stable at its worst tolerances; the ball screw's least margins are the table's."""
+    asked = tuple(requirement(f"corner_{name}_margin", minimum=3.0) for name in ("gain", "phase"))
+    verdicts = evaluate_requirements(replace(load_design("fin"), requirements=asked))
+    assert [one.passed for one in verdicts] == [False, False]
+    design = replace(load_design("ballscrew"), requirements=asked)
+    gain, phase = evaluate_requirements(design)
+    loops = [one.margins for corner in corners(design).corners for one in corner.figures.values()]
+    assert gain.value == pytest.approx(min(abs(one.gain_margin_db) for one in loops))  # type: ignore[arg-type]
+    assert phase.value == pytest.approx(min(abs(one.phase_margin_deg) for one in loops))  # type: ignore[arg-type]
+
+
+def test_a_figure_that_there_is_not_says_why() -> None:
+    asked = (requirement("winding_temperature", maximum=100.0), requirement("duty_current", maximum=1.0))
+    cold = evaluate_requirements(replace(load_design("fin"), requirements=asked[:1]))[0]
+    assert (cold.passed, cold.reason) == (None, "the design does not state what this needs")
+    source = evaluate_requirements(replace(load_design("emps"), requirements=asked[1:]))[0]
+    assert (source.passed, source.reason) == (None, "duty: an ideal torque source has no current")
+
+
+def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path: Path) -> None:
+    asked = requirement("duty_current", maximum=1.0)
+    design = replace(load_design("fin"), requirements=(*load_design("fin").requirements, asked))
+    found = monte_carlo(design, tmp_path, MonteCarloSettings(samples=16, worst_cases=False))
+    assert "duty_current" not in {odds.id for odds in found.odds}
+    assert any("duty_current" in note for note in found.notes)
