@@ -47,6 +47,7 @@ def corners(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.sections.corners import summary
+    from reports.terminal import print_verdict
 
     drive = load_drive(design, changes)
     asked = Asked.of(drive, hot_degC=hot, cold_degC=cold, supply_V=supply, cold_viscous=cold_viscous)
@@ -54,11 +55,10 @@ def corners(
     if as_json:
         print_json(_json(found))
     else:
-        print_line(f"{drive.name}: corners")
+        print_verdict(found.passed, f"{drive.name}: {summary(found)}")
         for corner in found.corners:
             for line in _lines(corner):
                 print_line(line)
-        print_line(summary(found))
     leave_with(found.passed)
 
 

@@ -24,12 +24,14 @@ def cycles(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.sections.cycles import summary
+    from reports.terminal import print_verdict
 
     found = limit_cycles(load_drive(design, changes))
     if as_json:
         print_json(_json(found))
     else:
-        for line in [f"{found.design.name}: limit cycles", *_lines(found), summary(found)]:
+        print_verdict(found.hunting is None, f"{found.design.name}: {summary(found)}")
+        for line in _lines(found):
             print_line(line)
     leave_with(found.hunting is None)
 

@@ -51,6 +51,7 @@ def duty(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.sections.duty import summary
+    from reports.terminal import print_verdict
 
     drive = load_drive(design, changes)
     asked = Asked.of(
@@ -61,7 +62,8 @@ def duty(
     if as_json:
         print_json(_json(found))
     else:
-        for line in [f"{drive.name}: duty cycle", *_lines(found), summary(found)]:
+        print_verdict(found.passed, f"{drive.name}: {summary(found)}")
+        for line in _lines(found):
             print_line(line)
     leave_with(found.passed)
 
