@@ -42,8 +42,10 @@ html_theme = "pydata_sphinx_theme"
 html_title = "actuator-lti"
 html_show_sourcelink = False
 html_copy_source = False
+html_sidebars = {"**": ["globaltoc.html"]}
 html_theme_options = {
     "show_prev_next": True,
+    "navbar_center": [],  # the whole contents stand at the side
     "navbar_end": ["theme-switcher"],
     "footer_start": ["copyright"],
     "footer_end": [],

@@ -1,4 +1,13 @@
-"""The same drive, moving: the nonlinear time-domain model that checks the linear predictions."""
+"""The same drive, moving: the nonlinear time-domain model that checks the linear predictions.
+
+>>> from nonlinear import commands, simulate
+>>> run = simulate("ilr33-amber", commands.step(0.01), duration_s=0.2, load_Nm=2.0)
+>>> run.status, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
+('ok', True)
+
+``run.plot()`` draws it, ``run.to_pandas()`` and ``run.to_csv(path)`` give its rows. `simulate_many` runs many
+at once over the cores, `Drive` runs tick by tick inside a loop of your own.
+"""
 
 from __future__ import annotations
 

@@ -141,10 +141,14 @@ def _show(night: Overview, site: Path, as_json: bool) -> None:
     from reports.cli.output import print_line
     from reports.nightly.machines import STATE_WORDS, summary_text
     from reports.nightly.text import one_line
+    from reports.terminal import print_verdict
 
     if as_json:
         print_line(summary_text(night).rstrip("\n"))
         return
+    counts = ", ".join(f"{night.count(s)} {words}" for s, words in STATE_WORDS.items() if night.count(s))
+    cached = sum(d.result.cached for d in night.designs)
+    print_verdict(night.exit_status == 0, f"night {night.run.id}: {counts} ({cached} unchanged)")
     for design in night.designs:
         if design.state != "pass":
             why = design.result.message.partition("\n")[0] or design.result.worst_id
@@ -152,6 +156,4 @@ def _show(night: Overview, site: Path, as_json: bool) -> None:
                 worst = design.regressions[0].figure
                 why = f"{len(design.regressions)} figures worse than the baseline, {worst}"
             print_line(f"{STATE_WORDS[design.state]:>10}  {one_line(design.name, 60)}: {one_line(why, 300)}")
-    counts = ", ".join(f"{night.count(s)} {words}" for s, words in STATE_WORDS.items() if night.count(s))
-    cached = sum(d.result.cached for d in night.designs)
-    print_line(f"night {night.run.id}: {counts} ({cached} unchanged)\n{site / 'index.html'}")
+    print_line(str(site / "index.html"))

@@ -63,6 +63,7 @@ def report(
     from reports.cli.output import print_line
     from reports.cli.progress import progress
     from reports.document import dumps, load
+    from reports.terminal import print_verdict
     from reports.verdict_summary import verdict_words
 
     drive = load_drive(design, changes)
@@ -80,12 +81,14 @@ def report(
         from reports.pdf import write_pdf
 
         written = (*written, write_pdf(made, out / "report.pdf"))
+    passed = bool(made["verdict"]["passed"] and not _unstable(made))
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
-        words = verdict_words(made["verdict"]) or ["no requirement in the design file"]
-        print_line("\n".join([*words, *map(str, written)]))
-    leave_with(made["verdict"]["passed"] and not _unstable(made))
+        first, *more = verdict_words(made["verdict"]) or ["no requirement in the design file"]
+        print_verdict(passed, f"{drive.name}: {first}")
+        print_line("\n".join([*more, *map(str, written)]))
+    leave_with(passed)
 
 
 def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:

@@ -5,7 +5,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 SECTIONS = set(re.findall(r"(?m)^## ([0-9]+)\.", (ROOT / "docs" / "model.md").read_text(encoding="utf-8")))
-OTHERS = {"README.md", "CHANGELOG.md", "SECURITY.md", "summary.md"}  # the last is written by a nightly build
+OTHERS = {"README.md", "CHANGELOG.md", "SECURITY.md"}
+OTHERS |= {"summary.md", "compiled_code.md"}  # written by a nightly build, and into an FMU
 CITED = re.compile(r"model\.md,?\s+sections?\s+([0-9]+(?:(?:\s*,\s*|\s+and\s+|\s+to\s+)[0-9]+)*)")
 
 

@@ -92,7 +92,7 @@ def test_a_failed_requirement_is_status_1(tmp_path: Path, capsys: pytest.Capture
     ("arguments", "words"),
     [
         (["margins", "ilr33-ambre"], 'nearest known: "ilr33-amber"'),
-        (["margins", "--form", "digital"], "form = 'digital'"),
+        (["margins", "--form", "digital"], "--form 'digital'"),
         (["margins", "--load", "nan"], "load"),
         (["margins", "--operating-point", "flying"], "flying"),
         (["margins", "--no-such-option"], "--no-such-option"),
