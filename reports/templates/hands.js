@@ -300,9 +300,14 @@
   const NONE = { "-1": "too many states for this page", "-2": "its loop is periodic; see the report" };
   const table = () => {
     const head = html("tr");
-    head.append(html("th", "left", "Loop"));
+    const heading = (words, side, scope) => {
+      const th = html("th", side, words);
+      th.scope = scope;
+      return th;
+    };
+    head.append(heading("Loop", "left", "col"));
     for (const [, label, unit] of FIGURES) {
-      const th = html("th", "right", label + " ");
+      const th = heading(label + " ", "right", "col");
       th.append(html("span", "unit", unit));
       head.append(th);
     }
@@ -310,7 +315,7 @@
     for (const name of [...data.loops, ...Object.keys(data.points)]) {
       const own = now.loops[name] || now.points[name], old = before.loops[name] || before.points[name];
       if (own.n === 0 && !(name in now.loops)) continue; // no such break point
-      const row = html("tr"), th = html("th", "left", LOOP_NAMES[name] || POINT_NAMES[name]);
+      const row = html("tr"), th = heading(LOOP_NAMES[name] || POINT_NAMES[name], "left", "row");
       row.append(th);
       if (!own.figures || !old.figures) {
         const td = html("td", "", `not followed here: ${NONE[own.n] || "no loop"}`);
@@ -335,7 +340,8 @@
     const top = html("thead"), rest = html("tbody");
     top.append(head);
     rest.append(...body);
-    find("table.now").replaceChildren(top, rest);
+    const box = find("table.now");
+    box.replaceChildren(box.querySelector("caption"), top, rest);
   };
   const state = () => {
     const line = find(".state"), fails = failing(now), old = failing(before), total = data.requirements.length;
