@@ -126,9 +126,6 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
     loops = assemble_loops(design)
     for name, loop in loops.present.items():
         truth = stability_margins(loop.open_loop)
-        if truth.stable is None:  # pole of the PI on the zero that the load's stiffness puts at z = 1
-            assert name == "velocity"
-            continue
         assert figures.stable(name)[0] == truth.stable, name
         for quantity in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
             mine = figures.quantity(quantity.removesuffix("_db").removesuffix("_deg"), name)[0]
