@@ -53,7 +53,7 @@ class Sensitivity:
     @property
     def swing(self) -> float:
         """Distance between the figures at both ends."""
-        return abs(self.high - self.low)
+        return abs(_rise(self.low, self.high))
 
 
 @dataclass(frozen=True)
@@ -112,13 +112,18 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     figures = population_figures(Population(design, values, count), design)
     entries = [
         Sensitivity(
-            path, name, float(column[2 + 4 * k] - column[1 + 4 * k]) / (200.0 * STEP), *ends[path][:2],
+            path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path][:2],
             float(column[3 + 4 * k]), float(column[4 + 4 * k]), ends[path][2],
         )
         for k, path in enumerate(chosen)
         for name, column in figures.items()
     ]  # fmt: skip
     return Sensitivities({name: float(column[0]) for name, column in figures.items()}, tuple(entries))
+
+
+def _rise(low: float, high: float) -> float:
+    """High less low; 0 where both are the same infinity (a stiffness that no moment overcomes)."""
+    return 0.0 if low == high else float(high - low)
 
 
 def _moves(design: Design, path: str) -> bool:
