@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
 def designs(as_json: JsonOption = False) -> None:
     """List the shipped designs: name, title, and the stages that each drive has."""
+    from rich.padding import Padding
+    from rich.text import Text
+
     from actuator_lti.design import load_design, shipped_designs
     from reports.cli.output import console, print_json
 
@@ -19,15 +22,12 @@ def designs(as_json: JsonOption = False) -> None:
     if as_json:
         print_json({"schema": "actuator-lti/designs", "version": 1, "designs": rows})
         return
-    from rich.table import Column, Table
-
-    table = Table(
-        Column("name", no_wrap=True), "title", "motor", "loops", "total ratio", box=None, pad_edge=False
-    )
+    out = console()
     for row in rows:
-        loops = ", ".join(row["loops"])
-        table.add_row(row["name"], row["title"], row["motor"], loops, f"{row['total_ratio']:g}")
-    console().print(table)
+        out.print(Text.assemble((row["name"], "bold"), f": {row['title']}"))
+        loops = ", ".join(row["loops"]) or "no loops"
+        facts = f"{row['motor']}; {loops}; total ratio {row['total_ratio']:g}"
+        out.print(Padding(Text(facts), (0, 0, 0, 4)))
 
 
 def _row(design: Design) -> dict[str, Any]:
