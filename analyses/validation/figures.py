@@ -99,7 +99,9 @@ class Measured:
     no_dc: str = ""
 
 
-def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int) -> Measured:
+def measure_figures(
+    setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int, slowest_ticks: float | None = None
+) -> Measured:
     """Measure what a sweep brackets, and the step.
 
     Parameters
@@ -109,6 +111,8 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
         Wide enough to hold what is looked for.
     settle_ticks, step_ticks : int
         Waited for before a point of the sweep; length of the step response.
+    slowest_ticks : float, optional
+        Slowest time constant of the loop; by default that which the step response is made for.
     """
     step = step_response(setup, step_ticks)
     lost = step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0
@@ -120,7 +124,7 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
     fine = refined(setup, fine, wide, settle_ticks)
     fine, changed = _peaks_refined(setup, fine, settle_ticks)
     f = fine.frequency_hz
-    own = point_errors(setup, fine, step_ticks)
+    own = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
     error = float(own[fine.valid].max())
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
@@ -151,7 +155,7 @@ def measure_figures(setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int
 BESIDE = 2  # points on either side
 
 
-def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
+def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
     """Relative error of each point: the change between its windows, and what the transient still holds.
 
     A transient of the time constant tau that changes by d from one window W to the next has
@@ -161,7 +165,7 @@ def point_errors(setup: Rig, sweep: Sweep, step_ticks: int) -> Floats:
 
     tick_s = setup.design.controller.period_s
     window = coherent(sweep.frequency_hz, tick_s, setup.base_ticks).ticks
-    slowest = max(step_ticks / SETTLE_TIME_CONSTANTS, 1.0)
+    slowest = max(slowest_ticks, 1.0)
     own = sweep.unsteadiness
     if own.size > 2 * BESIDE:  # a transient that swings may hide from one point, not from those beside it
         own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)

@@ -45,7 +45,7 @@ from analyses.validation.riding import has_to_stand, may_stand, on_its_stand, ri
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.steady import steady_entry
-from analyses.validation.sweep import settling_ticks_of, stepped_sine
+from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, settling_ticks_of, stepped_sine
 from analyses.validation.tones import tone_sweep
 from nonlinear import Rows
 
@@ -59,6 +59,7 @@ U = TypeVar("U")
 HIGHEST = 0.49  # of the sampling frequency
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
+EVER_TICKS = 10**9  # no run is so long: this tells how slow a loop is
 NEAR = (0.9, 0.95, 1.0, 1.05)
 NO_POSITION = "a drive without a position loop: its loops are judged, motion from rest to an angle is not"
 ABOUT = (0.98, 1.0, 1.02)  # frequencies about each figure, beside the grid
@@ -280,7 +281,8 @@ class _Work:
         setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
         sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
         whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
-        measured = measure_figures(setup, sweep, settle, whole)
+        ever = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, EVER_TICKS)
+        measured = measure_figures(setup, sweep, settle, whole, ever / SETTLE_TIME_CONSTANTS)
         fine = measured.sweep
         tones = errors = None
         if self.settings.multisine:

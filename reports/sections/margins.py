@@ -140,8 +140,8 @@ def response_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
     """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
-        "−90°. Current and velocity: the feedback loop. Position: the response from the command to the output "
-        "shaft, feed-forward and filters of the command included."
+        "−90°. Current and velocity: the feedback loop. Position: the response from the command to the "
+        "output shaft, feed-forward and filters of the command included."
     )
     rows = [{"loop": name, **response_row(found)} for name, found in named.items()]
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
