@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
-from math import log10
 from typing import Any
 
 from analyses.validation.ledger import Entry
@@ -27,7 +26,6 @@ MORE = {
     "response_closed": "response of the closed loop",
     "response_command": "response to the command",
 }
-LOST = 0.9  # of a linear gain margin: what large deviations leave of it
 STATUS = {True: "pass", False: "fail", None: "info"}
 WORD = {True: "agrees", False: "DISAGREES", None: "not judged"}
 
@@ -108,7 +106,7 @@ def findings(validation: Validation) -> list[Finding]:
         )
         for row in validation.failed
     ]
-    return found + _large(validation) + _released(validation) + _unknown(validation) + _left_out(validation)
+    return found + _large(validation) + _unknown(validation) + _left_out(validation)
 
 
 def _large(validation: Validation) -> list[Finding]:
@@ -122,28 +120,6 @@ def _large(validation: Validation) -> list[Finding]:
     if conditional.limiter:
         text += f": the {conditional.limiter} limit takes gain away"
     return [Finding(severity="fail", text=f"{text}.", where="conditional")]
-
-
-def _released(validation: Validation) -> list[Finding]:
-    """Of each loop, the margin that a large deviation takes most of."""
-    found = []
-    for name in validation.loops:
-        own = [
-            item
-            for item in validation.amplitude_margins
-            if item.loop == name and item.kind == "gain up" and item.border.value and item.linear > 1.0
-        ]
-        worst = min(own, key=lambda item: item.border.value or 0.0, default=None)
-        if worst is None or (worst.border.value or 0.0) > LOST * worst.linear:
-            continue
-        decibel, linear = 20.0 * log10(worst.border.value or 1.0), 20.0 * log10(worst.linear)
-        why = f", because the {worst.limiter} limit acts" if worst.limiter else ""
-        text = (
-            f"The {loop_name(name).lower()} keeps oscillating if its gain is raised by {decibel:.3g} dB and "
-            f"it is released from a {worst.size} deviation{why}; its linear gain margin is {linear:.3g} dB."
-        )
-        found.append(Finding(severity="warn", text=text, where="validation"))
-    return found
 
 
 def _unknown(validation: Validation) -> list[Finding]:
