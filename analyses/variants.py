@@ -331,6 +331,6 @@ def _alone(base: Design, other: Design, changed: tuple[Changed, ...]) -> dict[st
         values[path][k + 1] = parameter_value(other, path)
     columns = population_figures(Population(base, values, len(paths) + 1), base, time_figures=True)
     return {
-        path: {key: float(column[k + 1] - column[0]) for key, column in columns.items()}
+        path: {key: float(column[k + 1]) - float(column[0]) for key, column in columns.items()}
         for k, path in enumerate(paths)
     }

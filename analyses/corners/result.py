@@ -9,7 +9,7 @@ from math import isfinite
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.loop_figures import LoopFigures
-from analyses.requirements import RequirementVerdict, all_pass
+from analyses.verdicts import RequirementVerdict, all_pass
 
 HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
 

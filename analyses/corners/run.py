@@ -16,9 +16,9 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.quantities import ANALYSIS_QUANTITIES
 from analyses.corners.result import Asked, Corner, Corners
 from analyses.loop_figures import all_loop_figures
-from analyses.requirements import evaluate_requirements
 from analyses.sampling import Factor
 from analyses.sensitivity import population_figures
+from analyses.verdicts import judged
 
 _TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
 MARGINS = {"gain_margin": "worst gain margin", "phase_margin": "worst phase margin"}
@@ -44,7 +44,12 @@ def _judged(name: str, words: str, design: Design) -> Corner:
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     design = replace(design, requirements=kept)
     figures = all_loop_figures(assemble_loops(design))
-    return Corner(name, words, design, figures, evaluate_requirements(design, figures))
+    verdicts = tuple(verdict for one in kept for verdict in judged(design, one, figures, _not_here))
+    return Corner(name, words, design, figures, verdicts)
+
+
+def _not_here(name: str) -> tuple[None, str]:
+    return None, f"{name} is not judged at corners"
 
 
 def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:

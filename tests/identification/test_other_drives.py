@@ -95,7 +95,7 @@ CASES = [
          {"inertia": 0.01, "dry": 0.02, "viscous": 0.03}, 0.02),
     Case("fin", commands.multisine(0.12, [0.7, 2.3, 4.1], 6.0, 2e-4, seed=2), 6.0, 5, _fin,
          {"inertia": 0.03, "dry": 0.03, "load_coefficient": 0.05}, 0.04),
-    Case("joint", commands.multisine(0.8, [0.2, 0.5, 1.1], 8.0, 6.25e-5, seed=2), 8.0, 32, _joint,
+    Case("joint", commands.multisine(0.8, [0.25, 0.375, 0.625], 8.0, 6.25e-5, seed=2), 8.0, 32, _joint,
          {"inertia": 0.03, "dry": 0.05, "viscous": 0.03}, 0.04),
     Case("ctms-motor-position", commands.multisine(1.0, [0.5, 1.1, 2.3], 8.0, 1e-3, seed=2), 8.0, 1, _voltage,
          {"inertia": 0.005, "viscous": 0.02}, 0.02),

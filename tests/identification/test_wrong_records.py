@@ -166,11 +166,19 @@ def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path: Path) -> N
 
     design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
     run = simulate(design, commands.sine(0.08, 2.0), 0.6)
-    run.to_csv(tmp_path / "r.csv")
+    run.to_csv(tmp_path / "whole.csv")
+    _without(tmp_path / "whole.csv", "load_Nm", tmp_path / "r.csv")
     result = correlate_record(design, open_record(tmp_path / "r.csv"))
     assert max(signal.relative_error for signal in result.signals) < 1e-9
     without = correlate_record(load_design("ilr33-amber"), open_record(tmp_path / "r.csv"))
     assert without["current"].relative_error > 0.1
+
+
+def _without(path: Path, column: str, to: Path) -> None:
+    """Copy a CSV without one of its columns."""
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    left_out = rows[0].index(f'"{column}"')
+    to.write_text("".join(",".join(row[:left_out] + row[left_out + 1 :]) + "\n" for row in rows))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,158 @@
+"""Verdicts on requirements: what was found against the limit, in its unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.drive_figure import drive_figure
+from actuator_lti.errors import InputError
+from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
+from analyses.loop_figures import LoopFigures
+
+Asked = Callable[[str], tuple[float | None, str]]
+"""From the name of a quantity to what an analysis found, or why there is nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RequirementVerdict:
+    """One requirement at one place.
+
+    Attributes
+    ----------
+    id : str
+        Of the requirement, with ``/loop`` where it holds for every loop.
+    requirement : Requirement
+    loop : str or None
+        The loop that was judged; ``None`` for the whole drive.
+    value : float or None
+        What was found, in ``requirement.unit``; ``inf`` where there is no such bound.
+    distance : float or None
+        To the limit in ``requirement.unit``, positive on the good side.
+    passed : bool or None
+        ``None`` where it cannot be judged; ``reason`` says why.
+    reason : str
+        What has to be known to read it.
+    """
+
+    id: str
+    requirement: Requirement
+    loop: str | None
+    value: float | None
+    distance: float | None
+    passed: bool | None
+    reason: str = ""
+
+
+def all_pass(verdicts: tuple[RequirementVerdict, ...]) -> bool:
+    """Whether no requirement failed; one that could not be judged does not fail."""
+    return not any(verdict.passed is False for verdict in verdicts)
+
+
+def judged(
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
+) -> list[RequirementVerdict]:
+    """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
+    quantity = QUANTITIES.get(requirement.quantity)
+    if quantity is None:
+        raise InputError(
+            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
+            f"{', '.join(QUANTITIES)}",
+            where=design.origin or None,
+        )
+    if quantity.scope == "analysis":
+        value, reason = asked(quantity.name)
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    if quantity.scope == "drive":
+        found = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
+        value = None if math.isnan(found) else found
+        reason = "" if value is not None else "the design has no such figure"
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    named = requirement.loop not in (None, "every")
+    return [
+        _judge_loop(
+            design, requirement, requirement.id if named else f"{requirement.id}/{name}", name, figures
+        )
+        for name in judged_loops(requirement.loop, figures)
+    ]
+
+
+def _judge_loop(
+    design: Design, requirement: Requirement, id: str, name: str, figures: Mapping[str, LoopFigures]
+) -> RequirementVerdict:
+    """Judge one requirement on one loop; an unstable loop meets none."""
+    if name not in LOOPS:
+        raise InputError(
+            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
+            where=design.origin or None,
+        )
+    if name not in figures:
+        return _verdict(requirement, id, name, None, f"the design has no {name} loop")
+    found = figures[name]
+    if found.margins.stable is None:
+        return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
+    if not found.stable:
+        reason = f"the {name} loop is {found.margins.verdict}"
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
+        )
+    value = QUANTITIES[requirement.quantity].read(found)
+    reason = which_response(requirement.quantity, name)
+    if value is None:
+        reason = "not found in the band of this loop"
+    return _verdict(requirement, id, name, value, reason)
+
+
+def which_response(quantity: str, loop: str) -> str:
+    """Which of two responses a figure is taken of, in words; empty for a figure that both share.
+
+    Bandwidth, resonance and step of the position loop are those of the response to the command, with its
+    feed-forward and filters; of an inner loop, those of the feedback loop.
+
+    Examples
+    --------
+    >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
+    ('of the response to the command, feed-forward and filters included', '')
+    """
+    if not QUANTITIES[quantity].reader.startswith(("bandwidth.", "step.")):
+        return ""
+    if loop == "position":
+        return "of the response to the command, feed-forward and filters included"
+    return "of the feedback loop"
+
+
+def _verdict(
+    requirement: Requirement, id: str, loop: str | None, value: float | None, reason: str
+) -> RequirementVerdict:
+    """Compare a value with the limits."""
+    if value is None or math.isnan(value):
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=loop, value=None, distance=None, passed=None, reason=reason
+        )
+    room = distance(requirement, value)
+    if math.isinf(value):
+        reason = "nothing limits it" if value > 0 else reason
+    return RequirementVerdict(
+        id=id,
+        requirement=requirement,
+        loop=loop,
+        value=value,
+        distance=room,
+        passed=room >= 0.0,
+        reason=reason,
+    )
+
+
+def distance(requirement: Requirement, value: float) -> float:
+    """Give the distance of a value to the nearer limit, in its unit, positive on the good side.
+
+    Examples
+    --------
+    >>> distance(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0), 9.4)
+    3.4000000000000004
+    """
+    below = math.inf if requirement.minimum is None else value - requirement.minimum
+    above = math.inf if requirement.maximum is None else requirement.maximum - value
+    return min(below, above)
