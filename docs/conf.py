@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 import tomllib
 from pathlib import Path
 
@@ -30,6 +32,11 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 600
 nb_execution_show_tb = True
 nb_merge_streams = True
+# The notebooks' kernels live on this machine for a minute; their word on encryption says nothing of a page.
+_kernels = Path(tempfile.mkdtemp(prefix="docs-kernels-")) / "profile_default"
+_kernels.mkdir()
+(_kernels / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 'ERROR'\n", encoding="utf-8")
+os.environ["IPYTHONDIR"] = str(_kernels.parent)
 
 autosummary_generate = True
 autosummary_ignore_module_all = False
