@@ -36,6 +36,8 @@ CLOSE = 3e-3  # relative width at which the bracket is interpolated
 CYCLES = 20  # periods in a window
 FAINT = 1e-3  # kick, relative to the room of the signal
 FAINTEST = 3e-5  # where a reversal, or a coupling that comes free, may end a motion that would die out
+FAINT_IN_GRAVITY = 1e-9  # which is proportional to the angle only where that is small: growth takes its time
+GROWN = 1e5  # times the kick: no motion that dies out reaches that
 NOTHING = 1e-6  # of the kick: what is left counts as nothing
 NOTHING_RIDING = 1e-4  # the same on a ride, where rounding of the growing angle is seen in a speed estimate
 NEAR = 0.01  # relative width of the bracket from which on the frequency seen is that at the border
@@ -142,6 +144,8 @@ class Search:
         room = replace(self.setup, limits_on=True).room[signal[self.setup.point]]
         if room == inf:
             room = max(abs(self.setup.ride.speed_rad_s), 1.0)
+        if self.setup.design.load.gravity is not None:
+            return FAINT_IN_GRAVITY * room
         return (FAINTEST if self.setup.ride.delicate else FAINT) * room
 
     def growth(self, result: BatchResult) -> Floats:
@@ -153,6 +157,8 @@ class Search:
         gone = (last <= nothing * self.kick) | ~np.isfinite(found)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.delicate)
+        if self.setup.design.load.gravity is not None:  # a motion that has grown large is bounded by it
+            burst |= last > GROWN * self.kick
         return np.where(burst, inf, np.where(gone, -inf, found))
 
     def size(self, result: BatchResult, last: int) -> Floats:
