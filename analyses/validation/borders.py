@@ -36,6 +36,8 @@ CLOSE = 3e-3  # relative width at which the bracket is interpolated
 CYCLES = 20  # periods in a window
 FAINT = 1e-3  # kick, relative to the room of the signal
 FAINTEST = 3e-5  # where a reversal, or a coupling that comes free, may end a motion that would die out
+FAINT_IN_GRAVITY = 1e-9  # which is proportional to the angle only where that is small: growth takes its time
+GROWN = 1e5  # times the kick: no motion that dies out reaches that
 NOTHING = 1e-6  # of the kick: what is left counts as nothing
 NOTHING_RIDING = 1e-4  # the same on a ride, where rounding of the growing angle is seen in a speed estimate
 NEAR = 0.01  # relative width of the bracket from which on the frequency seen is that at the border
@@ -45,6 +47,7 @@ LONGER = 4
 FADED = 0.3  # of its size: what is left of an oscillation that keeps up, after twice the wait, is more
 UNSTEADY = "the position controller remembers, and the drive cannot stand: no run begins in its steady state"
 SLOW = "a slow motion that dies out hides the border: not told apart within the time given"
+SUDDEN = "no steady growth: a limit, a reversal or the play is met before"
 DECEIVED = 3.0  # widths of the bracket that a border may move when it is measured again
 GAIN_RANGE = 1e3
 LONGEST_DELAY_SAMPLES = 2000.0
@@ -76,6 +79,10 @@ class Search:
     smooth : bool
         Whether the growth rate is smooth at the border, so that it is interpolated; then it is that of the
         expected frequency.
+    alternating_hz : float or None
+        Where a real pole leaves the unit circle: 0 (at 1: the drive drifts away) or half a sampling
+        frequency (at -1: it alternates); ``None`` for an oscillation.  The span of such a motion changes from
+        window to window by its growth, exactly; then ``frequency_hz`` is one over the length of a window.
     """
 
     setup: Rig
@@ -86,6 +93,12 @@ class Search:
     cycles: int = CYCLES
     close: float = CLOSE
     smooth: bool = True
+    alternating_hz: float | None = None
+
+    @property
+    def real_pole(self) -> bool:
+        """Whether no oscillation, but a real pole makes the border."""
+        return self.alternating_hz is not None
 
     def rows(self, values: Floats) -> Rows:
         """One run a value."""
@@ -109,7 +122,7 @@ class Search:
         """The rig at one value, with a faint kick at the point at first."""
         setup = self.setup
         row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
-        row.series(setup.point, self._burst() if self.smooth else IMPULSE, self.kick)
+        row.series(setup.point, self._burst() if self.smooth and not self.real_pole else IMPULSE, self.kick)
         return row
 
     def _burst(self) -> Floats:
@@ -131,6 +144,8 @@ class Search:
         room = replace(self.setup, limits_on=True).room[signal[self.setup.point]]
         if room == inf:
             room = max(abs(self.setup.ride.speed_rad_s), 1.0)
+        if self.setup.design.load.gravity is not None:
+            return FAINT_IN_GRAVITY * room
         return (FAINTEST if self.setup.ride.delicate else FAINT) * room
 
     def growth(self, result: BatchResult) -> Floats:
@@ -142,11 +157,13 @@ class Search:
         gone = (last <= nothing * self.kick) | ~np.isfinite(found)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.delicate)
+        if self.setup.design.load.gravity is not None:  # a motion that has grown large is bounded by it
+            burst |= last > GROWN * self.kick
         return np.where(burst, inf, np.where(gone, -inf, found))
 
     def size(self, result: BatchResult, last: int) -> Floats:
         """Size in a window: of the fundamental, or from crest to crest where no frequency is expected."""
-        if self.smooth:
+        if self.smooth and not self.real_pole:
             return np.abs(result.phasor(self.setup.before, 1, last))
         low, high = result.span(self.setup.before, last)
         return high - low
@@ -160,6 +177,8 @@ class Search:
 
     def frequency(self, result: BatchResult) -> Floats:
         """Frequency of the oscillation, Hz, from the turn of the fundamental between the windows."""
+        if self.alternating_hz is not None:
+            return np.full(len(result.events), self.alternating_hz)
         last, earlier = (result.phasor(self.setup.before, 1, k) for k in (0, 1))
         turn = np.angle(last * earlier.conj())
         seconds = result.column("window") * result.column("period")
@@ -240,7 +259,8 @@ class _Hunt:
         self.values = np.geomspace(self.low, self.high, VALUES + 2)[1:-1]
         if self.frequency_hz is not None and abs(log(self.high / self.low)) < NEAR:
             off = abs(self.frequency_hz / self.search.frequency_hz - 1.0)
-            if self.search.smooth and OFF_FREQUENCY < off < 0.5 / self.search.cycles:
+            fitted = self.search.smooth and not self.search.real_pole
+            if fitted and OFF_FREQUENCY < off < 0.5 / self.search.cycles:
                 self.search = replace(self.search, frequency_hz=self.frequency_hz)
 
     def nominal(self) -> float:
@@ -263,6 +283,8 @@ class _Hunt:
         width = abs(log(self.high / self.low))
         if self.deceived:
             return Border(None, bracket, None, self.runs, SLOW)
+        if not self.done:
+            return Border(None, bracket, None, self.runs, SUDDEN)
         if not self.search.smooth:
             return Border(
                 exp(0.5 * log(self.low * self.high)), bracket, self.frequency_hz, self.runs, "", width
@@ -276,9 +298,23 @@ class _Hunt:
         """Whether a border has been found between two growth rates."""
         return bool(self.found and self.done and self.search.smooth and np.isfinite(self.growths).all())
 
+    @property
+    def looked_at_again(self) -> Floats:
+        """Values run with a longer wait: the border, or (nothing moves at a real pole's) both ends."""
+        if self.search.real_pole:
+            return np.array([self.low, self.high])
+        return np.array([exp(self.interpolated()[0])])
+
     def again(self, result: BatchResult) -> None:
         """Take the growth rate at the border after a longer wait: how far it says that the border lies."""
-        growth, (a, b) = float(self.search.growth(result)[0]), self.growths
+        growths, (a, b) = self.search.growth(result), self.growths
+        if self.search.real_pole:
+            low, high = (float(g) for g in growths)
+            if isfinite(low) and isfinite(high) and high > low and b > a:
+                self.shift = (a / (b - a) - low / (high - low)) * log(self.high / self.low)
+                self.runs += 2
+            return
+        growth = float(growths[0])
         if isfinite(growth) and b > a:
             self.shift = growth / (b - a) * abs(log(self.high / self.low))
             self.runs += 1
@@ -304,7 +340,8 @@ class _Hunt:
             return 0.5 * (ends[0] + ends[1]), width
         line = ends[0] - a / (b - a) * (ends[1] - ends[0])
         points = sorted([(ends[0], a), (ends[1], b), *self.beside], key=lambda item: item[1])
-        off = abs((self.frequency_hz or 0.0) / self.search.frequency_hz - 1.0)
+        seen = self.search.frequency_hz if self.search.real_pole else self.frequency_hz or 0.0
+        off = abs(seen / self.search.frequency_hz - 1.0)
         leak = off * width / (b - a)  # of a period that a window does not hold, over the slope of the growth
         if len(points) < 3 or any(y[1] <= x[1] for x, y in pairwise(points)):
             return line, 0.125 * width + leak
@@ -379,10 +416,11 @@ def _measure_again(hunts: list[_Hunt], threads: int | None) -> None:
     parts = []
     for hunt in hunts:
         later = replace(hunt.search, settle_ticks=2 * hunt.search.settle_ticks)
-        parts.append(later.rows(np.array([exp(hunt.interpolated()[0])])))
+        parts.append(later.rows(hunt.looked_at_again))
     result = Rows.join(parts).run(threads=threads)
-    for k, hunt in enumerate(hunts):
-        hunt.again(result.part(slice(k, k + 1)))
+    ends = np.cumsum([len(part) for part in parts])
+    for hunt, part, end in zip(hunts, parts, ends, strict=True):
+        hunt.again(result.part(slice(end - len(part), end)))
 
 
 def _control(hunts: list[_Hunt], threads: int | None) -> None:

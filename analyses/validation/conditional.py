@@ -149,11 +149,12 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
     from actuator_lti.loops import exact_margins
 
     margins = {point: exact_margins(loops, point) for point in points_of(design) if point != "output"}
-    predictions = tuple(
+    found = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
         if margins[point].stable and margins[point].gain_lower > LOW_GAIN
-    )
+    ]
+    predictions = tuple(one for one in found if one is not None)
     threshold, following = step_threshold(design, settle_ticks)
     hertz = amplitude = None
     limiter = ""
@@ -184,10 +185,12 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
     return [item for item in found if isfinite(item[1])]
 
 
-def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction:
-    """The limit cycle at the lower gain margin."""
+def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:
+    """The limit cycle at the lower gain margin; none where the drive drifts away there."""
     ratio = saturation_ratio(gain)
     hertz = oscillation_hz(loops.break_points[point], gain=gain)
+    if hertz == 0.0:
+        return None
     design, omega = loops.design, 2.0 * pi * hertz
     behind = gain * ratio * limit  # fundamental behind the limit
     output = behind * _to_output(design, point, omega)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
+from analyses.validation.coherent import LEAST_SAMPLES
 from analyses.validation.rig import Rig
 from analyses.validation.tolerance import allowed
 from nonlinear import Rows
@@ -28,6 +29,8 @@ AGAIN = 16  # times the wait
 LONGEST_AGAIN_TICKS = 100_000
 LONGEST_BLIND_TICKS = 20_000  # nobody knows what to wait for: several of the slowest time constants
 GRID, DIPS = 1000, 6  # frequencies looked at, and how many of the nearest approaches to -1 are refined
+SLOWEST = 1e-4  # of half the sampling frequency: a border below is a drift, no oscillation
+AT_NYQUIST = 1e-6  # relative: a real pole at -1
 FAR = 300.0  # margins beyond this factor count as none
 
 
@@ -45,7 +48,7 @@ class Confirmation:
         Factor of the loop gain, or delay in samples of the point (computing delay: in ticks); ``None`` where
         the linear loop has no such margin within the reach of the search.
     predicted_hz : float or None
-        Where the linear loop would oscillate.
+        Where the linear loop would oscillate; 0 where a real pole leaves the unit circle at 1 (it drifts).
     instrument : float or None
         Delay in samples at which the loop with the instrument's own interpolated delay reaches its border:
         what the instrument can find at best; ``None`` for gains.
@@ -200,7 +203,10 @@ def point_questions(setups: Mapping[str, Rig], loops: Loops, settle_ticks: int) 
 
 
 def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
-    """About where a loop oscillates at its border: the frequency at which ``gain L`` comes nearest to -1."""
+    """About where a loop oscillates at its border: the frequency at which ``gain L`` comes nearest to -1.
+
+    0, and half the sampling frequency, where a real pole leaves the unit circle at 1 or -1.
+    """
     from scipy.optimize import minimize_scalar
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
@@ -208,7 +214,7 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
         z = np.exp(1j * omega * loop.period_s)
         return np.abs(1.0 + gain * np.atleast_1d(loop.open_loop(z)) * np.exp(-1j * omega * delay_s))
 
-    grid = np.log(np.geomspace(1e-4, 0.999, GRID) * 0.5 / loop.period_s)
+    grid = np.log(np.geomspace(SLOWEST, 0.999, GRID) * 0.5 / loop.period_s)
     values = distance(grid)
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
@@ -216,16 +222,27 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
     for k in dips:  # a narrow one is deeper than the grid shows
         ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
         found.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
-    return float(np.exp(min(found, key=lambda item: float(item.fun)).x))
+    best = min(found, key=lambda item: float(item.fun))
+    nyquist = 0.5 / loop.period_s
+    at_minus_one = float(distance(np.log(nyquist))[0])
+    if values[0] <= min(best.fun, at_minus_one):
+        return 0.0
+    return nyquist if at_minus_one <= best.fun else float(np.exp(best.x))
 
 
 def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
     """A gain margin; where none is predicted within reach the search looks all the same."""
-    nyquist = 0.5 / setup.period_s
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
         return Question(_blind(setup, kind, settle_ticks), kind, None, None)
     ratio, omega = predicted
-    hertz = min(omega / (2.0 * pi), 0.97 * nyquist)
+    hertz, tick_s = omega / (2.0 * pi), setup.design.controller.period_s
+    halves = {0.5 / setup.period_s, 0.5 / (setup.base_ticks * tick_s), 0.5 / tick_s}
+    alternating = [half for half in halves if abs(hertz / half - 1.0) < AT_NYQUIST]
+    if hertz <= SLOWEST * min(halves):
+        alternating = [0.0]
+    if alternating:
+        return Question(_real_pole(setup, kind, settle_ticks, alternating[0]), kind, ratio, alternating[0])
+    hertz = min(hertz, 0.97 * 0.5 / setup.period_s)
     return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks)), kind, ratio, hertz)
 
 
@@ -237,6 +254,14 @@ def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
         return Search(setup, kind, hertz, wait, reach=100.0, smooth=False)
     hertz = 3.0 / (max(wait, 100) * setup.design.controller.period_s)
     return Search(setup, kind, hertz, 2 * wait, reach=10.0, cycles=6, smooth=False)
+
+
+def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Search:
+    """Look for the gain at which a real pole reaches 1 (0 Hz, windows as long as the wait) or -1."""
+    window = LEAST_SAMPLES * setup.base_ticks
+    wait = max(min(settle_ticks, LONGEST_BLIND_TICKS), window)
+    hertz = 1.0 / ((window if at_hz else wait) * setup.design.controller.period_s)
+    return Search(setup, kind, hertz, wait, cycles=1, alternating_hz=at_hz)
 
 
 def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:

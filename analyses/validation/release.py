@@ -151,7 +151,7 @@ def release_margins(
     cases = [
         (item, size, friction)
         for item in confirmed
-        if item.loop in setups and item.kind in ("gain up", "delay") and item.predicted is not None
+        if item.loop in setups and item.kind in ("gain up", "delay") and item.predicted_hz  # a drift has none
         for size in sizes
         for friction in ((False, True) if _has_friction(setups[item.loop].design) else (False,))
     ]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import exp
+
 import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design, stability_margins
+from analyses.validation import Settings, validate
 from analyses.validation.borders import Search, find_borders
 from analyses.validation.confirm import (
     Confirmation,
@@ -17,6 +21,17 @@ from analyses.validation.confirm import (
 from analyses.validation.release import release_margins
 from analyses.validation.rig import rig
 from analyses.validation.sweep import settling_ticks_of
+
+SMALL = Settings(
+    frequencies=12,
+    point_frequencies=0,
+    multisine=False,
+    amplitude_margins=False,
+    rest_frequencies=0,
+    large_signals=False,
+    friction_effects=False,
+    specification=False,
+)
 
 
 def confirmed(name: str) -> tuple[Confirmation, ...]:
@@ -125,3 +140,46 @@ def test_amplitude_and_friction_move_the_border() -> None:
         by["velocity", "delay", "small", True].border.value
         > 1.1 * by["velocity", "delay", "small", True].linear
     )
+
+
+def test_a_drive_that_drifts_away_has_a_lower_margin_at_no_frequency() -> None:
+    """A moment that pushes the surface away: below some gain the drive no longer holds it.
+
+    There the constant torques balance: ``g K_V K_X N x`` volts through ``N kM / R`` against the slope.
+    """
+    slope = 300.0
+    design = load_design("fin")
+    design = replace(design, load=replace(design.load, moment_slope_Nm_rad=slope))
+    control, motor, N = design.controller, design.motor, design.total_ratio
+    border = (
+        slope * motor.resistance_ohm
+        / (N**2 * motor.torque_constant_Nm_A * control.velocity.gain * control.position.gain)
+    )  # fmt: skip
+    found = validate(design, SMALL).loops["position"].confirmed
+    item = next(one for one in found if one.kind == "gain down")
+    assert item.predicted == pytest.approx(border, rel=1e-9)
+    assert item.predicted_hz == 0.0
+    assert item.border.value == pytest.approx(border, rel=1e-6)
+    assert item.error < 1e-4
+    assert item.passed
+
+
+def test_a_loop_that_alternates_at_its_border() -> None:
+    """A current loop without computing delay: at its border every sample has the other sign.
+
+    ``i+ = a i + b u`` with ``a = exp(-R Ts/L)``, ``b = (1 - a)/R``; the controller at z = -1.
+    """
+    design = load_design("ilr33-amber")
+    design = replace(
+        design, controller=replace(design.controller, computing_delay_s=0.0, position=None, velocity=None)
+    )
+    motor, control, Ts = design.motor, design.controller.current, design.controller.period_s
+    a = exp(-motor.resistance_ohm * Ts / motor.inductance_H)
+    b = (1.0 - a) / motor.resistance_ohm
+    at_minus_one = control.gain_V_A * (1.0 + 0.5 * Ts / control.integral_time_s)
+    found = validate(design, SMALL).loops["current"].confirmed
+    item = next(one for one in found if one.kind == "gain up")
+    assert item.predicted_hz == pytest.approx(0.5 / Ts)
+    assert item.border.value == pytest.approx((1.0 + a) / (b * at_minus_one), rel=1e-6)
+    assert item.border.frequency_hz == pytest.approx(0.5 / Ts)
+    assert item.passed
