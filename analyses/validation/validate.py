@@ -422,8 +422,7 @@ class _Work:
             return []
         system, design = self.answer_loops.reference_to_output, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        settle = max(settling_ticks_of(system, base, design.name), *self.settle.values(), 1)
-        slowest = settle / SETTLE_TIME_CONSTANTS
+        slowest = settling_ticks_of(system, base, design.name, EVER_TICKS) / SETTLE_TIME_CONSTANTS
         return [command_entry(design, sweep, system, slowest)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
