@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, isfinite, pi
+from math import ceil, isfinite, log, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.coherent import LEAST_SAMPLES
 from analyses.validation.rig import Rig
+from analyses.validation.sweep import SETTLE_TIME_CONSTANTS
 from analyses.validation.tolerance import allowed
 from nonlinear import Rows
 from nonlinear.probe import fractional_delay
@@ -119,9 +120,16 @@ class Question:
     predicted: float | None
     predicted_hz: float | None
     instrument: float | None = None
+    settles_ticks: int = 0  # in which the nominal drive does, for a search for a border that nobody expects
 
     def answer(self, border: Border) -> Confirmation:
-        """The confirmation from the border found."""
+        """The confirmation from the border found; an unexpected one is none while slow modes still move."""
+        if (
+            self.predicted is None
+            and border.value is not None
+            and self.search.settle_ticks < self.settles_ticks
+        ):
+            border = replace(border, value=None, unknown=SLOW)
         setup = self.search.setup
         return Confirmation(
             loop=setup.loop,
@@ -157,8 +165,8 @@ def _doubted(
         search = questions[k].search
         wait = min(AGAIN * search.settle_ticks, max(LONGEST_AGAIN_TICKS, search.settle_ticks))
         searches.append(replace(search, settle_ticks=wait))
-    for k, border in zip(odd, find_borders(searches, threads=threads), strict=True):
-        found[k] = questions[k].answer(border)
+    for k, search, border in zip(odd, searches, find_borders(searches, threads=threads), strict=True):
+        found[k] = replace(questions[k], search=search).answer(border)
     return found
 
 
@@ -190,10 +198,13 @@ def point_questions(setups: Mapping[str, Rig], loops: Loops, settle_ticks: int) 
         exact, loop = exact_margins(loops, point), loops.break_points[point]
         if not exact.stable:
             continue
+        radius = exact.spectral_radius
+        own = 0 if not 0.0 < radius < 1.0 else ceil(-SETTLE_TIME_CONSTANTS * setup.base_ticks / log(radius))
         for kind, ratio in (("gain up", exact.gain_upper), ("gain down", exact.gain_lower)):
             there = isfinite(ratio) and ratio > 0.0
             border = (ratio, 2.0 * pi * oscillation_hz(loop, gain=ratio)) if there else None
-            found.append(_gain(setup, kind, border, settle_ticks))  # type: ignore[arg-type]
+            asked = _gain(setup, kind, border, settle_ticks)  # type: ignore[arg-type]
+            found.append(replace(asked, settles_ticks=max(own, asked.settles_ticks)))
         if exact.delay_s is not None and isfinite(exact.delay_s):
             ticks = exact.delay_s / setup.design.controller.period_s
             hertz = oscillation_hz(loop, delay_s=exact.delay_s)
@@ -233,7 +244,7 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
 def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
     """A gain margin; where none is predicted within reach the search looks all the same."""
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
-        return Question(_blind(setup, kind, settle_ticks), kind, None, None)
+        return Question(_blind(setup, kind, settle_ticks), kind, None, None, settles_ticks=settle_ticks)
     ratio, omega = predicted
     hertz, tick_s = omega / (2.0 * pi), setup.design.controller.period_s
     halves = {0.5 / setup.period_s, 0.5 / (setup.base_ticks * tick_s), 0.5 / tick_s}

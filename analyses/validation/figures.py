@@ -156,11 +156,7 @@ BESIDE = 2  # points on either side
 
 
 def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
-    """Relative error of each point: the change between its windows, and what the transient still holds.
-
-    A transient of the time constant tau that changes by d from one window W to the next has
-    ``d/(1 - exp(-W/tau))`` to go.
-    """
+    """Relative error of each point: the change between its windows, carried on, and rounding."""
     from scipy.ndimage import maximum_filter1d
 
     tick_s = setup.design.controller.period_s
@@ -171,7 +167,15 @@ def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
         own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)
     seen = np.maximum(np.abs(sweep.closed_loop * sweep.amplitude), 1e-300)
     rounding = angle_rounding(setup, window) / seen
-    return own / -np.expm1(-window / slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
+    return carried_on(own, window, slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
+
+
+def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
+    """What a transient that changes by d from one window W to the next still holds.
+
+    ``d/(1 - exp(-W/tau))`` with its time constant tau.
+    """
+    return change / -np.expm1(-np.asarray(window) / slowest)
 
 
 def angle_rounding(setup: Rig, window: npt.NDArray[np.int64]) -> Floats:

@@ -17,8 +17,9 @@ import numpy as np
 from actuator_lti.design.model import Design
 from analyses.loop_figures import LoopFigures
 from analyses.validation.borders import LONGEST_DELAY_SAMPLES
+from analyses.validation.coherent import coherent
 from analyses.validation.confirm import Confirmation
-from analyses.validation.figures import Measured, hertz, most_frequent
+from analyses.validation.figures import ROUNDING, Measured, carried_on, hertz, most_frequent
 from analyses.validation.reading import Reading
 from analyses.validation.response import Sweep, SweepErrors, linear_response
 from analyses.validation.tolerance import PREDICTED, allowed
@@ -27,7 +28,6 @@ SMALL = "feedback loop, small signal"
 NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
 NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
 DECIBEL = 20.0 / log(10.0)  # dB per unit of a small relative change
-COMMAND_SURE = 10.0  # changes between windows: a transient slower than the window has more to go
 ROUND = 1e-9  # of a tolerance: the rounding of its own sum
 
 
@@ -246,8 +246,11 @@ def _step_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entr
     ]
 
 
-def command_entry(design: Design, sweep: Sweep, system: Any) -> Entry:
-    """The response to the command, with feed-forward and filters, at its worst point."""
+def command_entry(design: Design, sweep: Sweep, system: Any, slowest_ticks: float) -> Entry:
+    """The response to the command, with feed-forward and filters, at its worst point.
+
+    ``slowest_ticks`` is the time constant of the slowest mode: what the last window still holds of it.
+    """
     loop = design.controller.outermost
     words = "response to the command (with feed-forward), small signal"
     valid = sweep.valid
@@ -255,7 +258,9 @@ def command_entry(design: Design, sweep: Sweep, system: Any) -> Entry:
         why = f"no frequency could be measured: {most_frequent(sweep.reason)}"
         return not_judged(loop, "response_command", "%", 0.0, None, why, words)
     off = np.abs(sweep.closed_loop[valid] / linear_response(system, sweep.frequency_hz[valid]) - 1.0)
-    may = allowed(COMMAND_SURE * sweep.unsteadiness[valid], 1.0)
+    tick_s = design.controller.period_s
+    window = coherent(sweep.frequency_hz[valid], tick_s, round(sweep.period_s / tick_s)).ticks
+    may = allowed(carried_on(sweep.unsteadiness[valid], window, max(slowest_ticks, 1.0)) + ROUNDING, 1.0)
     k = int(np.argmax(off / may))
     hertz = sweep.frequency_hz[valid][k]
     where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"

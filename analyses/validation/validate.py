@@ -420,7 +420,10 @@ class _Work:
         """The worst point of the response to the command."""
         if sweep is None:
             return []
-        return [command_entry(self.design, sweep, self.answer_loops.reference_to_output)]
+        system, design = self.answer_loops.reference_to_output, self.design
+        base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
+        slowest = settling_ticks_of(system, base, design.name, EVER_TICKS) / SETTLE_TIME_CONSTANTS
+        return [command_entry(design, sweep, system, slowest)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
