@@ -213,3 +213,12 @@ def _denominator_at_rest(form: DelayForm) -> list[fmpq]:
             tau = sum((_exact(form.delays[k]) for k in chosen), fmpq(0))
             total += Quasi(((_determinant(core, n), tau),)).series(_MOST_AT_REST)
     return [total[k] for k in range(_MOST_AT_REST)]
+
+
+def value_at_rest(form: DelayForm) -> float | None:
+    """L(0) with the power of s that N and D share cancelled; ``None`` where that leaves a pole."""
+    if form.delays.size > _MOST_DELAYS:
+        return None
+    loop = exact_delay_loop(form)
+    above, below = loop.N.series(1)[0], loop.D.series(1)[0]
+    return None if below == 0 else float((above / below).p) / float((above / below).q)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins
 from actuator_lti.design import read_design_text
 
 SERVO = """
@@ -90,3 +90,13 @@ def test_a_weak_spring_is_told_from_none(slope: float) -> None:
     assert loops.velocity is not None
     assert stability_margins(loops.current.open_loop).stable is (slope < 0.0)
     assert stability_margins(loops.velocity.open_loop).stable is True
+
+
+def test_the_gain_at_rest_of_a_current_loop_on_a_free_rotor() -> None:
+    """L(0) = Kp/Tn J/(kM kE): at constant current the ramp of the PI is one of the back-EMF."""
+    design = read_design_text(SERVO + WITH_CURRENT_LOOP, "rc")
+    loop = assemble_loops(design, form="continuous").current
+    assert loop is not None
+    at_rest = 0.5 / 1e-3 * 1.2e-7 / 6e-3**2
+    dc_gain = closed_loop_bandwidth(loop.closed_loop).dc_gain
+    assert dc_gain == pytest.approx(at_rest / (1.0 + at_rest), rel=1e-9)
