@@ -280,7 +280,7 @@ def _dc(form: DelayForm) -> float:
 
 
 def _value_at_rest(form: DelayForm, low: float) -> float:
-    """L(0), exact where a mode at rest that L does not show leaves 0/0; the value at ``low`` where none is."""
+    """L(0), exact where a mode at rest that L does not show leaves 0/0; at ``low`` where none is."""
     if not form.sampled and form.delays.size:
         from actuator_lti.margins.exact_delay import singular_at_rest, value_at_rest  # flint if needed
 
