@@ -272,16 +272,25 @@ def _dc(form: DelayForm) -> float:
     low, order = low_frequency(form)
     if order:
         raise InputError(_POLE)
-    try:
-        value = float(border_values(form.without_series(), np.zeros(1))[0].real)
-    except np.linalg.LinAlgError:
-        value = float(border_values(form.without_series(), np.array([low]))[0].real)
-    if not math.isfinite(value):
-        value = float(border_values(form.without_series(), np.array([low]))[0].real)
+    value = _value_at_rest(form.without_series(), low)
     reference = float(np.abs(border_values(form.without_series(), np.array([low * 1e3])))[0])
     if abs(value) <= 1e-12 * reference:
         raise InputError(_NO_GAIN)
     return value
+
+
+def _value_at_rest(form: DelayForm, low: float) -> float:
+    """L(0), exact where a mode at rest that L does not show leaves 0/0; at ``low`` where none is."""
+    if not form.sampled and form.delays.size:
+        from actuator_lti.margins.exact_delay import singular_at_rest, value_at_rest  # flint if needed
+
+        if singular_at_rest(form) and (exact := value_at_rest(form)) is not None:
+            return exact
+    try:
+        value = float(border_values(form, np.zeros(1))[0].real)
+    except np.linalg.LinAlgError:
+        value = math.nan
+    return value if math.isfinite(value) else float(border_values(form, np.array([low]))[0].real)
 
 
 def _rational_falls(loop: RationalLoop, level: float) -> list[float]:

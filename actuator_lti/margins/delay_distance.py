@@ -97,5 +97,7 @@ def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
         if criterion is MODULUS:
             return np.maximum(distance - R, by_gain)
         by_disk = np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
+        # about L = 1, where the criterion has its pole: a servo whose gain at rest is one starts there
+        by_disk = np.maximum(by_disk, 2.0 * (np.abs(1.0 + found.L) - R) / (away + R))
         by_gain = np.maximum(2.0 * (1.0 - most) / (1.0 + most), 2.0 * (least - 1.0) / (least + 1.0))
         return np.maximum(by_disk, by_gain)

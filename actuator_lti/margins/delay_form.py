@@ -223,15 +223,20 @@ def _spread(form: DelayForm, half: Real, G: Real, X: Real, Y: Real, q: int) -> R
     k = np.concatenate((np.zeros(n), np.abs(form.D12) * form.delays))
     if not n + q:
         return np.zeros(half.size)
-    GK = G @ K
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # beside a pole: no bound there
+        spread = _series_bound(G @ K, X, Y @ K, k, half)
+    return np.where(np.isfinite(spread), spread, np.inf)
+
+
+def _series_bound(GK: Real, X: Real, YK: Real, k: Real, half: Real) -> Real:
+    """Bound of abs(dL) from the Neumann series in the norm weighted by a Perron vector; inf: none."""
     u = np.maximum(X, 1e-3 * X.max(axis=1, keepdims=True)) + 1e-300
     for _ in range(3):  # towards the Perron vector, kept positive
         v = (GK @ u[..., None])[..., 0]
         u = u / u.max(axis=1, keepdims=True) + v / (v.max(axis=1, keepdims=True) + 1e-300)
     rho = half * ((GK @ u[..., None])[..., 0] / u).max(axis=1)
     beta = half * ((GK @ X[..., None])[..., 0] / u).max(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gamma = np.where(rho < 1.0, beta / (1.0 - rho), np.inf)
-        total = X + gamma[:, None] * u
-        spread = half * ((Y @ K) * total).sum(axis=1) + half * (total @ k)
+    gamma = np.where(rho < 1.0, beta / (1.0 - rho), np.inf)
+    total = X + gamma[:, None] * u
+    spread = half * (YK * total).sum(axis=1) + half * (total @ k)
     return np.where(rho < 1.0, spread, np.inf)

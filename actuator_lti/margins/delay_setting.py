@@ -53,7 +53,10 @@ class Setting:
 
 def setting_of(form: DelayForm, band: tuple[float, float] | None, tail: bool = True) -> Setting:
     """Find the setting of a loop; ``band`` in rad/s, as asked for."""
-    poles = _exact_zero(form, sorted_poles(open_loop_matrix(form, 24), form.sampled, gather=True))
+    matrix = open_loop_matrix(form, 24)
+    poles = _exact_zero(form, sorted_poles(matrix, form.sampled, gather=True))
+    if poles.at_dc > 1 and not form.sampled and form.delays.size:
+        poles = _parted(form, poles, sorted_poles(matrix, in_z=False))
     at_dc = poles.at_dc
     with np.errstate(divide="ignore"):
         sizes = np.abs(np.log(poles.values)) if form.sampled else np.abs(poles.values)
@@ -102,6 +105,22 @@ def _exact_zero(form: DelayForm, poles: SortedPoles) -> SortedPoles:
     return SortedPoles(values, unstable, (BorderPole(0.0, 1), *poles.border), count, poles.doubtful)
 
 
+def _parted(form: DelayForm, gathered: SortedPoles, plain: SortedPoles) -> SortedPoles:
+    """A slow pole that was gathered to zero put back, where the entries say that it is none."""
+    from actuator_lti.margins.exact_delay import poles_at_rest  # python-flint only where it is needed
+
+    count = poles_at_rest(form)
+    if not count or count >= gathered.at_dc:
+        return gathered
+    values = plain.values.copy()
+    values[np.abs(values).argsort()[:count]] = 0.0
+    border = (BorderPole(0.0, count), *(pole for pole in gathered.border if pole.x > 0.0))
+    away = gathered.at_dc - count
+    slow = values[np.abs(values).argsort()[count : count + away]]
+    unstable = gathered.unstable + int(np.count_nonzero(slow.real > 0.0))
+    return SortedPoles(values, unstable, border, gathered.border_count - away, gathered.doubtful)
+
+
 def low_frequency(form: DelayForm) -> tuple[float, int]:
     """A frequency x below which L follows its pole at zero, and the multiplicity of that pole in L."""
     setting = setting_of(form.without_series(), None, tail=False)
@@ -111,6 +130,10 @@ def low_frequency(form: DelayForm) -> tuple[float, int]:
 def _order_atdc_value(form: DelayForm, low: float, most: int) -> tuple[float, int]:
     """A frequency at which L already follows its pole at zero, and the order of that pole."""
     order, _ = slope_at_dc(lambda x: border_values(form, x), 10.0 * low, most)
+    if most == 1 and not order and not form.sampled:
+        from actuator_lti.margins.exact_delay import shown_at_rest  # python-flint only where it is needed
+
+        order = int(shown_at_rest(form))
     for _ in range(14):
         L = border_values(form, np.array([low, 0.1 * low]))
         slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))

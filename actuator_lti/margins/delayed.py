@@ -16,7 +16,7 @@ from actuator_lti.margins.delay_setting import FLOOR, Setting, cells_of, dc_valu
 from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
-from actuator_lti.margins.poles import sorted_poles
+from actuator_lti.margins.poles import SortedPoles, sorted_poles
 from actuator_lti.margins.results import (
     Agreement,
     DiskMargin,
@@ -25,6 +25,8 @@ from actuator_lti.margins.results import (
     StabilityMargins,
 )
 from actuator_lti.margins.sweep import GAIN, PHASE, crossings, reach
+
+_BESIDE = 1e-3  # of the next pole: this near to zero lies the hidden one, collocated
 
 
 def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
@@ -79,7 +81,19 @@ def _agreement(setting: Setting, count: int | None, found: Cells, crossover: flo
     if points is None:  # the gain is above one for many turns of the delay: more poles than can be collocated
         return Agreement(None, count)
     closed = sorted_poles(closed_loop_matrix(form, points), False)
-    return Agreement(closed.unstable, count, max(closed.border_count - setting.hidden, 0))
+    unstable, border = _without_hidden(closed, setting.hidden)
+    return Agreement(unstable, count, border)
+
+
+def _without_hidden(closed: SortedPoles, hidden: int) -> tuple[int, int]:
+    """Unstable and border poles, less a hidden mode at zero, which collocation puts beside it on any side."""
+    size = np.abs(closed.values)
+    if not hidden or closed.at_dc or size.size < 2:
+        return closed.unstable, max(closed.border_count - hidden, 0)
+    k = int(size.argmin())
+    if size[k] > _BESIDE * np.delete(size, k).min():
+        return closed.unstable, closed.border_count
+    return closed.unstable - int(closed.values[k].real > 0.0), closed.border_count
 
 
 def _assembled(

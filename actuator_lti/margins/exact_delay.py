@@ -14,6 +14,8 @@ from actuator_lti.margins.delay_form import DelayForm
 from actuator_lti.margins.given import ULP
 
 _MOST_DELAYS = 5
+_MOST_AT_REST = 6
+Terms = tuple[tuple[fmpq_poly, fmpq], ...]
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:
     r"""Expand the determinants, affine in each exp(-s tau_k): one polynomial for each subset of delays.
 
     D = det [sI - A, -B2 E; -C2, I - D22 E] and N the same bordered by (-B1, -D21; C1, D12 E, D11), with
-    E = diag exp(-s tau_k); a column without its delay is a unit vector, which takes its row away.
+    E = diag exp(-s tau_k); a column without its delay is a unit vector, which takes its row away. A power of
+    s in every term of both is cancelled.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:
     if q > _MOST_DELAYS:
         raise InputError(f"exact arithmetic takes at most {_MOST_DELAYS} inner delays; this loop has {q}")
     delays = [_exact(tau) for tau in form.delays]
-    N, D = [], []
+    above, below = [], []
     for size in range(q + 1):
         for chosen in combinations(range(q), size):
             tau = sum((delays[k] for k in chosen), fmpq(0))
@@ -104,17 +107,25 @@ def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:
             column = np.concatenate((-form.B1, -form.D21[S]))
             row = np.concatenate((form.C1, form.D12[S]))
             whole = np.block([[core, column[:, None]], [row[None], np.array([[form.D11]])]])
-            D.append((_determinant(core, n), tau))
-            N.append((_determinant(whole, n), tau))
-    if any(p.degree() >= n for p, _ in D[1:]) or any(p.degree() >= n for p, _ in N):
+            below.append((_determinant(core, n), tau))
+            above.append((_determinant(whole, n), tau))
+    if any(p.degree() >= n for p, _ in below[1:]) or any(p.degree() >= n for p, _ in above):
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
         )
-    late = Quasi(_present(N)).late(_exact(form.series_s))
-    return ExactDelayLoop(late, Quasi(_present(D)), n)
+    N, D, n = _without_common_s(_present(above), _present(below), n)
+    return ExactDelayLoop(Quasi(N).late(_exact(form.series_s)), Quasi(D), n)
 
 
-def _present(terms: list[tuple[fmpq_poly, fmpq]]) -> tuple[tuple[fmpq_poly, fmpq], ...]:
+def _without_common_s(N: Terms, D: Terms, degree: int) -> tuple[Terms, Terms, int]:
+    """Cancel a factor s that stands in every term of both: a mode at zero frequency that L does not show."""
+    while N and degree and all(p[0] == 0 for p, _ in (*N, *D)):
+        N, D = (tuple((p // fmpq_poly([0, 1]), tau) for p, tau in terms) for terms in (N, D))
+        degree -= 1
+    return N, D, degree
+
+
+def _present(terms: list[tuple[fmpq_poly, fmpq]]) -> Terms:
     return tuple((p, tau) for p, tau in terms if p.degree() >= 0)
 
 
@@ -156,3 +167,58 @@ def singular_at_rest(form: DelayForm) -> bool:
     m = inner.shape[0]
     entries = [fmpq(*float(x).as_integer_ratio()) for x in inner.ravel()]
     return bool(fmpq_mat(m, m, entries).det() == 0)
+
+
+def shown_at_rest(form: DelayForm) -> bool:
+    """Whether L shows a pole at zero frequency: N(0) is not zero, and stays what it is for the neighbours.
+
+    The slope of L cannot tell: behind a weak spring the residue may be 1e-6 of what hides it.
+    """
+    values = [_numerator_at_rest(near) for near in (form, neighbour(form, 1.0), neighbour(form, -1.0))]
+    return values[0] != 0 and all(abs(v / values[0] - 1) < fmpq(1, 100) for v in values[1:])
+
+
+def _numerator_at_rest(form: DelayForm) -> fmpq:
+    whole = np.block(
+        [
+            [-form.A, -form.B2, -form.B1[:, None]],
+            [-form.C2, np.eye(form.delays.size) - form.D22, -form.D21[:, None]],
+            [form.C1[None], form.D12[None], np.array([[form.D11]])],
+        ]
+    )
+    m = whole.shape[0]
+    return fmpq_mat(m, m, [_exact(x) for x in whole.ravel()]).det()
+
+
+def poles_at_rest(form: DelayForm) -> int | None:
+    """Multiplicity of the open loop's pole at zero frequency; ``None`` where rounding decides about it.
+
+    Eigenvalues cannot tell a double one from one at zero beside a slow one (a weak spring that drives).
+    """
+    series = [_denominator_at_rest(near) for near in (form, neighbour(form, 1.0), neighbour(form, -1.0))]
+    first = next((k for k, c in enumerate(series[0]) if c != 0), None)
+    if first is None or any(any(near[:first]) for near in series[1:]):
+        return None
+    steady = all(abs(near[first] / series[0][first] - 1) < fmpq(1, 100) for near in series[1:])
+    return first if steady else None
+
+
+def _denominator_at_rest(form: DelayForm) -> list[fmpq]:
+    """The first Taylor coefficients of D at zero, no power of s cancelled."""
+    n, total = form.B1.size, fmpq_poly()
+    for size in range(form.delays.size + 1):
+        for chosen in combinations(range(form.delays.size), size):
+            S = list(chosen)
+            core = np.block([[-form.A, -form.B2[:, S]], [-form.C2[S], -form.D22[np.ix_(S, S)]]])
+            tau = sum((_exact(form.delays[k]) for k in chosen), fmpq(0))
+            total += Quasi(((_determinant(core, n), tau),)).series(_MOST_AT_REST)
+    return [total[k] for k in range(_MOST_AT_REST)]
+
+
+def value_at_rest(form: DelayForm) -> float | None:
+    """L(0) with the power of s that N and D share cancelled; ``None`` where that leaves a pole."""
+    if form.delays.size > _MOST_DELAYS:
+        return None
+    loop = exact_delay_loop(form)
+    above, below = loop.N.series(1)[0], loop.D.series(1)[0]
+    return None if below == 0 else float((above / below).p) / float((above / below).q)
