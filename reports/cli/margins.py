@@ -84,7 +84,7 @@ def margins(
     else:
         _print_tables(where, figures, verdicts, outer)
     every = [*figures.values(), *outer.values()]
-    leave_with(all_pass(verdicts) and all(found.margins.stable is not False for found in every))
+    leave_with(all_pass(verdicts) and all(found.margins.stable for found in every))
 
 
 def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str, LoopFigures]:
@@ -113,7 +113,7 @@ def _print_json(
 
     loops = {name: loop_json(found) for name, found in figures.items()}
     passed = all_pass(tuple(verdicts)) and all(
-        found.margins.stable is not False for found in (*figures.values(), *outer.values())
+        found.margins.stable for found in (*figures.values(), *outer.values())
     )
     around = {"around": {name: loop_json(found) for name, found in outer.items()}} if outer else {}
     print_json(
@@ -146,7 +146,12 @@ def _print_tables(
     unknown = [name for name, found in named.items() if found.margins.stable is None]
     loops = f"not stable: {', '.join(unstable)}" if unstable else "every loop is stable"
     loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
-    print_verdict(all_pass(tuple(verdicts)) and not unstable, f"{where['design']}: {loops}. {made['result']}")
+    good = all_pass(tuple(verdicts)) and not unstable
+    print_verdict(
+        good and not unknown,
+        f"{where['design']}: {loops}. {made['result']}",
+        failed="UNDECIDED" if good else "FAIL",
+    )
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
