@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -72,8 +73,6 @@ def duty(
 
 
 def _known(value: float) -> float | None:
-    from math import isfinite
-
     return value if isfinite(value) else None
 
 
@@ -106,9 +105,10 @@ def _json(found: Duty) -> dict[str, Any]:
 
 def _lines(found: Duty) -> list[str]:
     over, heat = found.overload, found.heating
+    stated = f"{found.continuous_A:.4g} A" if isfinite(found.continuous_A) else "not stated"
     lines = [
         f"  current {found.rms_A:.4g} A rms (in motion {found.moving_rms_A:.4g} A, "
-        f"peak {found.peak_A:.4g} A), continuous {found.continuous_A:.4g} A"
+        f"peak {found.peak_A:.4g} A), continuous {stated}"
     ]
     if found.asked.share < 1.0:
         lines.append(f"  holding still: {found.holding_A:.4g} A")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from reports.cli.drive import SetOption, load_drive
@@ -54,8 +55,6 @@ def _rigid(found: Stiffness) -> bool:
 
 
 def _known(value: float | None) -> float | None:
-    from math import isfinite
-
     return None if value is None or not isfinite(value) else float(value)
 
 
@@ -114,16 +113,15 @@ def _lines(found: Stiffness) -> list[str]:
     lines = [f"{found.design.name}: stiffness at the output, {unit}"]
     for curve in found.curves:
         least, at = curve.least
-        lines.append(
-            f"  {STATES[curve.state]:<28} static {curve.static_Nm_rad:.6g}, least {least:.6g} at {at:.4g} Hz"
-        )
+        static = _shown(curve.static_Nm_rad)
+        lines.append(f"  {STATES[curve.state]:<28} static {static}, least {least:.6g} at {at:.4g} Hz")
     lost = found.lost_motion
     if lost is not None:
         seen = "" if lost.seen_rad is None else f", simulated {lost.seen_rad:.4g} {angle}"
         lines.append(f"  play {lost.play_rad:.4g} {angle}; lost motion {lost.foreseen_rad:.4g} {angle}{seen}")
     load = "N" if found.design.axis == "linear" else "N m"
     lines.extend(
-        f"  at rest, {one.moment_Nm:.4g} {load} at {one.frequency_hz:.4g} Hz: {abs(one.seen_Nm_rad):.6g}"
+        f"  at rest, {one.moment_Nm:.4g} {load} at {one.frequency_hz:.4g} Hz: {_shown(abs(one.seen_Nm_rad))}"
         for one in found.at_rest
     )
     lines.extend(
@@ -132,3 +130,8 @@ def _lines(found: Stiffness) -> list[str]:
         for check in found.checks
     )
     return lines
+
+
+def _shown(stiffness: float) -> str:
+    """Six digits; in words where nothing moves."""
+    return f"{stiffness:.6g}" if isfinite(stiffness) else "infinite"
