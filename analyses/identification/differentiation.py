@@ -36,8 +36,8 @@ def central_difference(values: FloatArray, period_s: float, points: int = 3) -> 
     --------
     >>> t = np.arange(200) * 0.1
     >>> three, seven = (central_difference(np.sin(5.0 * t), 0.1, n)[100] / 5.0 for n in (3, 7))
-    >>> round(three / np.cos(5.0 * t[100]), 3), round(seven / np.cos(5.0 * t[100]), 3)
-    (0.959, 1.0)
+    >>> [round(float(slope / np.cos(5.0 * t[100])), 3) for slope in (three, seven)]
+    [0.959, 1.0]
     """
     simple = np.asarray(np.gradient(values, period_s), dtype=np.float64)
     if points == 3 or len(values) < len(SEVEN_POINTS):
