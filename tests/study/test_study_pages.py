@@ -1,28 +1,13 @@
 """The pages of studies in a real browser: no error, no request, every figure seen, on desktop and phone."""
 
-import shutil
-
 import pytest
 from typer.testing import CliRunner
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 COMMANDS = {
     "montecarlo": ("montecarlo", "--samples", "200", "--no-worst"),
     "compare": ("compare", "ilr33-amber", "--set", "gear.worm.ratio=40", "--set", "friction.law=tanh"),
     "tune": ("tune", "--require", "position.bandwidth>=40 Hz"),
 }
-
-
-@pytest.fixture(scope="module")
-def browser():
-    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if path is None:
-        pytest.skip("no Chromium on this machine")
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with playwright.sync_playwright() as running:
-        started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.mark.parametrize("name", COMMANDS)
