@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_settings import SMALL
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Coupling, Design, Gravity, Load
-from analyses.validation import Settings, validate
+from analyses.validation import validate
 from analyses.validation.bench import on_the_bench
 from analyses.validation.reading import crossing, maximum
 from analyses.validation.riding import on_its_stand, riding_at
@@ -18,17 +19,6 @@ from analyses.validation.tolerance import allowed
 from reports.sections.validation import section
 
 AMBER = load_design("ilr33-amber")
-SMALL = Settings(
-    frequencies=12,
-    point_frequencies=0,
-    multisine=False,
-    amplitude_margins=False,
-    rest_frequencies=4,
-    large_signals=False,
-    friction_effects=False,
-    specification=False,
-    seconds=60.0,
-)
 
 
 def without(*stages: str) -> Design:

@@ -7,24 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_settings import SMALL
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design, Limits
 from analyses.large_signal.border import check_border
-from analyses.validation import Settings, validate
+from analyses.validation import validate
 
 AMBER = load_design("ilr33-amber")
-SMALL = Settings(
-    frequencies=12,
-    point_frequencies=0,
-    multisine=False,
-    amplitude_margins=False,
-    rest_frequencies=4,
-    large_signals=False,
-    friction_effects=False,
-    specification=False,
-    seconds=60.0,
-)
 
 
 def motor(design: Design, **factors: float) -> Design:
