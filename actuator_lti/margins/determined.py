@@ -131,8 +131,8 @@ def _values(f: Findings, closed: bool) -> Complex:
     """Poles in the s-plane, hidden ones and those at zero among them."""
     p = (f.loop.closed if closed else f.loop.D) * f.loop.hidden
     zeros = next(k for k in range(p.degree() + 1) if p[k] != 0)
-    found = [complex(root) for root, times in all_roots(p) for _ in range(times)]
-    return np.array([0j] * zeros + found)
+    result = [complex(root) for root, times in all_roots(p) for _ in range(times)]
+    return np.array([0j] * zeros + result)
 
 
 def _by_movement(base: Findings, others: list[Findings], closed: Complex) -> tuple[int, int, int, str | None]:

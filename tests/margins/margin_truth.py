@@ -249,13 +249,13 @@ def difference(m: StabilityMargins, expected: Truth, period: float, rel: float) 
     end = math.pi * (1 - 1e-12) if m.period_s is not None else math.inf
     ends = [k for x, k in gains if not 0 < x < end]
     gains = [g for g in gains if 0 < g[0] < end]
-    found = {
+    result = {
         "gain crossovers": ([p.frequency_rad_s * period for p in m.phase_margins], expected.gain_crossovers),
         "phase crossovers": ([w for w, _ in gains], expected.phase_crossovers),
         "gain margins": ([k for _, k in gains], expected.gain_margins),
         "gain margins at the ends": (ends, expected.end_margins),
     }
-    for name, (ours, theirs) in found.items():
+    for name, (ours, theirs) in result.items():
         if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=rel, atol=0):
             return f"{name} {ours}, not {theirs}"
     degrees = [p.deg for p in m.phase_margins]

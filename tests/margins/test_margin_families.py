@@ -23,8 +23,8 @@ Family = Callable[[np.random.Generator], Loop]
 
 def problem(loop: Loop, m: StabilityMargins, rng: np.random.Generator) -> str | None:
     answer = truth_of(loop)
-    found = difference(m, answer, float(loop.dt) if loop.dt else 1.0, 1e-6)
-    return found if found is not None and determined(loop, answer, rng) else None
+    result = difference(m, answer, float(loop.dt) if loop.dt else 1.0, 1e-6)
+    return result if result is not None and determined(loop, answer, rng) else None
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
@@ -36,8 +36,8 @@ def test_the_answer_is_the_truth_where_the_data_determine_it(
         rng = np.random.default_rng([k, 1])
         loop = family(rng)
         m = stability_margins(loop)
-        if found := problem(loop, m, rng):
-            wrong.append((k, m.evidence, found))
+        if result := problem(loop, m, rng):
+            wrong.append((k, m.evidence, result))
     assert not wrong
     assert capfd.readouterr() == ("", "")
 
@@ -55,8 +55,8 @@ def test_what_double_precision_has_checked_is_what_exact_arithmetic_certifies(
         if m.evidence != "checked":
             continue
         exact = stability_margins(loop, certify=True)
-        if exact.evidence == "certified" and (found := unlike(m, exact)):
-            wrong.append((k, found))
+        if exact.evidence == "certified" and (result := unlike(m, exact)):
+            wrong.append((k, result))
     assert not wrong
     assert kinds & {"checked", "certified"}
     assert capfd.readouterr() == ("", "")

@@ -526,12 +526,12 @@ def stable_drives(first: int, count: int, kind: str = "") -> Iterator[Design]:
     kind : {"", "wider", "full"}
         Of `random_drive`, or `full_drive`.
     """
-    seed, found = first, 0
-    while found < count:
+    seed, result = first, 0
+    while result < count:
         design = full_drive(seed) if kind == "full" else random_drive(seed, wider=kind == "wider")
         seed += 1
         if is_stable(design):
-            found += 1
+            result += 1
             yield design
 
 
@@ -563,7 +563,7 @@ def main(first: int, count: int, kind: str, everything: bool) -> None:
         started = time.process_time()
         try:
             with isolated() as missing:
-                found = validate(design, Settings() if everything else TRIAL)
+                validation = validate(design, Settings() if everything else TRIAL)
         except InputError as error:
             print(f"{design.name}  refused: {error}", flush=True)
             continue
@@ -571,29 +571,29 @@ def main(first: int, count: int, kind: str, everything: bool) -> None:
             print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
             continue
         took = time.process_time() - started
-        judged = [row for row in found.ledger if row.passed is not None]
+        judged = [row for row in validation.ledger if row.passed is not None]
         stages = "".join(stage[0] for stage in design.controller.stages)
-        verdict = "pass" if found.passed else "FAIL"
+        verdict = "pass" if validation.passed else "FAIL"
         print(
-            f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s",
+            f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(validation.failed)} failed, {took:.1f} s",
             flush=True,
         )
         for item in missing:
             print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
-        for row in found.failed:
+        for row in validation.failed:
             print(
                 f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason} [{row.condition}]"
             )
-        border = None if found.large_signals is None else found.large_signals.border
+        border = None if validation.large_signals is None else validation.large_signals.border
         if border is not None and border.passed is False:
             print(f"    BORDER {border}")
-        if found.conditional is not None and found.conditional.found:
+        if validation.conditional is not None and validation.conditional.diverges:
             print(
-                f"    CONDITIONAL diverges from {found.conditional.next_rad} of {found.conditional.full_deflection_rad}"
+                f"    CONDITIONAL diverges from {validation.conditional.next_rad} of {validation.conditional.full_deflection_rad}"
             )
         if not judged:
-            print(f"    NOTES {found.notes} {[row.reason for row in found.ledger][:6]}")
-        for note in found.notes:
+            print(f"    NOTES {validation.notes} {[row.reason for row in validation.ledger][:6]}")
+        for note in validation.notes:
             if "cut" in note or "refused" in note:
                 print(f"    {note}")
 
