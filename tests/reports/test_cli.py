@@ -51,11 +51,22 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_starting_up_imports_nothing_heavy() -> None:
     code = (
         "import sys, typer.main; from reports.cli.app import build; typer.main.get_command(build());"
-        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pint', 'pydantic', 'pandas'};"
+        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pydantic', 'pandas'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("words", [["margins", "ilr33-amber"], ["stiffness", "ilr33-amber", "--json"]])
+def test_linear_figures_wait_for_no_plotting_library(words: list[str]) -> None:
+    code = (
+        f"import sys; from reports.cli.main import main; main({words!r});"
+        "heavy = {'control', 'matplotlib', 'scipy.signal', 'scipy.stats', 'numba', 'pandas', 'dask'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
