@@ -152,11 +152,14 @@ def record(path: Path) -> None:
 
 def report(path: Path) -> None:
     from reports.document import dumps, load
+    from reports.html import page
     from reports.pdf.printable import printable
 
     made = load(path)
     dumps(made)
     printable(made)
+    own = {"name": "d", "revision": "1"}, dict.fromkeys(("version", "time", "commit", "design_hash"))
+    page({**made, "design": own[0], "provenance": own[1], "live": None})  # as --include puts it into another
 
 
 def history(path: Path) -> None:
@@ -212,8 +215,17 @@ def small_report() -> bytes:
     )
     curve = {"label": "k", "x": [1.0, 2.0, None], "y": [0.0, -3.0, 1.0], "style": "points"}
     drawn = {"series": [curve], "x_label": "x", "y_label": "y", "levels": [{"y": 1.0, "label": "l"}]}
+    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "passed": True}
+    glance = {
+        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "passed": True},
+        "loops": [{
+            "loop": "Position", "anchor": "a", "stable": {"text": "yes", "status": "pass"},
+            "figures": [{"label": "Gain margin", "value": 7.5, "unit": "dB", "format": "fix:2", **near}],
+        }],
+        "findings": [{"severity": "warn", "text": "t", "where": "one"}],
+    }  # fmt: skip
     blocks = [
-        doc.table("T", columns, rows, "n"), doc.text("x\n\ny"), doc.facts([doc.fact("l", 3.5, "m")]),
+        glance, doc.table("T", columns, rows, "n"), doc.text("x\n\ny"), doc.facts([doc.fact("l", 3.5, "m")]),
         doc.verdicts([verdict]), doc.details("more", [doc.text("z"), doc.table("U", columns, [])]),
         doc.figure("curves", drawn, caption="c", alt="a"),
     ]  # fmt: skip

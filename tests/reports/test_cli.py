@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import typer
 
 from actuator_lti.errors import InputError, NumericalError
 from reports.cli import errors
-from reports.cli.app import PANELS
+from reports.cli.app import PANELS, build
 from reports.cli.main import main
 
 
@@ -41,6 +42,16 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     }  # fmt: skip
     assert {name for names in PANELS.values() for name in names} >= wanted
     assert all(f"│ {name} " in words for name in wanted)
+
+
+def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
+    todo, docs = [typer.main.get_command(build())], {}
+    for command in todo:
+        todo.extend(getattr(command, "commands", {}).values())
+        said = [command.help or "", *(getattr(parameter, "help", "") or "" for parameter in command.params)]
+        docs[command.name] = re.findall(r"(?<!\\)\[[a-z_. ]+\]", " ".join(said))
+    assert len(docs) > 20
+    assert not any(docs.values()), docs
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
