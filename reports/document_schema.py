@@ -18,6 +18,7 @@ STATUSES = ("pass", "fail", "warn", "info")
 
 Status = Literal["pass", "fail", "warn", "info"]
 Scalar = None | bool | int | float | str
+Format = Annotated[str, Field(pattern=r"^(text|yesno|int|fix:1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
 
 
 class _Part(BaseModel):
@@ -30,7 +31,14 @@ class Mark(_Part):
     """A cell with a state."""
 
     text: Scalar
-    status: Status | Literal[""] | None = None
+    status: Status | Literal[""] | None
+
+
+class State(_Part):
+    """A word with a state that is known."""
+
+    text: str
+    status: Status
 
 
 Cell = Annotated[
@@ -46,7 +54,14 @@ class Column(_Part):
     label: str
     unit: str
     align: Literal["left", "right", "center"]
-    format: Annotated[str, Field(pattern=r"^(text|yesno|int|(sig|short|fix|ms):1?[0-9])$")]
+    format: Format
+
+
+class Row(_Part):
+    """Cells by the keys of their columns; ``_status`` colours the row."""
+
+    __pydantic_extra__: dict[str, Cell] = Field(init=False)
+    status: Annotated[Status | Literal[""] | None, Field(alias="_status")] = None
 
 
 class TableBlock(_Part):
@@ -55,7 +70,7 @@ class TableBlock(_Part):
     kind: Literal["table"]
     caption: str
     columns: list[Column]
-    rows: list[dict[str, Cell]]
+    rows: list[Row]
     note: str = ""
 
 
@@ -129,7 +144,7 @@ class GlanceFigure(_Part):
     label: str
     value: Scalar
     unit: str
-    format: str
+    format: Format
     limit: float | None
     comparison: str
     distance: float | None
@@ -141,7 +156,7 @@ class GlanceLoop(_Part):
 
     loop: str
     anchor: str
-    stable: Cell
+    stable: State
     figures: list[GlanceFigure]
 
 
@@ -153,12 +168,20 @@ class FindingItem(_Part):
     where: str
 
 
+class Weakest(_Part):
+    """The requirement that is nearest to its limit."""
+
+    label: str
+    words: str
+    passed: bool | None
+
+
 class GlanceBlock(_Part):
     """The first screen."""
 
     kind: Literal["glance"]
     loops: list[GlanceLoop]
-    weakest: dict[str, Scalar] | None
+    weakest: Weakest | None
     findings: list[FindingItem]
     more: int
 
@@ -190,6 +213,15 @@ class Verdict(_Part):
     total: int
 
 
+class Provenance(_Part):
+    """By whom, of what and when it was made; more may stand."""
+
+    version: str | None = None
+    time: str | None = None
+    commit: str | None = None
+    design_hash: str | None = None
+
+
 class Document(_Part):
     """A whole report.json."""
 
@@ -199,7 +231,7 @@ class Document(_Part):
     title: str
     subtitle: str
     design: dict[str, Scalar]
-    provenance: dict[str, Scalar | dict[str, Scalar]]
+    provenance: Provenance
     verdict: Verdict
     sections: list[SectionPart]
 

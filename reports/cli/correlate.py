@@ -89,7 +89,7 @@ def correlate(
     where a loop sets the voltage itself.
 
     A CSV, Parquet or MATLAB file with columns such as time_s, reference_deg,
-    Output angle [deg], motor_speed_rpm, current_A, load_Nm is read as it is,
+    Output angle \\[deg], motor_speed_rpm, current_A, load_Nm is read as it is,
     with commas, semicolons or tabs; so is what simulate writes, and the EMPS
     benchmark's file. Any other layout is told by a
     record file in TOML, a line for each: file = "log.csv", separator = ";",
