@@ -547,8 +547,8 @@ class ControllerObject:
 class ControllerObjects:
     """The controller's own settings that a design was imported from, also those that no key holds.
 
-    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges and
-    steps of its objects.
+    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges
+    and steps of its objects.
     ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
     9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
     index and subindex.

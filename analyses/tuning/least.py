@@ -1,10 +1,11 @@
-"""The least change that meets the requirements: the point of the allowed set nearest to the design as it is.
+"""The least change that meets the requirements: the nearest point of what is allowed to the design as it is.
 
-Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares of feed-forward)
-with every requirement at every corner of the working set met. The allowed set is found first (`solve`); from
-there sequential quadratic programming goes to its nearest point. As margins have kinks (another crossover
-becomes the worst), what it finds is then compared with points drawn from the ball of smaller changes, and each
-value is taken back towards home by itself. What is returned meets every corner, or is the best compromise.
+Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares fed forward)
+with every requirement met at every corner of the working set: sequential quadratic programming from the
+design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
+crossover becomes the worst), what it finds is then compared with points drawn from shells of smaller
+changes, and each value is taken back towards home by itself. What is returned meets every corner, or is the
+best compromise.
 """
 
 from __future__ import annotations
@@ -98,12 +99,11 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     program = Program(problem, limits)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
+    met = {"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]}
+    settings = {"maxiter": 60, "ftol": 1e-10}
+    bounds = [*zip(low, high, strict=True)]
     try:
-        found = minimize(
-        cost, begin, method="SLSQP", bounds=[*zip(low, high, strict=True)],
-        constraints={"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]},
-        options={"maxiter": 60, "ftol": 1e-10},
-    ).x  # fmt: skip
+        found = minimize(cost, begin, method="SLSQP", bounds=bounds, constraints=met, options=settings).x
     except Spent:
         found = program.best if program.seen else begin
     rows = found + WAY[:, None] * (begin - found)

@@ -30,7 +30,7 @@ GAINS = (
 )
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
-MOST_DESIGNS = 40_000  # looked at in one tuning, about 40 s of one processor for a drive with two masses
+MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor for a drive with two masses
 
 
 @dataclass

@@ -104,8 +104,8 @@ def maximise(
     start : ndarray
         Gains to start from, SI.
     limits : callable
-        ``(candidates, coordinates) -> (candidates, functions)``. Without ``free`` their smallest is maximised,
-        up to the reserve of 30 %; with it they are constraints.
+        ``(candidates, coordinates) -> (candidates, functions)``. Without ``free`` their smallest is made as
+        large as can be, up to the reserve of 30 %; with it they are constraints.
     free : callable, optional
         Functions whose smallest is maximised instead.
     """
@@ -119,13 +119,15 @@ def maximise(
         return problem.values(x0)
     values, _, aims = program.model(x0)
     first = float(values[:aims].min())
+    met = {"type": "ineq", "fun": program.constraint, "jac": program.constraint_slope}
+    bounds = [*zip(low, high, strict=True), (None, most)]
+    settings = {"maxiter": iterations, "ftol": 1e-9}
+    begin = np.append(x0, first if most is None else min(first, most))
     try:
         found = minimize(
-        program.cost, np.append(x0, first if most is None else min(first, most)), jac=program.cost_slope,
-        method="SLSQP", bounds=[*zip(low, high, strict=True), (None, most)],
-        constraints={"type": "ineq", "fun": program.constraint, "jac": program.constraint_slope},
-        options={"maxiter": iterations, "ftol": 1e-9},
-    ).x[:-1]  # fmt: skip
+            program.cost, begin, jac=program.cost_slope, method="SLSQP", bounds=bounds,
+            constraints=met, options=settings,
+        ).x[:-1]  # fmt: skip
     except Spent:
         found = program.best
     return problem.values(np.clip(found, low, high))

@@ -63,8 +63,8 @@ def tune(
     With the aim ``least-change`` those nearest to the design as it is (`analyses.tuning.least`); with
     ``reserve`` those that stay as far as possible from every limit, relative to the limit. Both search the
     exact sampled loops. Where gains alone do not do, the elements of ``place`` are tried, one, then two, then
-    all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances say
-    by how much it misses. What is returned is judged once more by certified margins.
+    all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
+    say by how much it misses. What is returned is judged once more by certified margins.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def tune(
         solution = _solved(problem, settings.aim, give_up=k + 1 < len(choices))
         searched += problem.evaluations
         if best is None or solution.slack > best.solution.slack:
-            best = Found(placed, problem, solution)
+            best = Found(placed, problem, solution, problem.evaluations)
         tell(k + 1, stages)
         if solution.slack >= 0.0:
             break
@@ -110,6 +110,7 @@ def tune(
     tell(len(choices) + 2, stages)
     checks = nonlinear_checks(tuned, problem, gains, found) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
+    searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
         bool(found.min() >= 0.0) and all(v.passed is True for v in confirmed),
@@ -121,7 +122,7 @@ def tune(
         len(problem.all_corners),
         checks,
         curve,
-        searched + problem.evaluations,
+        searched,
         (*_notes(problem, gains, found), *_said(confirmed)),
         settings.aim,
         placed.elements,
@@ -141,6 +142,7 @@ class Found:
     placed: Placed
     problem: Problem
     solution: Solution
+    evaluations: int
 
 
 def _solved(problem: Problem, aim: Aim, *, give_up: bool) -> Solution:
