@@ -30,6 +30,13 @@ REQUIREMENT_COLUMNS = [
     doc.column("binds", "Binds", format="yesno"),
     doc.column("corner", "At"),
 ]
+CONFIRMED_COLUMNS = [
+    doc.column("label", "Requirement"),
+    doc.column("value", "Certified", format="sig:4"),
+    doc.column("limit", "Limit", format="sig:4"),
+    doc.column("unit", "Unit"),
+    doc.column("met", "Met", format="yesno"),
+]
 CHECK_COLUMNS = [
     doc.column("corner", "Design"),
     doc.column("amplitude", "Step", "deg", format="sig:3"),
@@ -44,6 +51,8 @@ CHECK_COLUMNS = [
 def section(result: TuningResult) -> dict[str, Any]:
     """Make the section."""
     blocks = [doc.verdicts(_verdict(r) for r in result.requirements), gains(result), requirements(result)]
+    if result.confirmed:
+        blocks.append(confirmed(result))
     if result.trade_off:
         blocks.append(_curve(result))
     if result.checks:
@@ -57,16 +66,35 @@ def section(result: TuningResult) -> dict[str, Any]:
 
 
 def summary(result: TuningResult) -> str:
-    """What came out, in two sentences."""
+    """What came out, in two or three sentences."""
     over = f"the nominal design and {result.corners - 1} corners of the tolerance box"
-    binding = [r for r in result.requirements if r.binds]
+    if result.corners == 1:
+        over = "the nominal design (no value has a tolerance)"
     if not result.feasible:
-        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in result.requirements if r.relative < 0.0)
+        missed = [r for r in result.requirements if r.relative < 0.0]
+        if not missed:
+            return f"The search meets every requirement over {over}; certified margins do not confirm it."
+        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in missed)
         return f"No gains meet every requirement over {over}. The best compromise misses {worst}."
-    if not binding:
-        return f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
+    words = [f"Every requirement is met over {over}."]
+    if result.placed:
+        words.append(f"Gains alone do not do; added: {', '.join(result.placed)}.")
+    binding = [r for r in result.requirements if r.binds]
     names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
-    return f"Every requirement is met over {over}. Nothing better is possible because of {names}."
+    if result.aim == "least-change":
+        if not changed(result):
+            return f"{words[0]} Nothing needs to change."
+        words.append(f"This is the least change that does; binding: {names}." if binding else "")
+    elif binding:
+        words.append(f"Nothing better is possible because of {names}.")
+    else:
+        words[0] = f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
+    return " ".join(word for word in words if word)
+
+
+def changed(result: TuningResult) -> bool:
+    """Whether any value differs from what the design had."""
+    return any(g.before is None or g.rounded != g.before for g in result.gains)
 
 
 def _amount(r: BindingRequirement) -> str:
@@ -92,7 +120,9 @@ def gains(result: TuningResult) -> dict[str, Any]:
         }
         for g in result.gains
     ]  # fmt: skip
-    note = "Tuned: rounded to the steps of the motion controller's objects, where the design has them."
+    note = (
+        "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
+    )
     return doc.table("Gains", GAIN_COLUMNS, rows, note)
 
 
@@ -107,6 +137,19 @@ def requirements(result: TuningResult) -> dict[str, Any]:
         for r in result.requirements
     ]  # fmt: skip
     return doc.table("Requirements at their worst corner", REQUIREMENT_COLUMNS, rows)
+
+
+def confirmed(result: TuningResult) -> dict[str, Any]:
+    """The requirements by certified margins."""
+    rows = [
+        {
+            "label": v.id, "value": v.value, "unit": "" if v.requirement.unit == "1" else v.requirement.unit,
+            "limit": v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum,
+            "met": v.passed is True, "_status": "pass" if v.passed is True else "fail",
+        }
+        for v in result.confirmed
+    ]  # fmt: skip
+    return doc.table("Confirmed by certified margins", CONFIRMED_COLUMNS, rows)
 
 
 def _corner(r: BindingRequirement) -> str:
