@@ -14,8 +14,8 @@ from analyses.identification.electrical import ElectricalFit, electrical_estimat
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
 from analyses.identification.joint_model import JointModel
-from analyses.identification.own_bias import without_bias
 from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
 from analyses.identification.resimulation import Resimulated, resimulate
 from analyses.identification.rows import recipe_for

@@ -24,6 +24,7 @@ from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import Estimate, design_with_estimate
 from analyses.identification.two_mass import (
+    FLOORS,
     TwoMass,
     angle_responses,
     fit_two_mass,
@@ -39,6 +40,8 @@ from analyses.records.record import Record
 FloatArray = NDArray[np.float64]
 
 MISFIT_LIMIT = 3.0
+MISFIT_DOUBTED = 1.5
+"""Above this other starts are tried: a valley may be the wrong one."""
 GUARD = 1.5
 COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
 KEYS = {
@@ -49,7 +52,6 @@ KEYS = {
     "viscous": "friction.viscous",
     "load_viscous": "load.friction.viscous",
 }
-NOT_NEGATIVE = ("damping", "viscous", "load_viscous")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,23 +177,29 @@ def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]
 
 
 def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float]) -> TwoMass:
-    """The fit; a damping or friction that comes out no larger than its error twice is held at zero."""
+    """The fit; a damping or friction that comes out negative is held at zero, the errors stay those without.
+
+    One that is merely small against its error stays: held at zero, its part would go into the others, beyond
+    their errors.
+    """
     start = {**start_of(lines, reduction, torque=names[0]), **held}
     load = "load_angle" if "load_angle" in names else None
     fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
-    if fit.misfit > MISFIT_LIMIT:
+    if fit.misfit > MISFIT_DOUBTED:
         for other in other_starts(start, lines, reduction):
             with suppress(NumericalError, np.linalg.LinAlgError):
                 again = {**other, **held}
                 result = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
                 start, fit = (again, result) if result.misfit < fit.misfit else (start, fit)
-            if fit.misfit <= MISFIT_LIMIT:
+            if fit.misfit <= MISFIT_DOUBTED:
                 break
-    weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
-    if not weak:
+    below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
+    if not below:
         return fit
-    zero = dict.fromkeys(weak, 0.0)
-    return fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
+    zero = dict.fromkeys(below, 0.0)
+    held_at_zero = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
+    rows = [fit.names.index(name) for name in held_at_zero.names]
+    return replace(held_at_zero, covariance=fit.covariance[np.ix_(rows, rows)])
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:

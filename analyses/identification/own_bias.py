@@ -66,7 +66,9 @@ def without_bias(
     size = _sizes(model)
     wild = [n for n, b, s in zip(model.names, bias, size, strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
-        return replace(model, bias_told=f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}")
+        return replace(
+            model, bias_told=f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
+        )
     return replace(
         model,
         values=values,

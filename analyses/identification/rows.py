@@ -254,7 +254,7 @@ def _end_skip(motion: Motion, recipe: Recipe) -> int:
 
 
 def _reaction(design: Design, sides: TwoSides) -> FloatArray:
-    """Torque of the load side at the motor, but for what its inertia takes at the motor's own acceleration."""
+    """Torque of the load side at the motor, less its inertia's at the motor's own acceleration."""
     ratio = design.ratio_to_coupling
     inertia = design.load_side_inertia_kgm2 / ratio
     return np.asarray(sides.torque / ratio - inertia * sides.motor.acceleration / ratio)

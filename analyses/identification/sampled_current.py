@@ -49,16 +49,17 @@ class HeldVoltage:
 
     @property
     def lead_s(self) -> float:
-        """By how much the samples lead the current, at low frequency: ``d + T/2 + L/R`` less the samples' own lag
-        ``T + T exp(-a (T - d))/(1 - exp(-a T))``."""
+        """By how much the samples lead the current, at low frequency.
+
+        The current lags by ``d + T/2 + L/R``, the samples by ``T + T exp(-a (T - d))/(1 - exp(-a T))``.
+        """
         a, T = self.rate_1_s, self.period_s
         d = self.delay_s % T
         return d - 0.5 * T + 1.0 / a + T * np.exp(-a * (T - d)) / np.expm1(-a * T)
 
 
 def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
-    """The winding and its voltage's steps; None where samples are not taken with the ticks, or nothing is to be
-    mended.
+    """The winding and its voltage's steps; None where samples are not taken with the ticks.
 
     A recorder of its own meets the steps at any phase, so that its samples are right in the mean.
     """
@@ -79,12 +80,10 @@ def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
     )
 
 
-def mean_current(
-    design: Design, record: Record, current: FloatArray, acceleration: FloatArray
-) -> FloatArray:
+def mean_current(design: Design, record: Record, current: FloatArray, acceleration: FloatArray) -> FloatArray:
     """The current between the ticks: the samples less their lead times the rate of what the voltage drives.
 
-    That rate is ``di/dt + (kE/R) dw/dt``. A correction that is not small belongs to another current than this one.
+    That rate is ``di/dt + (kE/R) dw/dt``. A correction that is not small belongs to another current than this.
     """
     held = held_voltage(design, record)
     if held is None:
