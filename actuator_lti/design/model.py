@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, log, pi, prod, sin, sqrt
+from math import inf, pi, prod, sin, sqrt
 from typing import Any, Literal
+
+import numpy as np
 
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
@@ -392,7 +394,7 @@ class Limits:
         return (
             self.peak_time_s * (r2 - 1)
             if self.overload == "excess"
-            else self.peak_time_s / log(r2 / (r2 - 1))
+            else self.peak_time_s / np.log(r2 / (r2 - 1))
         )
 
 

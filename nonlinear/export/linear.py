@@ -273,7 +273,7 @@ def put_phase(q, s, ticks):
 
 @emitted
 def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
-    """A, b, c of the loop as it is run, over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
+    """A, b, c of the loop as run over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
     for j in range(n + 1):
         if j < n:
             put_unit(q, s, places, j, angles)

@@ -99,7 +99,7 @@ def around_once(blocks: list[Block], z: complex) -> complex:
 
 
 def wanted_response(design: Design, name: str, loop: Loop) -> np.ndarray:
-    """L at the angles; of a periodic loop without the hundred states of its fundamental, which lose digits."""
+    """L at the angles; of a periodic loop without the many states of its fundamental, which lose digits."""
     z = np.exp(1j * ANGLES)
     if not loop.periodic:
         return np.asarray(loop.open_loop(z))
@@ -189,7 +189,8 @@ def agree_with_the_linear_form(designs: list[Design], folder: Path) -> tuple[int
 def test_random_drives(tmp_path: Path) -> None:
     """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
     made = (random_drive(np.random.default_rng(seed)) for seed in range(40))
-    loops, limiters = agree_with_the_linear_form([replace(d, instruments=Instruments()) for d in made], tmp_path)
+    designs = [replace(design, instruments=Instruments()) for design in made]
+    loops, limiters = agree_with_the_linear_form(designs, tmp_path)
     assert loops > 70
     assert limiters > 40
 
