@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -102,7 +103,7 @@ def _simulated(design: Design, record: Record) -> Record:
 
 def _sizes(model: JointModel) -> np.ndarray:
     """What a bias is held against: the value or, where it may be zero, that of its kind or its error."""
-    gravity = float(np.hypot(*(model[n] for n in ("gravity_sin", "gravity_cos")))) if _gravity(model) else 0.0
+    gravity = math.hypot(model["gravity_sin"], model["gravity_cos"]) if _gravity(model) else 0.0
     dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if _has(model, n)), 0.0)
     errors = np.sqrt(np.diag(model.covariance)) / LARGEST_BIAS
     like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]

@@ -13,6 +13,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
+    from reports.document_schema import Section
 
 KEYS = (
     "unit",
@@ -138,7 +139,7 @@ def correlate(
     leave_with(verdict is not False)
 
 
-def _show(sections: list[dict[str, Any]], verdict: bool | None) -> None:
+def _show(sections: list[Section], verdict: bool | None) -> None:
     from reports.terminal import print_section
 
     for k, made in enumerate(sections):

@@ -80,6 +80,7 @@ def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> Non
     from actuator_lti.design import write_design
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
+    from reports.document import with_columns
     from reports.sections import tuning
     from reports.study_pages import study_document, write_pages
     from reports.terminal import print_blocks, print_verdict
@@ -97,6 +98,7 @@ def _written(result: TuningResult, out: Path, as_json: bool, quiet: bool) -> Non
     print_verdict(result.feasible, f"{result.before.name}: {part['result']}")
     keys = ("path", "unit", "before", "rounded", "object", "steps", "object_unit")
     table = tuning.gains(result)
-    short = {**table, "columns": [c for c in table["columns"] if c["key"] in keys]}
-    print_blocks([short, tuning.requirements(result), tuning.checks(result)], list(result.notes))
+    print_blocks(
+        [with_columns(table, keys), tuning.requirements(result), tuning.checks(result)], list(result.notes)
+    )
     print_line(f"{page}\n{data}\n{file}")

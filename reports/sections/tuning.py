@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Block, Section, VerdictItem
 
 if TYPE_CHECKING:
     from analyses.tuning import BindingRequirement, TuningResult
+    from reports.figures import trade_off as trade_off_figure
 
 GAIN_COLUMNS = [
     doc.column("path", "Gain"),
@@ -48,9 +50,10 @@ CHECK_COLUMNS = [
 ]
 
 
-def section(result: TuningResult) -> dict[str, Any]:
+def section(result: TuningResult) -> Section:
     """Make the section."""
-    blocks = [doc.verdicts(_verdict(r) for r in result.requirements), gains(result), requirements(result)]
+    verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
+    blocks: list[Block] = [verdicts, gains(result), requirements(result)]
     if result.confirmed:
         blocks.append(confirmed(result))
     if result.trade_off:
@@ -103,7 +106,7 @@ def _amount(r: BindingRequirement) -> str:
     return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
 
 
-def _verdict(r: BindingRequirement) -> dict[str, Any]:
+def _verdict(r: BindingRequirement) -> VerdictItem:
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
         distance=r.distance, passed=r.relative >= 0.0,
@@ -111,7 +114,7 @@ def _verdict(r: BindingRequirement) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def gains(result: TuningResult) -> dict[str, Any]:
+def gains(result: TuningResult) -> Block:
     """Gains in SI and in the motion controller's objects."""
     rows = [
         {
@@ -126,7 +129,7 @@ def gains(result: TuningResult) -> dict[str, Any]:
     return doc.table("Gains", GAIN_COLUMNS, rows, note)
 
 
-def requirements(result: TuningResult) -> dict[str, Any]:
+def requirements(result: TuningResult) -> Block:
     """Every requirement at its worst corner."""
     rows = [
         {
@@ -139,7 +142,7 @@ def requirements(result: TuningResult) -> dict[str, Any]:
     return doc.table("Requirements at their worst corner", REQUIREMENT_COLUMNS, rows)
 
 
-def confirmed(result: TuningResult) -> dict[str, Any]:
+def confirmed(result: TuningResult) -> Block:
     """The requirements by certified margins."""
     rows = [
         {
@@ -156,12 +159,12 @@ def _corner(r: BindingRequirement) -> str:
     return "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
 
 
-def _curve(result: TuningResult) -> dict[str, Any]:
+def _curve(result: TuningResult) -> Block:
     limits = {(r.id, r.unit): r.limit for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
     margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
-    data = {
+    data: trade_off_figure.Data = {
         "title": "What the position loop can trade",
         "points": [
             {"bandwidth_hz": p.bandwidth_hz, "phase_margin_deg": p.phase_margin_deg, "feasible": p.feasible}
@@ -178,10 +181,12 @@ def _curve(result: TuningResult) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def checks(result: TuningResult) -> dict[str, Any]:
+def checks(result: TuningResult) -> Block:
     """The nonlinear check."""
     linear = result.design.axis == "linear"
-    columns = [{**c, "unit": "mm"} if linear and c["key"] == "amplitude" else c for c in CHECK_COLUMNS]
+    columns = [c.copy() for c in CHECK_COLUMNS]
+    for c in columns:
+        c["unit"] = "mm" if linear and c["key"] == "amplitude" else c["unit"]
     rows = [
         {
             "corner": c.corner, "amplitude": c.amplitude_rad * (1e3 if linear else math.degrees(1.0)),
