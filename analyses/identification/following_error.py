@@ -21,9 +21,9 @@ def following_item(design: Design, record: Record, simulated: Record) -> Item | 
     """Whether the recorded following error is that of the design's loops at this motion.
 
     Inertia, friction and gravity of a record whose clock runs wrong agree with each other, as its torque is
-    right and its motion only stretched. But a position loop over a velocity loop with an integral lags by
-    ``v/Kv``, whatever torque that takes: a clock off by a factor shows as the same factor between the
-    recorded following error and the simulated one.
+    right and its motion only stretched. But a position loop over a velocity loop lags by ``(v + i/Kp)/Kv``
+    (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
+    factor shows as about the same factor between the recorded following error and the simulated one.
 
     Returns
     -------
@@ -31,7 +31,7 @@ def following_item(design: Design, record: Record, simulated: Record) -> Item | 
         None where the drive has no such loops, or the two are too unlike to be compared.
     """
     control = design.controller
-    if control.position is None or control.velocity is None or not control.velocity.integral_time_s:
+    if control.position is None or control.velocity is None:
         return None
     errors = _errors(design, record, simulated)
     if errors is None:
