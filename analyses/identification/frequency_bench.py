@@ -205,18 +205,31 @@ def _fitted(
     if fit.misfit > MISFIT_DOUBTED:
         for other in other_starts(start, lines, reduction):
             with suppress(NumericalError, np.linalg.LinAlgError):
-                again = {**other, **held}
-                result = go(again, fixed=held)
-                start, fit = (again, result) if result.misfit < fit.misfit else (start, fit)
+                result = go({**other, **held}, fixed=held)
+                fit = result if result.misfit < fit.misfit else fit
             if fit.misfit <= MISFIT_DOUBTED:
                 break
     below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
-    zero = dict.fromkeys(below, 0.0)
-    held_at_zero = go(start, fixed={**held, **zero})
-    rows = [fit.names.index(name) for name in held_at_zero.names]
-    return replace(held_at_zero, covariance=fit.covariance[np.ix_(rows, rows)])
+    return _held_at_zero(fit, below)
+
+
+def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
+    """The fit where some parameters are zero: the others move as their covariance with these has it."""
+    gone = [fit.names.index(name) for name in below]
+    rest = [k for k in range(len(fit.names)) if k not in gone]
+    gain = np.linalg.solve(fit.covariance[np.ix_(gone, gone)], fit.covariance[np.ix_(gone, rest)])
+    values = fit.values[rest] - fit.values[gone] @ gain
+    again = replace(
+        fit,
+        names=tuple(fit.names[k] for k in rest),
+        values=values,
+        covariance=fit.covariance[np.ix_(rest, rest)],
+        fixed={**fit.fixed, **dict.fromkeys(below, 0.0)},
+    )
+    more = [name for name in FLOORS if name in again.names and again[name] < 0.0]
+    return _held_at_zero(again, more) if more else again
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:

@@ -36,8 +36,8 @@ HERTZ = np.arange(2.0, 400.0, 2.0)
 def _design() -> Design:
     """One gear 10:1 without inertia of its own, the rest to be found.
 
-    No friction grows with the load. Its tick is no part of the log's period, as of a recorder of its own: the records below are of a torque
-    without steps between the samples.
+    No friction grows with the load. Its tick is no part of the log's period, as of a recorder of its own:
+    the records below are of a torque without steps between the samples.
     """
     base = load_design("ilr33-amber")
     gear = replace(base.gears[0], name="gear", ratio=N, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
