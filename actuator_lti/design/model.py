@@ -384,16 +384,18 @@ class Limits:
     overload: Overload = "thermal"
 
     @property
-    def overload_time_s(self) -> float | None:
-        """tau of the overload state; None without overload protection."""
+    def overload_time_s(self) -> Any:
+        """tau of the overload state, of one design or stacked ones; None without overload protection."""
         if self.peak_time_s is None:
             return None
         r2 = (self.peak_current_A / self.continuous_current_A) ** 2
-        return (
-            self.peak_time_s * (r2 - 1)
-            if self.overload == "excess"
-            else self.peak_time_s / log(r2 / (r2 - 1))
-        )
+        if self.overload == "excess":
+            return self.peak_time_s * (r2 - 1)
+        if isinstance(r2, float | int):
+            return self.peak_time_s / log(r2 / (r2 - 1))
+        import numpy as np
+
+        return self.peak_time_s / np.log(r2 / (r2 - 1))
 
 
 @dataclass(frozen=True, kw_only=True)
