@@ -54,6 +54,8 @@ farad = ampere * second / volt = F
 kelvin = [temperature] = K
 celsius = [celsius] = degC
 degree = 0.017453292519943295 * radian = deg
+arcminute = 0.0002908882086657216 * radian = arcmin
+arcsecond = 4.84813681109536e-06 * radian = arcsec
 turn = 6.283185307179586 * radian = rev = _ = revolution
 rpm = 0.10471975511965977 * radian / second
 hertz = 6.283185307179586 * radian / second = Hz
