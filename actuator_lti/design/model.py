@@ -386,8 +386,8 @@ class Limits:
     overload: Overload = "thermal"
 
     @property
-    def overload_time_s(self) -> float | None:
-        """tau of the overload state; None without overload protection."""
+    def overload_time_s(self) -> Any:
+        """tau of the overload state, of one design or stacked ones; None without overload protection."""
         if self.peak_time_s is None:
             return None
         r2 = (self.peak_current_A / self.continuous_current_A) ** 2

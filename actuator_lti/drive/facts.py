@@ -58,10 +58,20 @@ def stall_torque_Nm(design: Design) -> Any:
         return motor.source_gain_Nm_V * limits.voltage_V
     assert motor.torque_constant_Nm_A is not None
     assert motor.resistance_ohm is not None
-    current = limits.voltage_V / motor.resistance_ohm
+    current = limits.voltage_V / circuit_resistance_ohm(design)
     if design.controller.current is not None:
         current = np.minimum(current, limits.peak_current_A)
     return motor.torque_constant_Nm_A * current
+
+
+def circuit_resistance_ohm(design: Design) -> Any:
+    """Resistance between the source and the back-EMF while the voltage is at its limit: R + R_s.
+
+    There u = U = U_s - R_s i, so ``U_s = (R + R_s) i + kE w``. It holds for motoring and R_s <= R; a supply
+    of more resistance than the winding gives its most current at less than its whole voltage.
+    """
+    resistance = design.effective_motor.resistance_ohm
+    return resistance if design.supply is None else resistance + design.supply.resistance_ohm
 
 
 def torque_gain_Nm_rad(design: Design) -> Any:
@@ -153,7 +163,7 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     kinds.append(FORCE)
     bounds.append(_first_root(against - stall, slopes, 0.0))
     if motor.source_gain_Nm_V is None:
-        R, kM, kE = motor.resistance_ohm, motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+        R, kM, kE = circuit_resistance_ohm(design), motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
         assert R is not None
         assert kM is not None
         assert kE is not None
