@@ -19,7 +19,7 @@ from nonlinear import Rows
 from nonlinear.probe import fractional_delay
 
 if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
+    from actuator_lti.loops import ExactMargins, Loops
     from actuator_lti.margins import StabilityMargins
 
 Floats = npt.NDArray[np.float64]
@@ -185,17 +185,22 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     return found
 
 
-def point_questions(setups: Mapping[str, Rig], loops: Loops, settle_ticks: int) -> list[Question]:
+def point_questions(
+    setups: Mapping[str, Rig],
+    loops: Loops,
+    settle_ticks: int,
+    margins: Mapping[str, ExactMargins] | None = None,
+) -> list[Question]:
     """Gain up and down at each break point with all other loops closed, and the computing delay at ``u``.
 
     Predicted by the eigenvalues of the whole loop over a position period (`exact_margins`), so also where it
-    is periodically time-varying.
+    is periodically time-varying; ``margins`` holds those already known.
     """
     from actuator_lti.loops import exact_margins
 
     found = []
     for point, setup in setups.items():
-        exact, loop = exact_margins(loops, point), loops.break_points[point]
+        exact, loop = (margins or {}).get(point) or exact_margins(loops, point), loops.break_points[point]
         if not exact.stable:
             continue
         radius = exact.spectral_radius

@@ -137,5 +137,9 @@ class Validation:
         words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
         if self.conditional is not None and self.conditional.found:
-            words += "; a command within full deflection makes the drive diverge"
+            ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
+            does = ending.get(self.conditional.ending, "diverge")
+            words += f"; a command within full deflection makes the drive {does}"
+            if self.conditional.limiter:
+                words += f" ({self.conditional.limiter} limit)"
         return words

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from math import inf, pi
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -50,13 +51,14 @@ from analyses.validation.tones import tone_sweep
 from nonlinear import Rows
 
 if TYPE_CHECKING:
-    from actuator_lti.loops import Loop, Loops
+    from actuator_lti.loops import ExactMargins, Loop, Loops
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 T = TypeVar("T")
 U = TypeVar("U")
 HIGHEST = 0.49  # of the sampling frequency
+LOADED = ("actuator_lti.loops.limiter_responses", "scipy.interpolate", "scipy.ndimage", "scipy.optimize")
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 EVER_TICKS = 10**9  # no run is so long: this tells how slow a loop is
@@ -140,7 +142,9 @@ class _Work:
             self.notes.append("small signals are measured with ideal instruments: without counts and noise")
 
     def _warm_up(self) -> None:
-        """Have the simulator compiled before the clock starts."""
+        """Have the simulator compiled, and libraries loaded, before the clock starts."""
+        for name in LOADED:
+            import_module(name)
         rows = Rows.of(self.design)
         rows["ticks"] = 2 * max(every(self.design, stage) for stage in (*stages_of(self.design), "current"))
         rows.run()
@@ -284,10 +288,15 @@ class _Work:
         ever = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, EVER_TICKS)
         measured = measure_figures(setup, sweep, settle, whole, ever / SETTLE_TIME_CONSTANTS)
         fine = measured.sweep
+        if measured.cut:
+            self.budget.cut.append(
+                f"{name} loop: {measured.cut}: its share of {self.budget.seconds:g} s is used up"
+            )
         tones = errors = None
-        if self.settings.multisine:
-            tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
-            errors = sweep_errors(tones, loop)
+        if self.settings.multisine and not measured.cut:
+            with suppress(OutOfTime):  # it only confirms the sweep
+                tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
+                errors = sweep_errors(tones, loop)
         return LoopValidation(
             name=name,
             figures=figures,
@@ -346,8 +355,17 @@ class _Work:
             )
         if self.settle and len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
-            questions += point_questions(setups, self.loops, max(self.settle.values()))
+            questions += point_questions(setups, self.loops, max(self.settle.values()), self._exact)
         return confirm_margins(questions)
+
+    @cached_property
+    def _exact(self) -> dict[str, ExactMargins]:
+        """Borders of the whole loop at every break point where something drives the motor."""
+        from actuator_lti.loops import exact_margins
+
+        return {
+            point: exact_margins(self.loops, point) for point in points_of(self.design) if point != "output"
+        }
 
     def _inner_points(self) -> list[str]:
         """Break points whose loop differs from that of a stage: all but the outermost, and the output."""
@@ -444,7 +462,13 @@ class _Work:
         return sweep, steps_from_rest(design, settle)
 
     def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self.loops, self.settle["position"])
+        slow = settling_ticks_of(
+            self.loops.present["position"].closed_loop,
+            rig(self.linear, "position").hold_ticks,
+            self.design.name,
+            LONGEST_STEP_TICKS,
+        )
+        return conditional_stability(self.design, self.loops, slow, self._exact)
 
     def _others(self, stable: bool) -> tuple[Any, Any, Any]:
         """Large signals, friction effects, specification."""

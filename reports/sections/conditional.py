@@ -36,16 +36,16 @@ def _words(found: Conditional, scale: float, unit: str) -> list[str]:
     full = f"{found.full_deflection_rad * scale:.4g} {unit}"
     if not found.found:
         return [f"Every step from rest up to full deflection ({full}) settles."]
-    threshold = (found.threshold_rad or 0.0) * scale
-    words = f"Steps beyond {threshold:.4g} {unit} do not settle (full deflection {full})"
-    words += ", although every loop is stable by its linear margins." if found.hidden else "."
+    threshold = found.threshold_rad or 0.0
+    beyond = f"beyond {threshold * scale:.4g} {unit}" if threshold else "of any size"
+    words = f"Steps {beyond} do not settle (full deflection {full})"
+    words += ", although every loop is stable by its linear margins" if found.hidden else ""
+    words += f": {_ending(found, scale, unit)}." if found.ending else "."
     made = [words]
     if found.oscillation_hz is not None and found.oscillation_rad is not None:
         size = f"{found.oscillation_rad * scale:.3g} {unit}"
         made.append(
-            f"At the threshold the output approaches a limit cycle of {size} at {found.oscillation_hz:.3g} "
-            "Hz; the "
-            f"{found.limiter} limit acts."
+            f"At the threshold the output nears a limit cycle of {size} at {found.oscillation_hz:.3g} Hz."
         )
         free = [one for one in found.predictions if not one.antiwindup]
         if free:
@@ -55,6 +55,19 @@ def _words(found: Conditional, scale: float, unit: str) -> list[str]:
                 f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
             )
     return made
+
+
+def _ending(found: Conditional, scale: float, unit: str) -> str:
+    """Say what the smallest step that does not settle ends in, and which limit acts."""
+    sizes = {
+        "diverges": "the output diverges",
+        "keeps oscillating": f"the output keeps oscillating with {(found.end_rad or 0.0) * scale:.3g} {unit}",
+        "is held by a limit": "the drive stops short of the command",
+    }
+    words = sizes[found.ending]
+    if found.limiter:
+        words += f"; the {found.limiter} limit acts {found.limiter_share:.0%} of the time"
+    return words
 
 
 def _facts(found: Conditional, scale: float, unit: str) -> dict[str, Any]:
