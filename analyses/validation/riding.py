@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import cosh, inf, isfinite
 
 import numpy as np
+import numpy.typing as npt
 
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, segments
@@ -18,6 +19,7 @@ from actuator_lti.errors import InputError
 from nonlinear import Rows
 from nonlinear.filters import section
 
+Value = float | npt.NDArray[np.float64]
 SHARE = 0.4  # of each limit that riding may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
@@ -222,12 +224,12 @@ def _commands_fit(design: Design, found: Ride) -> bool:
 class Steady:
     """A controller in its steady state: its command, its integrator, and its output before filters."""
 
-    command: float
-    integrator: float
-    output: float
+    command: Value
+    integrator: Value
+    output: Value
 
 
-def current_state(ride: Ride, gain: float, integral: bool, back_emf: float, resistance: float) -> Steady:
+def current_state(ride: Ride, gain: Value, integral: bool, back_emf: Value, resistance: Value) -> Steady:
     """The current controller of a ride; the last two are shares of feed-forward in V s/rad and ohm."""
     i, left = ride.current_A, ride.voltage_V - back_emf * ride.speed_rad_s
     if integral:
@@ -235,7 +237,7 @@ def current_state(ride: Ride, gain: float, integral: bool, back_emf: float, resi
     return Steady((left + gain * i) / (gain + resistance), 0.0, ride.voltage_V)
 
 
-def velocity_state(design: Design, ride: Ride, wanted: float, gain: float, integral: bool) -> Steady:
+def velocity_state(design: Design, ride: Ride, wanted: Value, gain: Value, integral: bool) -> Steady:
     """The velocity controller of a ride whose output behind the filters is ``wanted``."""
     before = wanted / steady_gain(design, "torque")
     seen = ride.speed_rad_s * steady_gain(design, "speed")
