@@ -30,6 +30,7 @@ from analyses.validation.confirm import (
     point_questions,
     stage_questions,
 )
+from analyses.validation.counts import Counts, counts_of
 from analyses.validation.figures import NotMeasured, hertz, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
 from analyses.validation.ledger import (
@@ -131,7 +132,7 @@ class _Work:
     held: Loop | None = None
     answer_loops: Any = None
     done: int = 0
-    STEPS = 11
+    STEPS = 12
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
@@ -187,6 +188,8 @@ class _Work:
                 if wanted
                 else ()
             )
+        with self.timed("counts of the encoders"):
+            counts = self._within(0.2, "counts of the encoders", self._counts, ()) if whole else ()
         large, friction, specification = self._others(whole)
         for name, loop in loops.items():
             own = tuple(item for item in confirmed if item.loop == name)
@@ -199,6 +202,7 @@ class _Work:
                 *([] if steady is None else [steady]),
             ),
             command=answer,
+            counts=counts,
             loops=loops,
             points=points,
             amplitude_margins=released,
@@ -469,6 +473,9 @@ class _Work:
             LONGEST_STEP_TICKS,
         )
         return conditional_stability(self.design, self.loops, slow, self._exact)
+
+    def _counts(self) -> tuple[Counts, ...]:
+        return counts_of(self.design, self.loops, self.settle["position"])
 
     def _others(self, stable: bool) -> tuple[Any, Any, Any]:
         """Large signals, friction effects, specification."""

@@ -31,6 +31,11 @@ def section(found: Conditional, axis: str = "rotary") -> dict[str, Any]:
     )  # fmt: skip
 
 
+def sentence(found: Conditional, axis: str = "rotary") -> str:
+    """Say in one sentence what large commands do."""
+    return _words(found, *((1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")))[0]
+
+
 def _words(found: Conditional, scale: float, unit: str) -> list[str]:
     """Say in some sentences what was found, the result first."""
     full = f"{found.full_deflection_rad * scale:.4g} {unit}"
