@@ -1,8 +1,9 @@
 """What the counts of an encoder do, beside the small signals, which are measured without them.
 
-The motor's counts are seen in the speed made of them (model.md section 2), the output's in its position, and
-in a speed made of it.  Four things: a standing error, ripple at constant speed, a limit cycle about the
-edge of a count (by describing function and in the simulator), and the amplitude from which the loop is linear again.
+The motor's counts are seen in the speed made of them (model.md section 2), the output's in its position,
+and in a speed made of it.  Four things: a standing error, ripple at constant speed, a limit cycle about the
+edge of a count (by describing function and in the simulator), and the amplitude from which the loop is linear
+again.
 
 An angle of amplitude A about a bias d, counted in steps q, has the fundamental ``n(A/q, d) A`` with
 
