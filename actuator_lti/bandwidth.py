@@ -12,17 +12,17 @@ from scipy.optimize import brentq
 from actuator_lti.bandwidth_exact import exact_gain
 from actuator_lti.errors import InputError
 from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, roots
-from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import gain_crossings
 from actuator_lti.margins.delay_distance import delayed_extreme
-from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, delay_form, from_rational
+from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
 from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.delayed import delayed_gain_crossings
 from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
+from actuator_lti.margins.level_crossings import LevelCrossings
 from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.rational import rational_extreme
-from actuator_lti.margins.sweep import reach, subdivided
+from actuator_lti.margins.sweep import subdivided, variation
 from actuator_lti.rest_mode import without_rest_mode
 
 Level = Literal["1/sqrt(2)", "-3 dB"]
@@ -254,13 +254,13 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
             if hasattr(system, "delays_s")
             else from_rational(rational_loop(system), delay_s)
         )
-        found = [delayed_extreme(form, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
+        result = [delayed_extreme(form, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
         unit = 1.0 if form.period_s is None else 1.0 / form.period_s
     else:
         loop = rational_loop(system.to_state_space() if hasattr(system, "delays_s") else system)
-        found = [rational_extreme(loop, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
+        result = [rational_extreme(loop, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
         unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
-    (s_value, s_place), (t_value, t_place) = found
+    (s_value, s_place), (t_value, t_place) = result
     return Peaks(_db(s_value), s_place * unit, _db(t_value), t_place * unit)
 
 
@@ -302,7 +302,7 @@ def _rational_falls(loop: RationalLoop, level: float) -> list[float]:
         d=loop.d / level,
         numerator=None if loop.numerator is None else loop.numerator / level,
     )
-    return gain_crossings(scaled, Circles(scaled, sorted_poles(loop.A, loop.in_z).values)).tolist()
+    return gain_crossings(scaled, LevelCrossings(scaled, sorted_poles(loop.A, loop.in_z).values)).tolist()
 
 
 def _first_turn(form: DelayForm, dc: float) -> float | None:
@@ -314,16 +314,16 @@ def _first_turn(form: DelayForm, dc: float) -> float | None:
     high = math.pi if form.sampled else low * 10.0
     floor = _FLOOR * abs(dc)
 
-    def resolved(found: Cells) -> Mask:
-        size, R = np.abs(found.L), reach(form, found)
+    def resolved(intervals: Intervals) -> Mask:
+        size, R = np.abs(intervals.L), variation(form, intervals)
         return (0.3 * size > R) | (size + R < floor)
 
     x0, L0 = low, complex(border_values(form, np.array([low]))[0]) * float(np.sign(dc))
     phase0 = float(np.angle(L0))
     for _ in range(1 if form.sampled else 20):
-        found = subdivided(form, np.geomspace(x0, high, 12), resolved)
-        L = np.concatenate(([L0], found.L * np.sign(dc)))
-        x = np.concatenate(([x0], found.x))
+        intervals = subdivided(form, np.geomspace(x0, high, 12), resolved)
+        L = np.concatenate(([L0], intervals.L * np.sign(dc)))
+        x = np.concatenate(([x0], intervals.x))
         phase = phase0 + np.concatenate(([0.0], np.cumsum(np.angle(L[1:] * L[:-1].conj()))))
         low_gain = np.abs(L) < floor
         below = np.flatnonzero((phase < -0.5 * np.pi) & ~np.maximum.accumulate(low_gain))

@@ -47,14 +47,14 @@ class ExactGain:
             if poles:
                 return math.inf, _root(poles[0][0])
             slope = self.above.derivative() * self.below - self.above * self.below.derivative()
-            found = [(1.0, 0.0)]
+            result = [(1.0, 0.0)]
             for v, _ in _positive_roots(slope):
                 value = flint.arb_poly(self.above)(v) / flint.arb_poly(self.below)(v)
-                found.append((_root(value) / abs(double(self.dc)), _root(v)))
+                result.append((_root(value) / abs(double(self.dc)), _root(v)))
             n = self.below.degree()
             end = math.sqrt(double(self.above[n] / self.below[n])) / abs(double(self.dc))
-            found.append((end, math.inf))
-        return max(found, key=lambda pair: pair[0])
+            result.append((end, math.inf))
+        return max(result, key=lambda pair: pair[0])
 
     def first_turn(self, floor_squared: float) -> float | None:
         """w at which the phase first falls below -90 deg against zero frequency.

@@ -12,7 +12,7 @@ from actuator_lti.quantities import DRIVE_QUANTITIES
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
-_FOUND_BY = {"capability": capability, "stiffness": stiffness_figures}
+_SOURCES = {"capability": capability, "stiffness": stiffness_figures}
 
 
 def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
@@ -32,4 +32,4 @@ def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
     if name not in DRIVE_QUANTITIES:
         raise InputError(f"quantity {name!r}: one of {', '.join(DRIVE_QUANTITIES)}")
     quantity = DRIVE_QUANTITIES[name]
-    return quantity.read(_FOUND_BY[quantity.found_by](design, load_Nm), design.axis)
+    return quantity.read(_SOURCES[quantity.source](design, load_Nm), design.axis)

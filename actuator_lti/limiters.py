@@ -142,21 +142,21 @@ class Place:
 
 def limiter_places(wired: Drive) -> list[Place]:
     """Every limiter that the wiring has, in the order of the registry."""
-    limits, found = wired.design.limits, {}
+    limits, result = wired.design.limits, {}
     target = wired.target or {"voltage": "u"}
     for stage, signal in target.items():
         name, every = CLAMP_OF[signal], wired.interval.get(stage, 1)
         limiter, unit = LIMITERS[name], wired.unit(signal)
-        found[name] = Place(limiter, signal, every, limiter.limit_of(limits), unit)
+        result[name] = Place(limiter, signal, every, limiter.limit_of(limits), unit)
         if stage == "velocity" and wired.filters("torque"):
             first = LIMITERS["torque-command"]
-            found[first.name] = Place(first, "torque_command", every, limiter.limit_of(limits), unit)
+            result[first.name] = Place(first, "torque_command", every, limiter.limit_of(limits), unit)
         if name == "speed":
             change = LIMITERS["acceleration"]
-            found["acceleration"] = Place(change, signal, every, change.limit_of(limits), f"{unit}^2")
+            result["acceleration"] = Place(change, signal, every, change.limit_of(limits), f"{unit}^2")
     if limits.peak_time_s is not None and "current" in wired.stages:
-        found["overload"] = Place(LIMITERS["overload"], "i", 1, limits.continuous_current_A, "A")
-    return [found[name] for name in LIMITERS if name in found]
+        result["overload"] = Place(LIMITERS["overload"], "i", 1, limits.continuous_current_A, "A")
+    return [result[name] for name in LIMITERS if name in result]
 
 
 def limiter_paths(

@@ -93,7 +93,7 @@ def _every(run: Any) -> float:
 
 def margins_html(margins: StabilityMargins) -> str:
     """The figures to quote, and how they are known."""
-    found = [
+    result = [
         ("gain margin", _figure(margins.gain_margin_db, 1.0, "dB")),
         ("phase margin", _figure(margins.phase_margin_deg, 1.0, "deg")),
         ("delay margin", _figure(margins.delay_margin_s, 1e3, "ms")),
@@ -102,7 +102,7 @@ def margins_html(margins: StabilityMargins) -> str:
         ("evidence", margins.evidence),
         *(("note", note) for note in margins.notes),
     ]
-    return html_table(f"closed loop: {margins.verdict}", ("figure", "value"), found)
+    return html_table(f"closed loop: {margins.verdict}", ("figure", "value"), result)
 
 
 def _figure(value: float | None, factor: float, unit: str) -> str:

@@ -14,7 +14,7 @@ from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.factors import factor_phase, poles, zeros
 from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.sweep import reach, subdivided
+from actuator_lti.margins.sweep import subdivided, variation
 
 
 def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.0) -> Real:
@@ -102,13 +102,13 @@ def _followed(form: DelayForm, omega: Real) -> Real:
     """Unwrapped phase of a system with inner delays, rad."""
     low, order = low_frequency(form)
     edges = np.geomspace(low, max(float(omega.max()), 2.0 * low) * 1.001, 60)
-    found = subdivided(form, edges, lambda c: reach(form, c) < 0.5 * np.abs(c.L))
+    intervals = subdivided(form, edges, lambda c: variation(form, c) < 0.5 * np.abs(c.L))
     start = -0.5 * np.pi * order
-    first = float(np.angle(found.L[0]) - start)
+    first = float(np.angle(intervals.L[0]) - start)
     first -= 2.0 * np.pi * np.round(first / (2.0 * np.pi))
     if first > 0.5 * np.pi:
         first -= 2.0 * np.pi  # a negative gain counts as -180 deg
-    steps = np.angle(found.L[1:] * found.L[:-1].conj())
+    steps = np.angle(intervals.L[1:] * intervals.L[:-1].conj())
     phase = start + first + np.concatenate(([0.0], np.cumsum(steps)))
-    nearest = np.clip(np.searchsorted(found.x + found.half, omega), 0, found.x.size - 1)
-    return phase[nearest] + np.angle(border_values(form, omega) * found.L[nearest].conj())
+    nearest = np.clip(np.searchsorted(intervals.x + intervals.half, omega), 0, intervals.x.size - 1)
+    return phase[nearest] + np.angle(border_values(form, omega) * intervals.L[nearest].conj())

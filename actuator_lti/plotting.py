@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # The colours of the reports (`reports.charts.paint`): those of Okabe and Ito, darkened for white paper.
 __all__ = [
-    "plot_bode", "plot_cells", "plot_nyquist", "plot_onset", "plot_run", "plot_step", "style",
+    "plot_bode", "plot_map", "plot_nyquist", "plot_onset", "plot_run", "plot_step", "style",
 ]  # fmt: skip
 
 COLOURS = ("#0072b2", "#c46200", "#00805f", "#8e4585", "#c0392b", "#3a8fc4", "#7a5c1e", "#1f2933", "#66727f")
@@ -88,8 +88,8 @@ def frequencies(system: Any, margins: StabilityMargins | None = None) -> np.ndar
 
     with np.errstate(all="ignore"):
         usual = np.asarray(control.frequency_response(system).omega)
-    found: list[Any] = [] if margins is None else [*margins.gain_margins, *margins.phase_margins]
-    at = [one.frequency_rad_s for one in found if 0.0 < one.frequency_rad_s < np.inf]
+    result: list[Any] = [] if margins is None else [*margins.gain_margins, *margins.phase_margins]
+    at = [one.frequency_rad_s for one in result if 0.0 < one.frequency_rad_s < np.inf]
     low, high = (min(at) / 30.0, max(at) * 10.0) if at else (usual[usual > 0.0][0], usual[-1])
     if system.isdtime(strict=True):
         high = np.pi / system.dt
@@ -199,8 +199,8 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     from actuator_lti.bandwidth import closed_loop_bandwidth
 
     if duration_s is None:
-        found = closed_loop_bandwidth(system).minus3db_rad_s
-        duration_s = 8.0 / found if found and np.isfinite(found) else 1.0
+        result = closed_loop_bandwidth(system).minus3db_rad_s
+        duration_s = 8.0 / result if result and np.isfinite(result) else 1.0
     if not duration_s > 0.0:
         raise InputError(f"duration_s = {duration_s}: must be positive")
     (panel,) = _panels(axes, 1)
@@ -285,7 +285,7 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
     return panel
 
 
-def plot_cells(
+def plot_map(
     frequency_hz: np.ndarray,
     amplitude_rad: np.ndarray,
     kind: np.ndarray,
@@ -295,7 +295,7 @@ def plot_cells(
     linear_axis: bool = False,
     axes: Any = None,
 ) -> Axes:
-    """A map of amplitude and frequency: a colour for what acts in each cell, lines for the linear onset."""
+    """A map of amplitude and frequency: a colour for what acts at each point, lines for the linear onset."""
     (panel,) = _panels(axes, 1)
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch

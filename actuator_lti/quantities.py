@@ -2,7 +2,7 @@
 
 A figure of a loop is read from an object with the parts ``margins``, ``bandwidth`` and ``step`` (one
 design), or is a column of `actuator_lti.batch.LinearFigures` of its own name (many). A figure of the whole
-drive is an attribute of what `found_by` names, for one design or many (`actuator_lti.drive_figure`).
+drive is an attribute of what `source` names, for one design or many (`actuator_lti.drive_figure`).
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Quantity:
     words : str
         What reports call it.
     reader : str
-        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `found_by` names.
-    found_by : {"loop", "capability", "stiffness", "analysis"}
+        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names.
+    source : {"loop", "capability", "stiffness", "analysis"}
         What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
         `actuator_lti.loops.stiffness.StiffnessFigures`, or `analyses.asked_figures.AskedFigures`.
     better : {1, -1}
@@ -66,7 +66,7 @@ class Quantity:
     closed: bool = True
     timed: bool = False
     size: float = 1.0
-    found_by: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
+    source: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
     heading: str = ""
     tolerance: float = 1e-9
 
@@ -74,9 +74,9 @@ class Quantity:
         """The unit in which this figure is reported."""
         return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
 
-    def read(self, found: Any, axis: Axis = "rotary") -> Any:
+    def read(self, result: Any, axis: Axis = "rotary") -> Any:
         """The figure in its unit, from figures of a loop or a `Capability`; ``None`` where there is none."""
-        value = found
+        value = result
         for part in self.reader.split("."):
             value = getattr(value, part, None)
             if value is None:
@@ -113,34 +113,34 @@ _LIST = (
     Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
              "step.settling_time_s", -1, timed=True, heading="Settling 2 %", tolerance=1e-07),
     Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
-             "output_rate_rad_s", 1, "m/s", found_by="capability"),
+             "output_rate_rad_s", 1, "m/s", source="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
-             "motor current at top speed", "motor_current_A", -1, found_by="capability"),
+             "motor current at top speed", "motor_current_A", -1, source="capability"),
     Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
-             "acceleration", "acceleration_rad_s2", 1, "m/s^2", found_by="capability"),
+             "acceleration", "acceleration_rad_s2", 1, "m/s^2", source="capability"),
     Quantity("static_stiffness", "N*m/rad", "drive", "moment over deflection at 0 Hz, powered",
-             "static stiffness", "static_stiffness_Nm_rad", 1, "N/m", found_by="stiffness"),
+             "static stiffness", "static_stiffness_Nm_rad", 1, "N/m", source="stiffness"),
     Quantity("least_stiffness", "N*m/rad", "drive", "least moment over deflection, 0.1 to 1000 Hz",
-             "least dynamic stiffness", "least_stiffness_Nm_rad", 1, "N/m", found_by="stiffness"),
+             "least dynamic stiffness", "least_stiffness_Nm_rad", 1, "N/m", source="stiffness"),
     Quantity("lost_motion", "deg", "drive", "play of the coupling and the twist that friction holds",
-             "lost motion", "lost_motion_rad", -1, "m", size=0.1, found_by="stiffness"),
+             "lost motion", "lost_motion_rad", -1, "m", size=0.1, source="stiffness"),
     Quantity("hard_over_time", "s", "analysis", "from the hard-over of the power stage to failure.stop",
-             "time from hard-over to the stop", "hard_over_time_s", 1, found_by="analysis"),
+             "time from hard-over to the stop", "hard_over_time_s", 1, source="analysis"),
     Quantity("failure_deflection", "deg", "analysis", "largest until detection, all failures",
              "deflection until a failure is detected", "failure_deflection_rad", -1, "m",
-             found_by="analysis"),
+             source="analysis"),
     Quantity("failure_moment", "N*m", "analysis", "largest in the drive train, over all failures",
-             "moment in the train at a failure", "failure_moment_Nm", -1, "N", found_by="analysis"),
+             "moment in the train at a failure", "failure_moment_Nm", -1, "N", source="analysis"),
     Quantity("duty_current", "A", "analysis", "rms of the motor current under [duty]",
-             "rms current of the duty", "duty_current_A", -1, found_by="analysis"),
+             "rms current of the duty", "duty_current_A", -1, source="analysis"),
     Quantity("winding_temperature", "degC", "analysis", "winding under [duty], in the long run",
-             "winding temperature of the duty", "winding_degC", -1, found_by="analysis"),
+             "winding temperature of the duty", "winding_degC", -1, source="analysis"),
     Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; 0 at rest",
-             "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, found_by="analysis"),
+             "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, source="analysis"),
     Quantity("corner_gain_margin", "dB", "analysis", "smallest hot, cold, at the worst tolerances",
-             "gain margin at the corners", "corner_gain_margin_db", 1, size=6.0, found_by="analysis"),
+             "gain margin at the corners", "corner_gain_margin_db", 1, size=6.0, source="analysis"),
     Quantity("corner_phase_margin", "deg", "analysis", "smallest hot, cold, at the worst tolerances",
-             "phase margin at the corners", "corner_phase_margin_deg", 1, size=45.0, found_by="analysis"),
+             "phase margin at the corners", "corner_phase_margin_deg", 1, size=45.0, source="analysis"),
 )  # fmt: skip
 
 QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
@@ -164,7 +164,7 @@ def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:
     return tuple(
         (name, load)
         for name, quantity in DRIVE_QUANTITIES.items()
-        for load in (loads if quantity.found_by == "capability" else (0.0,))
+        for load in (loads if quantity.source == "capability" else (0.0,))
     )
 
 

@@ -187,10 +187,10 @@ def _hint(text: str, error: Exception) -> str:
         return "; this looks like JSON, TOML is wanted"
     if re.match(r"[^=\[#]*[,;\t][^=\[#]*$", lines[0]):
         return "; this looks like a table of numbers, TOML is wanted"
-    if found := _COMMA.match(line):
-        return f"; use a decimal point: {found[1]} = {found[2].replace(',', '.')}"
-    if found := _UNQUOTED.match(line):
-        return f'; put a quantity in quotes: {found[1]} = "{shown(found[2].replace(",", "."))[1:-1]}"'
+    if result := _COMMA.match(line):
+        return f"; use a decimal point: {result[1]} = {result[2].replace(',', '.')}"
+    if result := _UNQUOTED.match(line):
+        return f'; put a quantity in quotes: {result[1]} = "{shown(result[2].replace(",", "."))[1:-1]}"'
     return ""
 
 

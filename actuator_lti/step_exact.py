@@ -79,10 +79,10 @@ def exact_response(system: Any, loop: RationalLoop) -> ExactResponse:
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
         with flint.ctx.workprec(bits):
-            found = _at_precision(loop, fraction, dc, bits)
-        if isinstance(found, ExactResponse):
-            return found
-        bits = max(2 * bits, found)
+            result = _at_precision(loop, fraction, dc, bits)
+        if isinstance(result, ExactResponse):
+            return result
+        bits = max(2 * bits, result)
     raise NumericalError("the poles of the step response lie too close together to be told apart")
 
 

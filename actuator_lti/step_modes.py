@@ -42,15 +42,15 @@ def modal_tail(form: DelayForm, poles: Complex, start: float) -> ModalTail:
         Estimates from the collocation.
     """
     alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
-    found: list[complex] = []
+    result: list[complex] = []
     weights: list[complex] = []
     for estimate in poles[alive]:
         pole, residue = _sharpened(form, complex(estimate))
-        if pole is None or any(abs(pole - p) <= 1e-9 * abs(p) for p in found):
+        if pole is None or any(abs(pole - p) <= 1e-9 * abs(p) for p in result):
             continue
-        found.append(pole)
+        result.append(pole)
         weights.append(residue / pole * (1.0 if abs(pole.imag) <= 1e-12 * abs(pole) else 2.0))
-    return ModalTail(np.array(found, dtype=complex), np.array(weights, dtype=complex))
+    return ModalTail(np.array(result, dtype=complex), np.array(weights, dtype=complex))
 
 
 def _sharpened(form: DelayForm, pole: complex) -> tuple[complex | None, complex]:

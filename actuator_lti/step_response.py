@@ -107,14 +107,16 @@ class Stepped:
         def below(t: float) -> float:
             return -self.between(k - 1 if t < time[k] else k, t)
 
-        found = minimize_scalar(below, bounds=(time[k - 1], time[k + 1]), method="bounded",
+        minimum = minimize_scalar(below, bounds=(time[k - 1], time[k + 1]), method="bounded",
                                 options={"xatol": 1e-10 * float(time[k + 1])})  # fmt: skip
-        return (-float(found.fun), float(found.x)) if -found.fun > y[k] else (float(y[k]), float(time[k]))
+        return (
+            (-float(minimum.fun), float(minimum.x)) if -minimum.fun > y[k] else (float(y[k]), float(time[k]))
+        )
 
     def at(self, time: Real) -> Real:
         """Each in its interval."""
-        cell = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2)
-        return np.array([self.between(int(k), float(t)) for k, t in zip(cell, time, strict=True)])
+        interval = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, self.time.size - 2)
+        return np.array([self.between(int(k), float(t)) for k, t in zip(interval, time, strict=True)])
 
     def _located(self, k: int, level: float) -> float:
         """Where the response passes a level between grid points k and k + 1."""
@@ -157,9 +159,9 @@ class Response:
         if not best > 1.0 + _OVER:
             best, place = 1.0 + _OVER, float("inf")
         if not self.later.empty:
-            found, at = self._search.greatest(best)
-            if found > best:
-                best, place = found, self.later.top(at) if not self.whole and at > 0.0 else at
+            result, at = self._search.greatest(best)
+            if result > best:
+                best, place = result, self.later.top(at) if not self.whole and at > 0.0 else at
         return (best, place) if np.isfinite(place) else (1.0, place)
 
     def at(self, time: Real) -> Real:

@@ -87,15 +87,15 @@ class AskedFigures:
         loops = [one for corner in self._corners.corners for one in corner.figures.values()]
         if not all(one.stable for one in loops):
             return -inf
-        found = (getattr(one.margins, attribute) for one in loops)
-        return min((abs(value) for value in found if value is not None), default=inf)
+        result = (getattr(one.margins, attribute) for one in loops)
+        return min((abs(value) for value in result if value is not None), default=inf)
 
 
-def asked_figure(found: AskedFigures, name: str) -> tuple[float | None, str]:
+def asked_figure(figures: AskedFigures, name: str) -> tuple[float | None, str]:
     """A figure in its unit and, where there is none, why."""
     quantity = ANALYSIS_QUANTITIES[name]
     try:
-        value = quantity.read(found, found.design.axis)
+        value = quantity.read(figures, figures.design.axis)
     except InputError as error:
         return None, error.message
     return value, "" if value is not None else "the design does not state what this needs"

@@ -159,7 +159,7 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
     """Gain (dB) and phase margins (deg) of the outer loops where friction matters most: in slow motion."""
     from actuator_lti import assemble_loops, stability_margins
 
-    found: dict[tuple[str, str], float] = {}
+    result: dict[tuple[str, str], float] = {}
     slow = 0.02 * min(design.limits.speed_rad_s, 1e3)
     for load in sorted({0.0, design.load.moment_max_Nm}):
         loops = assemble_loops(
@@ -175,8 +175,8 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
                 ("phase margin", "deg", margins.phase_margin_deg),
             ):
                 if value is not None and np.isfinite(value):
-                    found[f"{name} {what}, {load:g} N m", unit] = float(value)
-    return found
+                    result[f"{name} {what}, {load:g} N m", unit] = float(value)
+    return result
 
 
 def _ranges(

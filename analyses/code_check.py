@@ -77,12 +77,12 @@ def check_code(design: Design, settings: Settings = SETTINGS) -> CodeCheck:
                 compile_files(run_sources(), path.name, "this machine", flags, command=[compiler])
             )
             with borrowed(path):
-                found = validate(design, settings)
+                validation = validate(design, settings)
         except (InputError, NumericalError) as error:
             return CodeCheck(reason=str(error))
     # an unstable loop is a finding on the design: nothing is measured of it, so the code misses nothing
-    judged = (entry for entry in found.ledger if entry.passed is not None)
+    judged = (entry for entry in validation.ledger if entry.passed is not None)
     entries = tuple(entry for entry in judged if entry.quantity != "stability")
     if not entries:
-        return CodeCheck(reason="; ".join(found.notes) or "nothing is judged of this design")
+        return CodeCheck(reason="; ".join(validation.notes) or "nothing is judged of this design")
     return CodeCheck(entries, " ".join([Path(compiler).name, *FLAGS]))

@@ -56,18 +56,18 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     Examples
     --------
     >>> from actuator_lti import load_design
-    >>> found = drive_figures(load_design("ilr33-amber"), load_Nm=8.0)
-    >>> round(found.motor_current_A, 3), found.rate_limit
+    >>> result = drive_figures(load_design("ilr33-amber"), load_Nm=8.0)
+    >>> round(result.motor_current_A, 3), result.rate_limit
     (3.037, 'speed limit')
     """
-    found = capability(design, load_Nm)
-    current = float(found.motor_current_A)
-    limited = bool(found.accelerates_to_limit)
+    capacity = capability(design, load_Nm)
+    current = float(capacity.motor_current_A)
+    limited = bool(capacity.accelerates_to_limit)
     return DriveFigures(
         load_Nm=load_Nm,
-        output_rate_rad_s=float(found.output_rate_rad_s),
-        rate_limit=RATE_LIMITS[int(found.rate_limit)],
+        output_rate_rad_s=float(capacity.output_rate_rad_s),
+        rate_limit=RATE_LIMITS[int(capacity.rate_limit)],
         motor_current_A=None if math.isnan(current) else current,
-        acceleration_rad_s2=float(found.acceleration_rad_s2),
+        acceleration_rad_s2=float(capacity.acceleration_rad_s2),
         acceleration_limit="acceleration limit" if limited else "torque",
     )

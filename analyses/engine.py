@@ -328,7 +328,7 @@ def _same_code(client: Any, packages: tuple[str, ...]) -> None:
     """Refuse workers that run another version of the code."""
     here = code_version(packages)
     others = {
-        address: found for address, found in client.run(code_version, packages).items() if found != here
+        address: result for address, result in client.run(code_version, packages).items() if result != here
     }
     if others:
         address = next(iter(others))

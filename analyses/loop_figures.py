@@ -124,13 +124,13 @@ def all_loop_figures(
     InputError, NumericalError
         If the margins of a loop cannot be found, and ``refused`` is not given.
     """
-    found = {}
+    result = {}
     for name, loop in loops.present.items():
         response = loops.reference_to_output if name == "position" else None
         try:
-            found[name] = loop_figures(loop, response, step=step, certify=certify)
+            result[name] = loop_figures(loop, response, step=step, certify=certify)
         except (InputError, NumericalError) as error:
             if refused is None:
                 raise
             refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
-    return found
+    return result

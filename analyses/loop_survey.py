@@ -122,18 +122,18 @@ class LoopSurvey:
         from actuator_lti.extras import need
 
         rows = [
-            {"form": form, "loop": name, **_row(found)}
+            {"form": form, "loop": name, **_row(result)}
             for form, loops in self.forms.items()
-            for name, found in loops.items()
+            for name, result in loops.items()
         ]
         frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
         frame.attrs = {"design": self.design.name}
         return frame
 
 
-def _row(found: LoopFigures) -> dict[str, Any]:
+def _row(figures: LoopFigures) -> dict[str, Any]:
     """The figures of one loop, by name with unit."""
-    margins, bandwidth = found.margins, found.bandwidth
+    margins, bandwidth = figures.margins, figures.bandwidth
     return {
         "stable": margins.stable,
         "gain_margin_db": margins.gain_margin_db,
@@ -234,8 +234,8 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
     ) -> OperatingPointFigures:
         moment = load or 0.0
         slope = friction_slope(design, kind, moment, speed, 1)
-        found = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
-        figures = all_loop_figures(found, step=False, refused=refused, certify=True)
+        loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        figures = all_loop_figures(loops, step=False, refused=refused, certify=True)
         return OperatingPointFigures(label, load, slope, figures)
 
     points = [point("sliding", None, "sliding")]
@@ -267,10 +267,10 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
     from actuator_lti.delay_budget import delay_budget
 
     budgets = {}
-    for name, found in figures.items():
-        crossovers = [m.frequency_rad_s for m in found.margins.phase_margins if m.frequency_rad_s > 0.0]
+    for name, result in figures.items():
+        crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:
-            quoted = found.margins.phase_margin
+            quoted = result.margins.phase_margin
             at = quoted.frequency_rad_s if quoted and quoted.frequency_rad_s > 0 else min(crossovers)
             budgets[name] = delay_budget(design, name, at)
     return budgets
@@ -283,8 +283,8 @@ def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     outermost = loops.design.controller.outermost
     if not loops.limiters or outermost not in figures:
         return None
-    found = figures[outermost]
-    crossover = min((m.frequency_rad_s for m in found.margins.phase_margins), default=100.0)
+    result = figures[outermost]
+    crossover = min((m.frequency_rad_s for m in result.margins.phase_margins), default=100.0)
     nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
     high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
     border = onset(loops, np.geomspace(crossover / 100.0, high, 160))

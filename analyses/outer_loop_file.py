@@ -111,10 +111,10 @@ def _numbers(table: Mapping[str, Any], key: str, where: str) -> Matrix:
     )
     if not number or not values:
         raise InputError(f"{key}: allowed: a list of numbers", where=where)
-    found: Matrix = np.array(values, dtype=float)
-    if not np.isfinite(found).all():
+    result: Matrix = np.array(values, dtype=float)
+    if not np.isfinite(result).all():
         raise InputError(f"{key}: allowed: finite numbers", where=where)
-    return found
+    return result
 
 
 def _matrix(table: Mapping[str, Any], key: str, where: str) -> Matrix:

@@ -73,8 +73,8 @@ def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
     """Evaluate a system on the border of stability: at s = jw, or z = exp(jwT) where it is sampled."""
     omega = np.asarray(omega_rad_s, dtype=float)
     points = np.exp(1j * omega * system.dt) if system.dt else 1j * omega
-    found = _all_at_once(system, points) if all(hasattr(system, part) for part in "ABCD") else None
-    return np.atleast_1d(np.asarray(system(points), dtype=complex)) if found is None else found
+    result = _all_at_once(system, points) if all(hasattr(system, part) for part in "ABCD") else None
+    return np.atleast_1d(np.asarray(system(points), dtype=complex)) if result is None else result
 
 
 def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
@@ -138,13 +138,13 @@ def sampled_step(system: Any, samples: int) -> np.ndarray:
 
 
 def nyquist_curve(
-    system: Any, omega_rad_s: np.ndarray, reach: float, passes: int = 7
+    system: Any, omega_rad_s: np.ndarray, frame: float, passes: int = 7
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sample L(jw) closely enough for a figure of that reach around -1; NaN where it leaves the frame.
+    """Sample L(jw) closely enough for a figure of that half width around -1; NaN where it leaves the frame.
 
     Parameters
     ----------
-    reach : float
+    frame : float
         Half width of the frame around -1.
     passes : int
         How often intervals that are too long on paper are halved.
@@ -156,22 +156,22 @@ def nyquist_curve(
     """
     omega, values = omega_rad_s, response_at(system, omega_rad_s)
     for _ in range(passes):
-        near = np.abs(values + 1.0) < 2.5 * reach
-        long = (np.abs(np.diff(values)) > 0.04 * reach) & (near[1:] | near[:-1])
+        near = np.abs(values + 1.0) < 2.5 * frame
+        long = (np.abs(np.diff(values)) > 0.04 * frame) & (near[1:] | near[:-1])
         if not long.any() or len(omega) > 3000:
             break
         middle = np.sqrt(omega[1:] * omega[:-1])[long]
         order = np.argsort(np.concatenate([omega, middle]))
         values = np.concatenate([values, response_at(system, middle)])[order]
         omega = np.concatenate([omega, middle])[order]
-    kept = _framed(values, reach)
-    shown = np.where(np.abs(values + 1.0) < 2.5 * reach, values, np.nan + 0j)
+    kept = _framed(values, frame)
+    shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
     return omega[kept], shown[kept]
 
 
-def _framed(values: np.ndarray, reach: float) -> np.ndarray:
+def _framed(values: np.ndarray, frame: float) -> np.ndarray:
     """Tell which points a figure needs: one outside the frame as a gap, none too near to be told apart."""
-    shown = np.where(np.abs(values + 1.0) < 2.5 * reach, values, np.nan + 0j)
+    shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
     kept: list[int] = []
     for k, value in enumerate(shown):
         last = shown[kept[-1]] if kept else None
@@ -179,6 +179,6 @@ def _framed(values: np.ndarray, reach: float) -> np.ndarray:
             kept.append(k)
         elif np.isnan(value) and np.isnan(last):
             continue
-        elif np.isnan(value) or np.isnan(last) or abs(value - last) > 0.006 * reach:
+        elif np.isnan(value) or np.isnan(last) or abs(value - last) > 0.006 * frame:
             kept.append(k)
     return np.array(kept, dtype=int)

@@ -66,8 +66,8 @@ class Factor:
     def box(self) -> tuple[float, float]:
         """Smallest and largest value of the tolerance box; +-3 standard deviations of a normal one."""
         t = self.tolerance
-        reach = _width(t.half_width) if t.kind == "uniform" else BOX_SIGMA * _width(t.std)
-        return max(self.nominal - reach, t.lower), min(self.nominal + reach, t.upper)
+        half_range = _width(t.half_width) if t.kind == "uniform" else BOX_SIGMA * _width(t.std)
+        return max(self.nominal - half_range, t.lower), min(self.nominal + half_range, t.upper)
 
 
 def _width(value: float | None) -> float:
@@ -253,7 +253,7 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     taken = set(table.paths) if table else set()
     factors = tuple(Factor(p, value, t) for p, value, t in tolerances(design) if p not in taken)
     for factor in factors:
-        _check_reach(factor, design.origin or None)
+        _check_range(factor, design.origin or None)
     names = [factor.path for factor in factors]
     for pair in design.correlations:
         for name in (pair.first, pair.second):
@@ -262,7 +262,7 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     return Sampler(factors, correlation_of(design, names), table, seed)
 
 
-def _check_reach(factor: Factor, where: str | None) -> None:
+def _check_range(factor: Factor, where: str | None) -> None:
     """Refuse a distribution that may give values that the key does not allow."""
     from actuator_lti.design.fields import field_of
 

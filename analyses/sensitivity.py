@@ -94,8 +94,8 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     The position loop's crossover, and so its bandwidth, follows its gain:
 
     >>> from actuator_lti import load_design
-    >>> found = sensitivities(load_design("ilr33-amber"), ["control.position.gain"])
-    >>> round(found.tornado("position.bandwidth")[0].per_percent, 2)
+    >>> result = sensitivities(load_design("ilr33-amber"), ["control.position.gain"])
+    >>> round(result.tornado("position.bandwidth")[0].per_percent, 2)
     0.38
     """
     from actuator_lti.design import parameter_value

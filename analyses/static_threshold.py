@@ -52,8 +52,8 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
     Examples
     --------
     >>> from actuator_lti import load_design
-    >>> found = static_threshold(load_design("emps"))
-    >>> round(1e6 * found.backward_rad, 3)  # um: (Fc - |offset|) and (Fc + |offset|) over the stiffness
+    >>> result = static_threshold(load_design("emps"))
+    >>> round(1e6 * result.backward_rad, 3)  # um: (Fc - |offset|) and (Fc + |offset|) over the stiffness
     17.187
     """
     gain, strongest = float(torque_gain_Nm_rad(design)), float(stall_torque_Nm(design))

@@ -66,11 +66,11 @@ class Reader:
 
     def tables(self, tree: dict[str, Any], key: str, place: str = "") -> list[dict[str, Any]]:
         """A list of tables, empty where there is none."""
-        found = tree.get(key, [])
-        if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+        result = tree.get(key, [])
+        if not isinstance(result, list) or not all(isinstance(item, dict) for item in result):
             path = f"{place}.{key}" if place else key
             raise self.error(f"{path}: allowed: a list of tables, [[{key}]]")
-        return found
+        return result
 
     def text(
         self, table: dict[str, Any], place: str, key: str, otherwise: str | None = None, longest: int = 2000

@@ -41,10 +41,10 @@ class FigureName:
     better: int
 
 
-def small_signal(design: Design, found: Mapping[str, LoopFigures]) -> dict[str, float | None]:
+def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str, float | None]:
     """Linear figures of every loop and static figures at every load of the design."""
     figures: dict[str, float | None] = {}
-    for loop, one in found.items():
+    for loop, one in result.items():
         for name, quantity in LOOP_QUANTITIES.items():
             value = quantity.read(one) if one.stable or not quantity.closed else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)
@@ -123,7 +123,7 @@ def _name(key: str, design: Design) -> FigureName:
     words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"
-    elif known is not None and known.found_by == "stiffness":
+    elif known is not None and known.source == "stiffness":
         at = ""  # no load changes it
     elif at:
         at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"

@@ -37,14 +37,14 @@ class Store:
             return None
         try:
             head, _, body = decode(read_bytes(path, "entry"), str(path)).partition("\n")
-            found = json.loads(body) if head == _digest(body) else None
+            result = json.loads(body) if head == _digest(body) else None
         except (InputError, ValueError, RecursionError):
             return None
-        return found if isinstance(found, dict) else None
+        return result if isinstance(result, dict) else None
 
-    def write(self, key: str, found: Mapping[str, Any]) -> None:
+    def write(self, key: str, result: Mapping[str, Any]) -> None:
         """Keep what was found."""
-        body = json.dumps(found)
+        body = json.dumps(result)
         write_bytes(self._path(key), f"{_digest(body)}\n{body}".encode())
 
     def _path(self, key: str) -> Path:

@@ -169,28 +169,30 @@ def compare(
     tell = progress or (lambda done, total: None)
     kept = _Kept(None if folder is None else Store(folder), study.base, (plan, tested))
     base = kept.read(study.base) or kept.write(study.base, _evaluated(study.base, plan, tested))
-    found = [kept.read(variant) for variant in good]
+    result = [kept.read(variant) for variant in good]
     tell(1, total)
     slopes = sensitivities(study.base.design)
-    missing = [k for k, one in enumerate(found) if one is None]
+    missing = [k for k, one in enumerate(result) if one is None]
     first = total - len(missing)
     tell(first, total)
 
     def take(place: tuple[int, Variant], one: Found) -> None:
-        found[place[0]] = kept.write(place[1], one)
+        result[place[0]] = kept.write(place[1], one)
 
     work = partial(_beside, base, study.base, plan, tested)
     places = [(k, good[k]) for k in missing]
     (engine or Engine(threads=1)).map(work, places, take, lambda done, _: tell(first + done, total))
-    ends = tuple(_compared(variant, one) for variant, one in zip(good, found, strict=True) if one is not None)
+    ends = tuple(
+        _compared(variant, one) for variant, one in zip(good, result, strict=True) if one is not None
+    )
     reference = _compared(study.base, base)
     names = figure_names([c.figures for c in (reference, *ends)], study.base.design)
     refused = tuple(v for v in study.variants if v.design is None)
     return Comparison(study, names, reference, ends, slopes, refused)
 
 
-def _compared(variant: Variant, found: Found) -> Compared:
-    return Compared(variant=variant, **{part.name: getattr(found, part.name) for part in fields(Found)})
+def _compared(variant: Variant, result: Found) -> Compared:
+    return Compared(variant=variant, **{part.name: getattr(result, part.name) for part in fields(Found)})
 
 
 @dataclass(frozen=True)
@@ -208,10 +210,10 @@ class _Kept:
         except ValueError:  # not what this version writes: computed again
             return None
 
-    def write(self, variant: Variant, found: Found) -> Found:
+    def write(self, variant: Variant, result: Found) -> Found:
         if self.store is not None:
-            self.store.write(self._address(variant), _adapter().dump_python(found))
-        return found
+            self.store.write(self._address(variant), _adapter().dump_python(result))
+        return result
 
     def _address(self, variant: Variant) -> str:
         return address((self.base.design, variant.design), self.settings)
@@ -241,10 +243,10 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 
     assert variant.design is not None
     loops = assemble_loops(variant.design)
-    found = all_loop_figures(loops, certify=True)
-    figures = {**small_signal(variant.design, found), **plan.figures(variant.design, loops)}
+    result = all_loop_figures(loops, certify=True)
+    figures = {**small_signal(variant.design, result), **plan.figures(variant.design, loops)}
     ledger, untested = _ledger(variant.design) if tested else ((), "")
-    verdicts = evaluate_requirements(variant.design, found)
+    verdicts = evaluate_requirements(variant.design, result)
     return Found(figures=figures, verdicts=verdicts, ledger=ledger, untested=untested)
 
 

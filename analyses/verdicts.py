@@ -66,8 +66,8 @@ def judged(
         value, reason = asked(quantity.name)
         return [_verdict(requirement, requirement.id, None, value, reason)]
     if quantity.scope == "drive":
-        found = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
-        value = None if math.isnan(found) else found
+        result = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
+        value = None if math.isnan(result) else result
         reason = "" if value is not None else "the design has no such figure"
         return [_verdict(requirement, requirement.id, None, value, reason)]
     named = requirement.loop not in (None, "every")
@@ -90,15 +90,15 @@ def _judge_loop(
         )
     if name not in figures:
         return _verdict(requirement, id, name, None, f"the design has no {name} loop")
-    found = figures[name]
-    if found.margins.stable is None:
+    result = figures[name]
+    if result.margins.stable is None:
         return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
-    if not found.stable:
-        reason = f"the {name} loop is {found.margins.verdict}"
+    if not result.stable:
+        reason = f"the {name} loop is {result.margins.verdict}"
         return RequirementVerdict(
             id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
         )
-    value = QUANTITIES[requirement.quantity].read(found)
+    value = QUANTITIES[requirement.quantity].read(result)
     reason = which_response(requirement.quantity, name)
     if value is None:
         reason = "not found in the band of this loop"

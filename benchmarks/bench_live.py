@@ -22,7 +22,7 @@ ROUNDS = 3
 
 def rows(quick: bool = False) -> Iterable[Row]:
     """Move every slider of some designs and take the time that the page itself measures."""
-    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    path = next((result for name in BROWSERS if (result := shutil.which(name))), None)
     if path is None:
         return
     from playwright.sync_api import sync_playwright

@@ -79,7 +79,7 @@ def _margins(quick: bool) -> Iterator[Row]:
 def _difference(figures: Any, loop: str, k: int, truth: Any) -> float:
     """Largest relative difference of any crossover; 1 if their number differs."""
     gain, phase = figures.gain_crossovers(loop), figures.phase_crossovers(loop)
-    if (gain.found[k], phase.found[k]) != (len(truth.phase_margins), len(truth.gain_margins)):
+    if (gain.crossings[k], phase.crossings[k]) != (len(truth.phase_margins), len(truth.gain_margins)):
         return 1.0
     pairs = [(gain.frequency_rad_s[k, j], m.frequency_rad_s) for j, m in enumerate(truth.phase_margins)]
     pairs += [(gain.margin[k, j], m.deg) for j, m in enumerate(truth.phase_margins)]

@@ -20,15 +20,15 @@ def rows(quick: bool = False) -> Iterable[Row]:
     for name in names:
         design = load_design(name)
         started = time.perf_counter()
-        found = validate(design, Settings())
+        validation = validate(design, Settings())
         taken = time.perf_counter() - started
         swept = ", ".join(
             f"{loop} {item.measured.sweep.frequency_hz.size}"
-            for loop, item in found.loops.items()
+            for loop, item in validation.loops.items()
             if item.measured
         )
-        held = sum(row.passed is True for row in found.ledger)
-        note = f"points: {swept}; {held} predictions hold, {len(found.failed)} fail; map 25 x 40"
+        held = sum(row.passed is True for row in validation.ledger)
+        note = f"points: {swept}; {held} predictions hold, {len(validation.failed)} fail; map 25 x 40"
         yield Row(
             group="validation",
             name=f"{name}, everything",
@@ -37,5 +37,5 @@ def rows(quick: bool = False) -> Iterable[Row]:
             target=TARGET_S,
             note=note,
         )
-        for part, seconds in found.seconds.items():
+        for part, seconds in validation.seconds.items():
             yield Row(group="validation", name=f"{name}: {part}", measured=seconds, unit="s")

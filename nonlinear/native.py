@@ -175,10 +175,10 @@ def build() -> Path:
     from nonlinear.export.build import compile_files, system_compiler
     from nonlinear.export.run_library import run_sources
 
-    found = system_compiler()
-    if found is None:
+    compiler = system_compiler()
+    if compiler is None:
         raise InputError("no C compiler; allowed: gcc or clang, or leave it to numba")
-    data = compile_files(run_sources(), "run.so", "this machine", _FLAGS, command=[found])
+    data = compile_files(run_sources(), "run.so", "this machine", _FLAGS, command=[compiler])
     path = library_path()
     write_bytes(path, data)
     for old in _FOLDER.glob("run-*.so"):

@@ -176,9 +176,9 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
         "Margins": lambda: margins.section(figures, survey.locked),
     }
-    for name, found in figures.items():
+    for name, result in figures.items():
         locked = survey.locked if name == "current" else None
-        makers[f"Loop {name}"] = partial(loop.section, name, design, found, locked)
+        makers[f"Loop {name}"] = partial(loop.section, name, design, result, locked)
     makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
     makers["Break points"] = lambda: break_points.section(survey.break_points, figures)
     makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)

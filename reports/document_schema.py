@@ -228,8 +228,8 @@ def _line(error: ValidationError | RecursionError) -> str:
     if isinstance(error, RecursionError):
         return "details within details: nested too deeply"
     first = error.errors(include_url=False, include_context=False)[0]
-    found = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
-    return f"{_place(first['loc'])}{found}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+    result = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
+    return f"{_place(first['loc'])}{result}: {first['msg'][:1].lower()}{first['msg'][1:]}"
 
 
 def _place(steps: tuple[int | str, ...]) -> str:

@@ -36,5 +36,5 @@ def plain(findings: Iterable[Finding]) -> list[dict[str, Any]]:
 
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
     """Collect what the sections of a report carry, the gravest first, each once."""
-    found = [Finding(**item) for part in sections for item in part.get("findings", ())]
-    return sorted(dict.fromkeys(found), key=lambda item: ORDER.index(item.severity))
+    result = [Finding(**item) for part in sections for item in part.get("findings", ())]
+    return sorted(dict.fromkeys(result), key=lambda item: ORDER.index(item.severity))

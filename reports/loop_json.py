@@ -7,9 +7,9 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 
 
-def loop_json(found: LoopFigures) -> dict[str, Any]:
+def loop_json(figures: LoopFigures) -> dict[str, Any]:
     """Give everything known of one loop; a figure that does not exist is null."""
-    m, band, peaks, step = found.margins, found.bandwidth, found.peaks, found.step
+    m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
     return {
         "stable": m.stable,
         "verdict": m.verdict,
@@ -39,5 +39,5 @@ def loop_json(found: LoopFigures) -> dict[str, Any]:
         "settling_time_s": step.settling_time_s if step else None,
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
-        "notes": [*m.notes, *found.notes],
+        "notes": [*m.notes, *figures.notes],
     }

@@ -32,13 +32,13 @@ class Crossovers:
     ----------
     frequency_rad_s, margin : ndarray, shape (count, 6)
         Margin in deg (gain crossovers) or as ratio (phase crossovers).
-    found : ndarray of int, shape (count,)
+    crossings : ndarray of int, shape (count,)
         How many there are; where it is more than 6 the rest is not listed.
     """
 
     frequency_rad_s: np.ndarray
     margin: np.ndarray
-    found: np.ndarray
+    crossings: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class LinearFigures:
         """Frequencies where |L| = 1, with phase margins in deg."""
         from ._figures import FIRST_GAIN
 
-        found = self._list(loop, FIRST_GAIN, 1)
-        return Crossovers(found.frequency_rad_s, np.degrees(found.margin), found.found)
+        result = self._list(loop, FIRST_GAIN, 1)
+        return Crossovers(result.frequency_rad_s, np.degrees(result.margin), result.crossings)
 
     def phase_crossovers(self, loop: str) -> Crossovers:
         """Frequencies where L is negative real, with gain margins as ratio."""
@@ -135,9 +135,9 @@ class LinearFigures:
         return _nearest_zero(self.gain_crossovers(loop).margin)
 
     def _delay_margin(self, loop: str) -> np.ndarray:
-        found = self.gain_crossovers(loop)
-        angle = np.radians(np.where(found.margin > 0, found.margin, found.margin + 360.0))
-        delays = np.where(np.isnan(angle), inf, angle / found.frequency_rad_s)
+        result = self.gain_crossovers(loop)
+        angle = np.radians(np.where(result.margin > 0, result.margin, result.margin + 360.0))
+        delays = np.where(np.isnan(angle), inf, angle / result.frequency_rad_s)
         return np.where(self.stable(loop), delays.min(axis=1), 0.0)
 
     def _modulus_margin(self, loop: str) -> np.ndarray:
@@ -267,8 +267,8 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     leads = np.array(np.broadcast_to(np.asarray(lead, dtype=float), len(rows)))
     closed = A - B[:, :, None] * C[:, None, :] * ~np.isnan(leads)[:, None, None]
     finite = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(closed).all(axis=(1, 2))
-    found = [np.linalg.eigvals(np.where(finite[:, None, None], each, 0.0)) for each in (A, closed)]
-    poles = np.stack([part for each in found for part in (each.real, each.imag)], axis=1)
+    result = [np.linalg.eigvals(np.where(finite[:, None, None], each, 0.0)) for each in (A, closed)]
+    poles = np.stack([part for each in result for part in (each.real, each.imag)], axis=1)
     poles[~finite] = np.nan
     many_loops(A.copy(), B.copy(), C.copy(), poles, leads, time_figures, rows)
     if not np.isnan(leads).any():

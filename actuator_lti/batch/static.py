@@ -24,9 +24,9 @@ def drive_figures(population: Population, quantity: str, load_Nm: float = 0.0) -
         raise InputError(f"quantity {quantity!r}: one of {', '.join(DRIVE_QUANTITIES)}")
     if quantity == "motor_current" and not population.design.motor.has_electrical_dynamics:
         raise InputError("motor_current: an ideal torque source has no current")
-    if DRIVE_QUANTITIES[quantity].found_by == "capability":
-        found = drive_figure(population.stacked, quantity, load_Nm)
-        return np.broadcast_to(np.asarray(found, dtype=float), (population.count,))
+    if DRIVE_QUANTITIES[quantity].source == "capability":
+        figure = drive_figure(population.stacked, quantity, load_Nm)
+        return np.broadcast_to(np.asarray(figure, dtype=float), (population.count,))
     out = np.empty(population.count)
     for group in population.alike():
         for first in range(0, len(group), _CHUNK):

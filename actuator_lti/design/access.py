@@ -155,7 +155,7 @@ def _replaced(
 def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Parameter, ...]:
     """A :class:`Parameter` for every numeric key of a design, also those that its file left to defaults."""
     structure = Structure.of(design)
-    found = []
+    result = []
     for path in paths_of(design) if paths is None else paths:
         known = design.parameters.get(path)
         if known is None:
@@ -165,8 +165,8 @@ def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Param
             known = Parameter(
                 path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="default"
             )
-        found.append(known)
-    return tuple(found)
+        result.append(known)
+    return tuple(result)
 
 
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:

@@ -126,14 +126,14 @@ class Builder:
 
     def tables(self, path: str, raw: Any) -> dict[str, Any]:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         for section in children(path):
             given = getattr(raw, section.key)
             if section.many:
-                found[section.attribute] = self._items(section, given)
+                result[section.attribute] = self._items(section, given)
             elif given is not None:
-                found[section.attribute] = self.part(section, given, section.path)
-        return found
+                result[section.attribute] = self.part(section, given, section.path)
+        return result
 
     def _items(self, section: Section, given: Any) -> tuple[Any, ...]:
         paths: list[str] = []

@@ -52,7 +52,7 @@ def _local(element: Element) -> str:
 
 def _objects_in(root: Element, where: str) -> list[tuple[ControllerObject, Element]]:
     """Every object with an actual value, and the element that holds it."""
-    found: list[tuple[ControllerObject, Element]] = []
+    result: list[tuple[ControllerObject, Element]] = []
     stack: list[tuple[Element, int]] = [(root, 0)]
     while stack:
         element, depth = stack.pop()
@@ -60,13 +60,13 @@ def _objects_in(root: Element, where: str) -> list[tuple[ControllerObject, Eleme
             raise InputError("nested too deeply", where=where)
         if _local(element) == "CANopenObject":
             index = _hex(element, "index", 4, where)
-            found += _values_of(element, index, 0, where)
+            result += _values_of(element, index, 0, where)
             for sub in element:
                 if _local(sub) == "CANopenSubObject":
-                    found += _values_of(sub, index, _hex(sub, "subIndex", 2, where), where)
+                    result += _values_of(sub, index, _hex(sub, "subIndex", 2, where), where)
             continue
         stack.extend((child, depth + 1) for child in reversed(element))
-    return found
+    return result
 
 
 def _hex(element: Element, attribute: str, digits: int, where: str) -> int:

@@ -20,7 +20,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     >>> warnings_of(load_design("ilr33-amber"))
     ()
     """
-    found: list[str] = []
+    result: list[str] = []
     checks = (
         _sampling,
         _crossovers,
@@ -33,8 +33,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
         elastic_warnings,
     )
     for check in checks:
-        found.extend(check(design))
-    return tuple(found)
+        result.extend(check(design))
+    return tuple(result)
 
 
 def _loops(design: Design) -> Iterator[tuple[str, object, float]]:
@@ -60,34 +60,34 @@ def _sampling(design: Design) -> Iterator[str]:
 def estimated_crossovers(design: Design) -> dict[str, float]:
     """First estimates of the loops' crossovers in rad/s, from the asymptotes; only for warnings."""
     control, motor = design.controller, design.effective_motor
-    found: dict[str, float] = {}
+    result: dict[str, float] = {}
     if control.current is not None and motor.inductance_H is not None:
-        found["current"] = control.current.gain_V_A / motor.inductance_H
+        result["current"] = control.current.gain_V_A / motor.inductance_H
     if control.velocity is not None:
         torque = motor.source_gain_Nm_V
         if torque is None and motor.torque_constant_Nm_A is not None and motor.resistance_ohm is not None:
             divisor = 1.0 if control.current is not None else motor.resistance_ohm
             torque = motor.torque_constant_Nm_A / divisor
-        found["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
+        result["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
         if control.position is not None:
-            found["position"] = control.position.gain
-    return found
+            result["position"] = control.position.gain
+    return result
 
 
 def _crossovers(design: Design) -> Iterator[str]:
-    found = estimated_crossovers(design)
+    crossovers = estimated_crossovers(design)
     for name, _, period in _loops(design):
         nyquist = pi / period
-        if found.get(name, 0.0) > 0.4 * nyquist:
+        if crossovers.get(name, 0.0) > 0.4 * nyquist:
             yield (
-                f"control.{name}.gain: crossover near {found[name]:.3g} rad/s, too close to the loop's "
+                f"control.{name}.gain: crossover near {crossovers[name]:.3g} rad/s, too close to the loop's "
                 f"Nyquist frequency of {nyquist:.3g} rad/s"
             )
     for inner, outer in (("current", "velocity"), ("velocity", "position")):
-        if inner in found and outer in found and found[outer] > found[inner]:
+        if inner in crossovers and outer in crossovers and crossovers[outer] > crossovers[inner]:
             yield (
-                f"control.{outer}.gain: crossover near {found[outer]:.3g} rad/s lies above that of the "
-                f"{inner} loop inside it, {found[inner]:.3g} rad/s"
+                f"control.{outer}.gain: crossover near {crossovers[outer]:.3g} rad/s lies above that of the "
+                f"{inner} loop inside it, {crossovers[inner]:.3g} rad/s"
             )
 
 

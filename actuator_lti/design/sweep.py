@@ -43,8 +43,8 @@ def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]
 
     Examples
     --------
-    >>> found = sweep("ilr33-amber", "limits.voltage", ["12 V", 14.0])
-    >>> [(at.value, at.design.limits.voltage_V) for at in found]
+    >>> result = sweep("ilr33-amber", "limits.voltage", ["12 V", 14.0])
+    >>> [(at.value, at.design.limits.voltage_V) for at in result]
     [('12 V', 12.0), (14.0, 14.0)]
     """
     base = as_design(design)

@@ -191,19 +191,19 @@ def _kinds() -> dict[Dimension, str]:
     return {parse_unit(unit).dimension: kind for unit, kind in _KINDS.items()}
 
 
-def _kind_of(written: str, found: UnitValue) -> str:
+def _kind_of(written: str, value: UnitValue) -> str:
     """What a unit measures, in words where there is one."""
-    kind = _kinds().get(found.dimension)
+    kind = _kinds().get(value.dimension)
     if kind is None:
         return f"has the dimension of {shown(written)}"
     return f"{shown(written)} is the unit of a{'n' if kind[0] in 'aeiou' else ''} {kind}"
 
 
-def _advice(found: UnitValue, wanted: UnitValue, number: float) -> str:
+def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted, where engineers mix the two up."""
-    pair = (_kinds().get(found.dimension, ""), _kinds().get(wanted.dimension, ""))
+    pair = (_kinds().get(value.dimension, ""), _kinds().get(wanted.dimension, ""))
     if pair == ("speed or angular frequency", "gain or rate"):
-        return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * found.factor:.6g} 1/s"
+        return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * value.factor:.6g} 1/s"
     if pair == ("moment of inertia", "mass"):
         return "; a screw of lead p carries J as the mass J (2 pi/p)^2"
     if pair == ("mass", "moment of inertia"):
@@ -226,11 +226,11 @@ def split_quantity(text: str) -> tuple[float, str]:
     return number, match.group(2).strip()
 
 
-def compatible(found: UnitValue, wanted: UnitValue) -> bool:
+def compatible(value: UnitValue, wanted: UnitValue) -> bool:
     """Whether a unit may stand for another; a radian in the denominator may be left out."""
-    if found.dimension == wanted.dimension:
+    if value.dimension == wanted.dimension:
         return True
-    return wanted.angle < 0 and found.angle == 0 and found.without_angle() == wanted.without_angle()
+    return wanted.angle < 0 and value.angle == 0 and value.without_angle() == wanted.without_angle()
 
 
 def parse_quantity(text: str | float | int, unit: str) -> float:
@@ -266,14 +266,14 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         number, written = (float(text), "") if isinstance(text, int | float) else split_quantity(text)
         if not isfinite(number):
             raise ValueError("must be finite")
-        found = parse_unit(written)
+        result = parse_unit(written)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{error}; allowed: {example}") from None
-    if not compatible(found, wanted):
-        missing = "has no unit" if not written else _kind_of(written, found)
+    if not compatible(result, wanted):
+        missing = "has no unit" if not written else _kind_of(written, result)
         wrong = "wrong dimension, " if written else ""
-        raise InputError(f"{wrong}{missing}; allowed: {example}{_advice(found, wanted, number)}")
-    value = scaled(number, found.factor)
+        raise InputError(f"{wrong}{missing}; allowed: {example}{_advice(result, wanted, number)}")
+    value = scaled(number, result.factor)
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")
     return value

@@ -179,13 +179,13 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
 def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
     structure = Structure.of(design)
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for path, value in values.items():
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
-        found[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
-    return found
+        result[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+    return result
 
 
 def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> None:

@@ -178,17 +178,17 @@ def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
 
 def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) -> Any:
     """First speed where ``start_value + friction(w) + more w`` rises through 0; inf where it does not."""
-    found: Any = np.asarray(math.inf)
+    result: Any = np.asarray(math.inf)
     value = np.asarray(start_value, dtype=float)
     ends = [start for start, _ in slopes[1:]] + [math.inf]
     for (start, slope), end in zip(slopes, ends, strict=True):
         rise = np.asarray(slope + more, dtype=float)
         with np.errstate(divide="ignore", invalid="ignore"):
             root = np.where(rise > 0, start - value / rise, math.inf)
-        hit = (root <= end) & (root >= start) & np.isinf(found)
-        found = np.where(hit, root, found)
+        hit = (root <= end) & (root >= start) & np.isinf(result)
+        result = np.where(hit, root, result)
         value = value + rise * (end - start) if math.isfinite(end) else value
-    return found
+    return result
 
 
 def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:

@@ -126,11 +126,11 @@ def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
 
 def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
     """(speed from which it holds, slope) of each straight piece of a friction map; the last continues."""
-    found = [
+    result = [
         (a.speed_rad_s, (b.torque_Nm - a.torque_Nm) / (b.speed_rad_s - a.speed_rad_s))
         for a, b in pairwise(points)
     ]
-    return found or [(0.0, 0.0)]
+    return result or [(0.0, 0.0)]
 
 
 def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> float:

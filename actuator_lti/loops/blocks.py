@@ -22,12 +22,12 @@ def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
     start : ndarray of bool, shape (n,)
         What the output looks at itself.
     """
-    found = start
+    result = start
     while True:
-        more = found | depends[found].any(axis=0)
-        if (more == found).all():
-            return found
-        found = more
+        more = result | depends[result].any(axis=0)
+        if (more == result).all():
+            return result
+        result = more
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,8 @@ class Compliance:
         for A, B, C, D in steps:
             total = total + C @ p + D
             p = (A @ p + B) / points
-        found = total[..., 0, 0] / len(steps)
-        return np.asarray(found[..., 0] if np.ndim(z) == 0 else found)
+        result = total[..., 0, 0] / len(steps)
+        return np.asarray(result[..., 0] if np.ndim(z) == 0 else result)
 
     @property
     def slowest(self) -> Any:

@@ -42,10 +42,10 @@ def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **nam
 
 def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[DelaySystem]:
     """The system from an input, and from its derivatives where the flow has them (ideal form)."""
-    found = [delay_system(flow, name, signal, scale) for name in RATES.get(source, (source,))]
-    while len(found) > 1 and not (np.any(found[-1].B1) or np.any(found[-1].D11)):
-        found.pop()
-    return found
+    result = [delay_system(flow, name, signal, scale) for name in RATES.get(source, (source,))]
+    while len(result) > 1 and not (np.any(result[-1].B1) or np.any(result[-1].D11)):
+        result.pop()
+    return result
 
 
 def joined(parts: list[DelaySystem]) -> DelaySystem:

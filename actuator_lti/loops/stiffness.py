@@ -45,8 +45,8 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> found = stiffness_figures(load_design("fin"))
-    >>> f"{found.static_stiffness_Nm_rad:.0f} N m/rad, {1e3 * found.lost_motion_rad:.3f} mrad"
+    >>> result = stiffness_figures(load_design("fin"))
+    >>> f"{result.static_stiffness_Nm_rad:.0f} N m/rad, {1e3 * result.lost_motion_rad:.3f} mrad"
     '1324 N m/rad, 1.625 mrad'
     """
     response = compliance(design)

@@ -31,7 +31,7 @@ _REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries ch
 
 
 def certified_delayed_margins(
-    form: DelayForm, found: StabilityMargins, band: tuple[float, float] | None
+    form: DelayForm, margins: StabilityMargins, band: tuple[float, float] | None
 ) -> StabilityMargins:
     """Certify a result of `delayed_margins`: crossings, verdict and bounds of both distances anew.
 
@@ -50,17 +50,17 @@ def certified_delayed_margins(
             problem = problem or difference(gains, near_gains, "|L| = 1")
             problem = problem or difference(reals, near_reals, "the real axis")
         if problem is None:
-            found = _with_distances(Axis(exact_delay_loop(form)), found)
-    agreement = Agreement(unstable, found.agreement.unstable_nyquist)
+            margins = _with_distances(Axis(exact_delay_loop(form)), margins)
+    agreement = Agreement(unstable, margins.agreement.unstable_nyquist)
     if problem is not None or not agreement.agree:
-        return withheld(replace(found, agreement=agreement), problem or "poles and Nyquist count disagree")
-    low, high = found.band_rad_s
+        return withheld(replace(margins, agreement=agreement), problem or "poles and Nyquist count disagree")
+    low, high = margins.band_rad_s
     phase_margins = tuple(
         PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w) for c in gains if low <= c.w <= high
     )
     stable, verdict = verdict_of(agreement)
     return replace(
-        found,
+        margins,
         stable=stable,
         verdict=verdict,
         gain_margins=tuple(GainMargin(1.0 / abs(c.L), c.w) for c in reals if low <= c.w <= high),
@@ -72,22 +72,22 @@ def certified_delayed_margins(
     )
 
 
-def _with_distances(axis: Axis, found: StabilityMargins) -> StabilityMargins:
+def _with_distances(axis: Axis, margins: StabilityMargins) -> StabilityMargins:
     """Both smallest distances, confirmed or corrected."""
-    assert found.modulus_margin is not None
-    assert found.modulus_frequency_rad_s is not None
-    assert found.disk_margin is not None
-    modulus = _distance(axis, (found.modulus_margin, found.modulus_frequency_rad_s), 1.0)
-    disk = _distance(axis, (found.disk_margin.alpha, found.disk_margin.frequency_rad_s), 2.0)
+    assert margins.modulus_margin is not None
+    assert margins.modulus_frequency_rad_s is not None
+    assert margins.disk_margin is not None
+    modulus = _distance(axis, (margins.modulus_margin, margins.modulus_frequency_rad_s), 1.0)
+    disk = _distance(axis, (margins.disk_margin.alpha, margins.disk_margin.frequency_rad_s), 2.0)
     return replace(
-        found, modulus_margin=modulus[0], modulus_frequency_rad_s=modulus[1], disk_margin=DiskMargin(*disk)
+        margins, modulus_margin=modulus[0], modulus_frequency_rad_s=modulus[1], disk_margin=DiskMargin(*disk)
     )
 
 
-def withheld(found: StabilityMargins, reason: str) -> StabilityMargins:
+def withheld(margins: StabilityMargins, reason: str) -> StabilityMargins:
     """The same without any figure."""
     return replace(
-        found, stable=None, verdict="undecided", gain_margins=(), phase_margins=(), delay_margins=(),
+        margins, stable=None, verdict="undecided", gain_margins=(), phase_margins=(), delay_margins=(),
         modulus_margin=None, modulus_frequency_rad_s=None, disk_margin=None,
         evidence="withheld", evidence_reason=reason,
     )  # fmt: skip
@@ -176,13 +176,13 @@ def _size(p: fmpq_poly, x: float) -> arb:
     return total
 
 
-def _distance(axis: Axis, found: tuple[float, float], at_end: float) -> tuple[float, float]:
+def _distance(axis: Axis, result: tuple[float, float], at_end: float) -> tuple[float, float]:
     """The smallest distance and its place: no zero of the distance less that value, or a smaller one.
 
     Under a delay 1 + L comes nearer than at infinity somewhere, however far; the last of `_AT_END` is how
     small a difference is looked for.
     """
-    start, (value, w) = _lowest(axis.loop), found
+    start, (value, w) = _lowest(axis.loop), result
     for level in (*_AT_END, 1.0 - _SLACK):
         for _ in range(_ROUNDS):
             below = min(value * (1.0 - _SLACK), level * at_end)

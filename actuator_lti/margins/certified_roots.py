@@ -70,15 +70,15 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
             return [(root, n) for factor, n in square_free(p) for root in _roots_of_factor(factor)]
         except NotIsolated:
             pass  # the library parts any roots, in its time
-    found: Any = p.complex_roots()
-    return [(acb(root), times) for root, times in found]
+    result: Any = p.complex_roots()
+    return [(acb(root), times) for root, times in result]
 
 
 def _roots_of_factor(p: fmpz_poly) -> list[acb]:
     if p.degree() > _HIGH:
         return isolated_roots(p)
-    found: Any = p.complex_roots()
-    return [acb(root) for root, _ in found]
+    result: Any = p.complex_roots()
+    return [acb(root) for root, _ in result]
 
 
 def sign_changes(p: fmpz_poly) -> int:

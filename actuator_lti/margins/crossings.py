@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from actuator_lti.margins.circles import Circles, on_axis, unwarped, warped
+from actuator_lti.margins.level_crossings import LevelCrossings, on_axis, unwarped, warped
 from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
 from actuator_lti.margins.trust import Doubtful
 
@@ -49,12 +49,12 @@ class _Candidates:
     samples: Real  # one more than x
 
 
-def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real) -> Crossings:
+def find_crossings(loop: RationalLoop, levels: LevelCrossings, typical_x: Real) -> Crossings:
     """Find every crossing of the unit circle and of the real axis with 0 < x < end.
 
     Parameters
     ----------
-    loop, circles : RationalLoop, Circles
+    loop, levels : RationalLoop, LevelCrossings
         At least one state, no pole on the border but at zero frequency.
     typical_x : array
         Further frequencies at which to look at the signs.
@@ -64,7 +64,7 @@ def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real) -> Cro
     Doubtful
         Changes of sign and eigenvalues do not tell the same crossings.
     """
-    gain_zeros, real_zeros = circles.circle(1.0, 0.0, -1.0), circles.real_axis()
+    gain_zeros, real_zeros = levels.circle(1.0, 0.0, -1.0), levels.real_axis()
     if gain_zeros is None or real_zeros is None:
         raise Doubtful("the gain is one, or the phase zero, at every frequency")
     gain = _candidates(gain_zeros, loop.in_z)
@@ -85,19 +85,19 @@ def find_crossings(loop: RationalLoop, circles: Circles, typical_x: Real) -> Cro
     return Crossings(root[:k], value[:k], root[k:], value[k:], x, L)
 
 
-def gain_crossings(loop: RationalLoop, circles: Circles) -> Real:
+def gain_crossings(loop: RationalLoop, levels: LevelCrossings) -> Real:
     """Only the crossings of the unit circle, 0 < x < end, points of touch left out; no border poles."""
     try:
-        zeros = circles.circle(1.0, 0.0, -1.0)
+        zeros = levels.circle(1.0, 0.0, -1.0)
         if zeros is None:
             return np.empty(0)
-        found = _candidates(zeros, loop.in_z)
-        if not found.x.size:
+        result = _candidates(zeros, loop.in_z)
+        if not result.x.size:
             return np.empty(0)
-        x = found.samples
+        x = result.samples
         hit = np.flatnonzero(_changes(np.abs(loop.response(x)) > 1.0))
-        root, _ = _polish(loop, found.x[hit], x[hit], x[hit + 1], hit.size)
-        _told_twice(loop, found, root, True)
+        root, _ = _polish(loop, result.x[hit], x[hit], x[hit + 1], hit.size)
+        _told_twice(loop, result, root, True)
     except (Doubtful, np.linalg.LinAlgError):
         return _exact_gain_crossings(loop)
     return root
@@ -115,12 +115,12 @@ def _changes(side: Mask) -> Mask:
     return side[1:] != side[:-1]
 
 
-def _start(found: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
+def _start(candidates: _Candidates, x: Real, hit: NDArray[np.intp]) -> Real:
     """Where Newton starts in each interval [x[k], x[k + 1]]: its candidate, or its middle."""
     low, high = x[hit], x[hit + 1]
-    if not found.x.size:
+    if not candidates.x.size:
         return np.sqrt(low * high)
-    at = found.x[np.minimum(np.searchsorted(found.x, low), found.x.size - 1)]
+    at = candidates.x[np.minimum(np.searchsorted(candidates.x, low), candidates.x.size - 1)]
     return np.where((at > low) & (at < high), at, np.sqrt(low * high))
 
 
@@ -139,11 +139,11 @@ def _candidates(zeros: Complex, in_z: bool) -> _Candidates:
     return _Candidates(unwarped(w, in_z), off_axis, unwarped(samples, in_z))
 
 
-def _told_twice(loop: RationalLoop, found: _Candidates, root: Real, gain: bool) -> None:
+def _told_twice(loop: RationalLoop, candidates: _Candidates, root: Real, gain: bool) -> None:
     """Every crossing has its eigenvalue; every eigenvalue on the axis and near the line has its crossing."""
-    w, at = warped(root, loop.in_z), warped(found.x, loop.in_z)
+    w, at = warped(root, loop.in_z), warped(candidates.x, loop.in_z)
     lonely = _apart(w, at).any()
-    open_x = found.x[(found.off_axis <= _POSSIBLE_TOUCH) & _apart(at, w)]
+    open_x = candidates.x[(candidates.off_axis <= _POSSIBLE_TOUCH) & _apart(at, w)]
     if open_x.size:  # an eigenvalue of rounding, as those at infinity are, lies where L is not near the line
         L = loop.response(open_x)
         away = np.abs(np.log(np.abs(L))) if gain else np.abs(L.imag) / np.abs(L)

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, cells
-from actuator_lti.margins.delay_setting import Setting, cells_of, dc_value, setting_of
+from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, evaluate_intervals
+from actuator_lti.margins.delay_setting import Setting, dc_value, intervals_of, setting_of
 from actuator_lti.margins.extremes import COMPLEMENTARY, FAR, MODULUS, PEAK, Criterion
 from actuator_lti.margins.loop import Complex, Real
-from actuator_lti.margins.sweep import reach
+from actuator_lti.margins.sweep import variation
 
 _FINEST = 1e-4  # how much lower the smallest distance may be, relative, before it is polished
 _MOST = 400_000
@@ -21,10 +21,10 @@ _MOST = 400_000
 def delayed_extreme(form: DelayForm, criterion: Criterion) -> tuple[float, float]:
     """Smallest value of a criterion over the axis, and where (x)."""
     setting = setting_of(form, None)
-    return smallest_distance(setting, cells_of(setting), criterion)
+    return smallest_distance(setting, intervals_of(setting), criterion)
 
 
-def smallest_distance(setting: Setting, found: Cells, criterion: Criterion) -> tuple[float, float]:
+def smallest_distance(setting: Setting, intervals: Intervals, criterion: Criterion) -> tuple[float, float]:
     """Smallest value of a criterion and its x, from intervals that cover the axis.
 
     Intervals in which the bound allows less than 0.9999 of the best so far are split; the best is polished.
@@ -39,19 +39,19 @@ def smallest_distance(setting: Setting, found: Cells, criterion: Criterion) -> t
     at_ends = criterion.distance(ends_L)
     best, place, half = float(at_ends.min()), float(ends_x[int(at_ends.argmin())]), 0.0
     while True:
-        distance = criterion.distance(found.L)
+        distance = criterion.distance(intervals.L)
         k = int(distance.argmin())
         if distance[k] < best * (1.0 - 1e-12):
-            best, place, half = float(distance[k]), float(found.x[k]), float(found.half[k])
-        again = _lower_bound(criterion, found, reach(form, found)) < best * (1.0 - _FINEST)
+            best, place, half = float(distance[k]), float(intervals.x[k]), float(intervals.half[k])
+        again = _lower_bound(criterion, intervals, variation(form, intervals)) < best * (1.0 - _FINEST)
         count += int(np.count_nonzero(again))
         if best < 1e-9 or not again.any():
             return _polished(form, criterion, best, place, half)
         if count > _MOST:
             raise NumericalError("the smallest distance to -1 was not settled: too many turns of the delay")
-        low, high = (found.x - found.half)[again], (found.x + found.half)[again]
+        low, high = (intervals.x - intervals.half)[again], (intervals.x + intervals.half)[again]
         middle = 0.5 * (low + high)
-        found = cells(form, np.concatenate((low, middle)), np.concatenate((middle, high)))
+        intervals = evaluate_intervals(form, np.concatenate((low, middle)), np.concatenate((middle, high)))
 
 
 def _polished(
@@ -66,8 +66,8 @@ def _polished(
     low, high = max(place - 4.0 * half, 0.5 * place), place + 4.0 * half
     if form.sampled:
         high = min(high, math.pi)
-    found = minimize_scalar(at, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
-    return (float(found.fun), float(found.x)) if found.fun < best else (best, place)
+    minimum = minimize_scalar(at, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})
+    return (float(minimum.fun), float(minimum.x)) if minimum.fun < best else (best, place)
 
 
 def _end_values(setting: Setting) -> tuple[list[float], Complex]:
@@ -82,11 +82,11 @@ def _end_values(setting: Setting) -> tuple[list[float], Complex]:
     return x, np.array(L, dtype=complex)
 
 
-def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
+def _lower_bound(criterion: Criterion, intervals: Intervals, R: Real) -> Real:
     """What the criterion cannot fall below inside each interval: by the disk about L, or by its gain."""
-    size = np.abs(found.L)
-    least, most = np.maximum(size - found.spread, 0.0), size + found.spread
-    distance, away = criterion.distance(found.L), np.abs(1.0 - found.L)
+    size = np.abs(intervals.L)
+    least, most = np.maximum(size - intervals.spread, 0.0), size + intervals.spread
+    distance, away = criterion.distance(intervals.L), np.abs(1.0 - intervals.L)
     with np.errstate(divide="ignore", invalid="ignore"):
         if criterion is PEAK:
             return 1.0 / most
@@ -98,6 +98,6 @@ def _lower_bound(criterion: Criterion, found: Cells, R: Real) -> Real:
             return np.maximum(distance - R, by_gain)
         by_disk = np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
         # about L = 1, where the criterion has its pole: a servo whose gain at rest is one starts there
-        by_disk = np.maximum(by_disk, 2.0 * (np.abs(1.0 + found.L) - R) / (away + R))
+        by_disk = np.maximum(by_disk, 2.0 * (np.abs(1.0 + intervals.L) - R) / (away + R))
         by_gain = np.maximum(2.0 * (1.0 - most) / (1.0 + most), 2.0 * (least - 1.0) / (least + 1.0))
         return np.maximum(by_disk, by_gain)

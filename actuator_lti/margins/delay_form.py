@@ -56,7 +56,7 @@ class DelayForm:
 
 
 @dataclass(frozen=True)
-class Cells:
+class Intervals:
     """Values at the middle of intervals, and how far the curve can be from them inside.
 
     Attributes
@@ -134,18 +134,20 @@ def border_values(form: DelayForm, x: Real) -> Complex:
     return values(form, np.exp(1j * x) if form.sampled else 1j * x)
 
 
-def cells(form: DelayForm, low: Real, high: Real) -> Cells:
+def evaluate_intervals(form: DelayForm, low: Real, high: Real) -> Intervals:
     """Evaluate the loop in the middle of each interval [low, high], with the bound of its change inside.
 
     With F(x) X = b the solution inside is X + dX, dX = -F^-1 dF (X + dX) and abs(dF) <= half K entry by
     entry: a Neumann series in a weighted norm bounds dX wherever the interval is short enough.
     """
     parts = [
-        _cells(form, low[k : k + _CHUNK], high[k : k + _CHUNK]) for k in range(0, max(low.size, 1), _CHUNK)
+        _evaluate(form, low[k : k + _CHUNK], high[k : k + _CHUNK]) for k in range(0, max(low.size, 1), _CHUNK)
     ]
     if len(parts) == 1:
         return parts[0]
-    return Cells(*(np.concatenate([getattr(p, name) for p in parts]) for name in Cells.__dataclass_fields__))
+    return Intervals(
+        *(np.concatenate([getattr(p, name) for p in parts]) for name in Intervals.__dataclass_fields__)
+    )
 
 
 def _matrix(form: DelayForm, points: Complex) -> tuple[Complex, Complex]:
@@ -182,7 +184,7 @@ def _output(form: DelayForm, lag: Complex) -> Complex:
     return row
 
 
-def _cells(form: DelayForm, low: Real, high: Real) -> Cells:
+def _evaluate(form: DelayForm, low: Real, high: Real) -> Intervals:
     x, half = 0.5 * (low + high), 0.5 * (high - low)
     n, q = form.B1.size, form.delays.size
     points = np.exp(1j * x) if form.sampled else 1j * x
@@ -203,7 +205,7 @@ def _cells(form: DelayForm, low: Real, high: Real) -> Cells:
     else:
         spread = _spread(form, half, np.abs(inverse), np.abs(X), np.abs(Y), q)
     back = np.exp(-1j * x * form.series)
-    return Cells(x, half, L0 * back, (slope0 - 1j * form.series * L0) * back, spread)
+    return Intervals(x, half, L0 * back, (slope0 - 1j * form.series * L0) * back, spread)
 
 
 def _relative_spread(points: Complex, half: Real, zeros: Complex, poles: Complex) -> Real:

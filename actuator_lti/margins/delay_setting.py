@@ -9,11 +9,11 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.collocation import open_loop_matrix
-from actuator_lti.margins.delay_form import Cells, DelayForm, border_values
+from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import slope_at_dc
 from actuator_lti.margins.poles import BorderPole, SortedPoles, sorted_poles
-from actuator_lti.margins.sweep import RESOLVED, reach, subdivided
+from actuator_lti.margins.sweep import RESOLVED, subdivided, variation
 
 FLOOR = 0.01  # gain below which no crossing of the real axis is listed: 40 dB
 _PER_DECADE = 12
@@ -178,24 +178,24 @@ def _tail(form: DelayForm, start: float) -> float:
     )
 
 
-def excluded(found: Cells, R: Real, setting: Setting) -> tuple[Mask, Mask]:
+def excluded(intervals: Intervals, R: Real, setting: Setting) -> tuple[Mask, Mask]:
     """Intervals that hold no crossing of the unit circle; none of the negative real axis."""
-    size = np.abs(found.L)
-    no_gain = (size - found.spread > 1.0) | (size + found.spread < 1.0)
-    to_axis = np.where(found.L.real < 0.0, np.abs(found.L.imag), size)
-    beyond = found.x - found.half > setting.listed_to
+    size = np.abs(intervals.L)
+    no_gain = (size - intervals.spread > 1.0) | (size + intervals.spread < 1.0)
+    to_axis = np.where(intervals.L.real < 0.0, np.abs(intervals.L.imag), size)
+    beyond = intervals.x - intervals.half > setting.listed_to
     return no_gain, (to_axis > R) | ((size + R < setting.floor) & beyond)
 
 
-def cells_of(setting: Setting) -> Cells:
+def intervals_of(setting: Setting) -> Intervals:
     """Intervals over the whole axis in which every crossing and every turn about -1 is resolved."""
     form = setting.form
 
-    def resolved(found: Cells) -> Mask:
-        R = reach(form, found)
-        no_gain, no_phase = excluded(found, R, setting)
-        size = np.abs(found.L)
-        followed = (0.7 * np.abs(1.0 + found.L) > R) | (size + found.spread < _NO_TURN)
+    def resolved(intervals: Intervals) -> Mask:
+        R = variation(form, intervals)
+        no_gain, no_phase = excluded(intervals, R, setting)
+        size = np.abs(intervals.L)
+        followed = (0.7 * np.abs(1.0 + intervals.L) > R) | (size + intervals.spread < _NO_TURN)
         return followed & ((RESOLVED * size >= R) | (no_gain & no_phase))
 
     decades = max(math.log10(setting.high / setting.low), 0.1)

@@ -11,8 +11,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins, verdict_of
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
-from actuator_lti.margins.delay_form import Cells, DelayForm, border_values, values
-from actuator_lti.margins.delay_setting import FLOOR, Setting, cells_of, dc_value, excluded, setting_of
+from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, values
+from actuator_lti.margins.delay_setting import FLOOR, Setting, dc_value, excluded, intervals_of, setting_of
 from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
@@ -24,7 +24,7 @@ from actuator_lti.margins.results import (
     PhaseMargin,
     StabilityMargins,
 )
-from actuator_lti.margins.sweep import GAIN, PHASE, crossings, reach
+from actuator_lti.margins.sweep import GAIN, PHASE, crossings, variation
 
 _BESIDE = 1e-3  # of the next pole: this near to zero lies the hidden one, collocated
 
@@ -34,14 +34,14 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     if form.series_s == 0.0 and abs(1.0 + form.D11) <= 1e-12:
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     setting = setting_of(form, band_rad_s)
-    found = cells_of(setting)
-    R = reach(form, found)
-    no_gain, no_phase = excluded(found, R, setting)
-    gain_x, gain_touch = crossings(form, found, GAIN, no_gain)
-    phase_x, phase_touch = crossings(form, found, PHASE, no_phase)
-    count = _nyquist(setting, found)
-    agreement = _agreement(setting, count, found, float(gain_x.max()) if gain_x.size else 0.0)
-    distances = [smallest_distance(setting, found, criterion) for criterion in (MODULUS, DISK)]
+    intervals = intervals_of(setting)
+    R = variation(form, intervals)
+    no_gain, no_phase = excluded(intervals, R, setting)
+    gain_x, gain_touch = crossings(form, intervals, GAIN, no_gain)
+    phase_x, phase_touch = crossings(form, intervals, PHASE, no_phase)
+    count = _nyquist(setting, intervals)
+    agreement = _agreement(setting, count, intervals, float(gain_x.max()) if gain_x.size else 0.0)
+    distances = [smallest_distance(setting, intervals, criterion) for criterion in (MODULUS, DISK)]
     return _assembled(setting, band_rad_s, agreement, (gain_x, gain_touch), (phase_x, phase_touch), distances)
 
 
@@ -49,16 +49,18 @@ def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
     """Frequencies at which the gain crosses ``level``, in order (x)."""
     scaled = replace(form, C1=form.C1 / level, D11=form.D11 / level, D12=form.D12 / level)
     setting = setting_of(scaled, None)
-    found = cells_of(setting)
-    x, touch = crossings(scaled, found, GAIN, excluded(found, reach(scaled, found), setting)[0])
+    intervals = intervals_of(setting)
+    x, touch = crossings(
+        scaled, intervals, GAIN, excluded(intervals, variation(scaled, intervals), setting)[0]
+    )
     return x[~touch].tolist() if x.size else []
 
 
-def _nyquist(setting: Setting, found: Cells) -> int | None:
+def _nyquist(setting: Setting, intervals: Intervals) -> int | None:
     form = setting.form
     if any(pole.x > 0.0 for pole in setting.open_poles.border):
         return None
-    F = 1.0 + found.L
+    F = 1.0 + intervals.L
     angle = float(np.angle(F[1:] * F[:-1].conj()).sum())
     if setting.order:
         r = setting.low
@@ -73,7 +75,7 @@ def _nyquist(setting: Setting, found: Cells) -> int | None:
     return setting.open_poles.unstable - round(angle / np.pi)
 
 
-def _agreement(setting: Setting, count: int | None, found: Cells, crossover: float) -> Agreement:
+def _agreement(setting: Setting, count: int | None, intervals: Intervals, crossover: float) -> Agreement:
     form = setting.form
     if form.sampled:
         return Agreement(None, count)

@@ -11,7 +11,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.certified_roots import all_roots
 from actuator_lti.margins.exact_findings import Crossing, Findings
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.loop import Complex, Mask, Real
 
 FAR_DB = 30.0
 _FAR = 10.0 ** (FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
@@ -27,8 +27,10 @@ class Settled:
 
     Attributes
     ----------
-    unstable, border : int
-        Closed-loop poles outside the stable region, and on its border as far as the data tell.
+    unstable : int or None
+        Closed-loop poles outside the stable region; ``None`` where the data do not tell.
+    border : int
+        Closed-loop poles exactly on the border.
     hidden_at_dc : int
         Modes at zero frequency that the loop does not show.
     gains, reals : tuple of Crossing
@@ -41,7 +43,7 @@ class Settled:
         Why no answer is given.
     """
 
-    unstable: int
+    unstable: int | None
     border: int
     hidden_at_dc: int
     gains: tuple[Crossing, ...]
@@ -111,7 +113,7 @@ def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
     return max(abs(other.w / c.w - 1.0), abs(other.L / c.L - 1.0))
 
 
-def _poles(base: Findings, others: list[Findings]) -> tuple[int, int, int, str | None]:
+def _poles(base: Findings, others: list[Findings]) -> tuple[int | None, int, int, str | None]:
     hidden = base.hidden.at_zero
     if hidden > 1 or base.hidden.border or base.loop.hidden_degree > base.loop.hidden.degree():
         where = "at zero frequency are" if hidden > 1 else "on the border of stability are"
@@ -131,36 +133,47 @@ def _values(f: Findings, closed: bool) -> Complex:
     """Poles in the s-plane, hidden ones and those at zero among them."""
     p = (f.loop.closed if closed else f.loop.D) * f.loop.hidden
     zeros = next(k for k in range(p.degree() + 1) if p[k] != 0)
-    found = [complex(root) for root, times in all_roots(p) for _ in range(times)]
-    return np.array([0j] * zeros + found)
+    result = [complex(root) for root, times in all_roots(p) for _ in range(times)]
+    return np.array([0j] * zeros + result)
 
 
-def _by_movement(base: Findings, others: list[Findings], closed: Complex) -> tuple[int, int, int, str | None]:
-    """Count with each pole's own error: how far it moves among the neighbours."""
+def _by_movement(
+    base: Findings, others: list[Findings], closed: Complex
+) -> tuple[int | None, int, int, str | None]:
+    """Count with each pole's own error: how far it moves among the neighbours.
+
+    On the border is a pole that lies there exactly; one that the neighbours only carry across it may lie on
+    either side, which is no answer. A hidden mode at zero frequency alone is known by its place.
+    """
     radius = _movements(closed, [_values(f, closed=True) for f in others])
-    size = np.abs(closed)
+    size, exact = np.abs(closed), _exactly_on_border(base, closed)
     near = np.abs(closed.real) <= 2.0 * radius
-    unstable = int(np.count_nonzero((closed.real > 0.0) & ~near))
-    border, at_dc = base.closed_at_end, 0
-    for k in np.flatnonzero(near):
-        beyond = size[size > 10.0 * max(radius[k], size[k])]
-        if radius[k] <= _SHARP * size[k] and size[k]:
-            border += 1
-        elif radius[k] <= _SHARP * beyond.min(initial=math.inf):
-            at_dc += 1
-        else:
-            return (
-                unstable,
-                0,
-                0,
-                f"{ULP} ulp of the entries move a closed-loop pole over the border of stability",
-            )
+    unstable = int(np.count_nonzero((closed.real > 0.0) & ~near & ~exact))
+    beyond = [size[size > 10.0 * max(r, s)].min(initial=math.inf) for r, s in zip(radius, size, strict=True)]
+    at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
     shown = _values(base, closed=False)
     spread = _movements(shown, [_values(f, closed=False) for f in others])
-    hidden = min(at_dc, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread + 0.0 * shown.real)))
+    hidden = min(int(np.count_nonzero(at_dc)), int(np.count_nonzero(np.abs(shown) <= 10.0 * spread)))
+    problem = None
     if hidden > 1:
-        return unstable, 0, 0, f"{ULP} ulp of the entries decide about several modes at zero frequency"
-    return unstable, border + at_dc - hidden, hidden, None
+        problem = f"{ULP} ulp of the entries decide about several modes at zero frequency"
+    elif np.count_nonzero(near & ~exact & ~at_dc) or np.count_nonzero(at_dc & ~exact) > hidden:
+        problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+    if problem is not None:
+        return None, 0, 0, problem
+    return unstable, base.closed_at_end + int(np.count_nonzero(exact | at_dc)) - hidden, hidden, None
+
+
+def _exactly_on_border(base: Findings, closed: Complex) -> Mask:
+    """Which of the poles, hidden ones among them, lie exactly on the axis."""
+    found = np.zeros(closed.size, dtype=bool)
+    for part in (base.closed, base.hidden):
+        places = [0j] * part.at_zero
+        for w, times in part.border:
+            places += [complex(0.0, float(w.mid())), complex(0.0, -float(w.mid()))] * times
+        for place in places:
+            found[np.argmin(np.where(found, math.inf, np.abs(closed - place)))] = True
+    return found
 
 
 def _movements(values: Complex, others: list[Complex]) -> Real:

@@ -113,19 +113,19 @@ def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -
     """In double precision, and by certified intervals where the two ways to stability do not both tell."""
     from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
 
-    found = delayed_margins(form, band)
-    told_twice = found.agreement.agree and None not in (
-        found.agreement.unstable_poles,
-        found.agreement.unstable_nyquist,
+    margins = delayed_margins(form, band)
+    told_twice = margins.agreement.agree and None not in (
+        margins.agreement.unstable_poles,
+        margins.agreement.unstable_nyquist,
     )
     if form.sampled or (told_twice and not certify):
-        return found
+        return margins
     try:
-        return certified_delayed_margins(form, found, band)
+        return certified_delayed_margins(form, margins, band)
     except (NumericalError, InputError) as error:
-        if not found.agreement.agree:
-            return withheld(found, f"poles and Nyquist count disagree; {error}")
-        return replace(found, evidence_reason=f"{found.evidence_reason}; not certified: {error}")
+        if not margins.agreement.agree:
+            return withheld(margins, f"poles and Nyquist count disagree; {error}")
+        return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
 
 
 def whole_samples(samples: float) -> int | None:

@@ -11,24 +11,24 @@ from flint import acb, arb
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.exact_delay import ExactDelayLoop, Quasi, at
 
-_MOST_CELLS = 60_000
+_MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
 _NEWTON_STEPS = 60
 _PER_DECADE = 5
 _HIGHEST_ORDER = 16
 _ODD = 0.9137236158
 J = acb(0, 1)
-Jet = tuple[acb, acb, acb]  # value and slope in the middle, second derivative over the cell, by x
+Taylor = tuple[acb, acb, acb]  # value and slope in the middle, second derivative over the interval, by x
 
 
 @dataclass(frozen=True)
-class Cell:
+class Enclosure:
     """An interval of x, with N and D of the loop there."""
 
     low: float
     high: float
-    N: Jet
-    D: Jet
+    N: Taylor
+    D: Taylor
 
     @property
     def half(self) -> arb:
@@ -41,18 +41,18 @@ class Axis:
 
     def __init__(self, loop: ExactDelayLoop) -> None:
         self.loop = loop
-        self._N, self._D = ([f.balls() for f in _jet(Q)] for Q in (loop.N, loop.D))
+        self._N, self._D = ([f.balls() for f in _derivatives(Q)] for Q in (loop.N, loop.D))
 
-    def cell(self, low: float, high: float) -> Cell:
+    def enclosure(self, low: float, high: float) -> Enclosure:
         """Enclosures on [low, high]."""
         middle = 0.5 * (arb(low) + arb(high))
         wide = middle.union(arb(low)).union(arb(high))
         point, ball = acb(0, middle), acb(0, wide)
 
-        def jet(f: list) -> Jet:
+        def taylor(f: list) -> Taylor:
             return at(f[0], point), J * at(f[1], point), -at(f[2], ball)
 
-        return Cell(low, high, jet(self._N), jet(self._D))
+        return Enclosure(low, high, taylor(self._N), taylor(self._D))
 
     def values(self, x: arb) -> tuple[acb, acb]:
         """N and D at one x."""
@@ -71,7 +71,7 @@ class Axis:
         return [0.0, *(low * (high / low) ** (k / count) for k in range(count)), high]
 
 
-def _jet(f: Quasi) -> tuple[Quasi, Quasi, Quasi]:
+def _derivatives(f: Quasi) -> tuple[Quasi, Quasi, Quasi]:
     first = f.derivative()
     return f, first, first.derivative()
 
@@ -100,15 +100,15 @@ class Form:
             + (self.v * both).real
         )
 
-    def curvature(self, N: Jet, D: Jet) -> arb:
-        """The second derivative, from jets that hold over a whole cell."""
+    def curvature(self, N: Taylor, D: Taylor) -> arb:
+        """The second derivative, from Taylor coefficients that hold over a whole interval."""
         both = N[2] * D[0].conjugate() + 2 * N[1] * D[1].conjugate() + N[0] * D[2].conjugate()
         own = [2 * ((f[2] * f[0].conjugate()).real + (f[1] * f[1].conjugate()).real) for f in (N, D)]
         return self.u * own[0] + (self.v * both).real + self.w * own[1]
 
 
-def _over(f: Jet, half: arb) -> Jet:
-    """A jet in the middle made one over the cell."""
+def _over(f: Taylor, half: arb) -> Taylor:
+    """Taylor coefficients in the middle made one over the interval."""
     slope = f[1] + f[2] * half
     return f[0] + f[1] * half + f[2] * (half * half) / 2, slope, f[2]
 
@@ -126,7 +126,7 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
     NumericalError
         Some zero could not be told: a touch, or too many turns.
     """
-    found: list[arb] = []
+    result: list[arb] = []
     stack = [(a, b) for a, b in pairwise(edges)][::-1]
     count = 0
     while stack:
@@ -138,27 +138,27 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
             if not _order_holds(axis, q, high, order_at_zero):
                 stack += [(0.5 * high, high), (0.0, 0.5 * high)]
             continue
-        cell = axis.cell(low, high)
-        value, slope = _enclosed(q, cell)
+        enclosure = axis.enclosure(low, high)
+        value, slope = _enclosed(q, enclosure)
         if value > 0 or value < 0:
             continue
         if slope > 0 or slope < 0:
-            found += _root(axis, q, low, high)
+            result += _root(axis, q, low, high)
             continue
-        if count > _MOST_CELLS or high - low < _NARROWEST * high:
+        if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
             raise NumericalError(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]
-    return found
+    return result
 
 
-def _enclosed(q: Form, cell: Cell) -> tuple[arb, arb]:
-    """The value and the slope over a cell."""
-    half = cell.half
-    N, D = _over(cell.N, half), _over(cell.D, half)
+def _enclosed(q: Form, enclosure: Enclosure) -> tuple[arb, arb]:
+    """The value and the slope over an interval."""
+    half = enclosure.half
+    N, D = _over(enclosure.N, half), _over(enclosure.D, half)
     curvature = q.curvature(N, D)
-    slope = q.slope(cell.N[0], cell.D[0], cell.N[1], cell.D[1])
-    value = q.at(cell.N[0], cell.D[0]) + slope * half + curvature * (half * half) / 2
+    slope = q.slope(enclosure.N[0], enclosure.D[0], enclosure.N[1], enclosure.D[1])
+    value = q.at(enclosure.N[0], enclosure.D[0]) + slope * half + curvature * (half * half) / 2
     return value, slope + curvature * half
 
 
@@ -227,9 +227,13 @@ def turn(axis: Axis, edges: list[float]) -> arb:
     while stack:
         low, high = stack.pop()
         count += 1
-        cell = axis.cell(low, high)
-        F: Jet = (cell.N[0] + cell.D[0], cell.N[1] + cell.D[1], cell.N[2] + cell.D[2])
-        ball = _over(F, cell.half)[0] / F[0] if not F[0].contains(0) else acb(0)
+        enclosure = axis.enclosure(low, high)
+        F: Taylor = (
+            enclosure.N[0] + enclosure.D[0],
+            enclosure.N[1] + enclosure.D[1],
+            enclosure.N[2] + enclosure.D[2],
+        )
+        ball = _over(F, enclosure.half)[0] / F[0] if not F[0].contains(0) else acb(0)
         if ball.real > 0:
             here = sum(axis.values(arb(high)), acb(0))
             total += (
@@ -239,7 +243,7 @@ def turn(axis: Axis, edges: list[float]) -> arb:
             )
             last = here
             continue
-        if count > _MOST_CELLS or high - low < _NARROWEST * high:
+        if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
             raise NumericalError(f"1 + L could not be told from zero near {low:.10g} rad/s")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.circles import Circles, on_axis, unwarped
+from actuator_lti.margins.level_crossings import LevelCrossings, on_axis, unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
 _BELOW = 1e-8  # relative: how much lower a second place may be without being found
@@ -70,7 +70,7 @@ DISK = Criterion(_disk_distance, _disk_derivatives, _disk_circle)
 
 
 def smallest(
-    loop: RationalLoop, circles: Circles, criterion: Criterion, x: Real, L: Complex, top: float
+    loop: RationalLoop, levels: LevelCrossings, criterion: Criterion, x: Real, L: Complex, top: float
 ) -> tuple[float, float]:
     """Smallest value of a criterion over the axis and where: a local search, confirmed by eigenvalues.
 
@@ -90,7 +90,7 @@ def smallest(
     for _ in range(_ROUNDS):
         if value <= _BELOW:
             return value, best
-        zeros = circles.circle(*criterion.circle(value * (1.0 - _BELOW)))
+        zeros = levels.circle(*criterion.circle(value * (1.0 - _BELOW)))
         if zeros is None:
             return value, best
         w = on_axis(zeros).imag
@@ -116,7 +116,7 @@ def _refined(
         return value, best
     at = best
     for _ in range(_NEWTON_STEPS):
-        L0, L1, L2 = loop.jet(at)
+        L0, L1, L2 = loop.derivatives(at)
         G, G_L, G_LL = criterion.derivatives(L0)
         G1 = G_L * L1
         G2 = G_L * L2 + G_LL * L1 * L1

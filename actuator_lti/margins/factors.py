@@ -25,8 +25,8 @@ def zeros(loop: RationalLoop) -> Complex:
     alpha, beta = eigvals(M, N, homogeneous_eigvals=True)
     size = max(float(np.abs(loop.A).max()), 1.0)
     finite = np.abs(beta) * _INFINITE * size > np.abs(alpha)
-    found = alpha[finite] / beta[finite]
-    return found[: max(n if loop.d else n - 1, 0)] if found.size > n else found
+    result = alpha[finite] / beta[finite]
+    return result[: max(n if loop.d else n - 1, 0)] if result.size > n else result
 
 
 def poles(loop: RationalLoop) -> Complex:

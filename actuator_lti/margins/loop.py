@@ -117,7 +117,7 @@ class RationalLoop:
             X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
         return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
 
-    def jet(self, x: float) -> tuple[complex, complex, complex]:
+    def derivatives(self, x: float) -> tuple[complex, complex, complex]:
         """L and its first two derivatives by x at one point."""
         if self.order == 0:
             return complex(self.d), 0j, 0j

@@ -45,14 +45,14 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
     """
     response = measured_response(data)
     omega, L, radius = _points(response, band_rad_s)
-    found = bounds(omega, L, radius, delay_s)
-    _refuse_coarse(omega, L, found)
+    result = bounds(omega, L, radius, delay_s)
+    _refuse_coarse(omega, L, result)
     L = L * np.exp(-1j * omega * delay_s)
-    phase_margins, grazed = _phase_margins(omega, found)
-    gain_margins, touched = _gain_margins(omega, found)
+    phase_margins, grazed = _phase_margins(omega, result)
+    gain_margins, touched = _gain_margins(omega, result)
     distance, alpha = np.abs(1.0 + L), DISK.distance(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
-    modulus_range, alpha_range = distance_ranges(L, radius, found)
+    modulus_range, alpha_range = distance_ranges(L, radius, result)
     noise = f"noise: {response.source}" if radius.any() else _QUIET
     return StabilityMargins(
         stable=None,
@@ -70,7 +70,7 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
         evidence_reason="measured points: the figures lie in their ranges, stability is not told",
-        notes=(*_NOTES, noise, *_hidden(omega, found), *_lost(omega, found), *grazed, *touched),
+        notes=(*_NOTES, noise, *_hidden(omega, result), *_lost(omega, result), *grazed, *touched),
     )
 
 
@@ -90,13 +90,13 @@ def _points(data: MeasuredResponse, band: tuple[float, float] | None) -> tuple[R
     return omega, L, radius
 
 
-def _refuse_coarse(omega: Real, L: Complex, found: Bounds) -> None:
-    if np.count_nonzero(found.unresolved) <= _MOST_UNRESOLVED * found.unresolved.size:
+def _refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
+    if np.count_nonzero(result.unresolved) <= _MOST_UNRESOLVED * result.unresolved.size:
         return
-    k = int(found.unresolved.argmax())
+    k = int(result.unresolved.argmax())
     ratio = L[k + 1] / L[k]
     raise InputError(
-        f"measured data are too coarse: {np.count_nonzero(found.unresolved)} of {found.unresolved.size} "
+        f"measured data are too coarse: {np.count_nonzero(result.unresolved)} of {result.unresolved.size} "
         f"intervals turn by more than 60 deg or 10 dB, the first between {omega[k]:.6g} and "
         f"{omega[k + 1]:.6g} rad/s ({np.degrees(np.angle(ratio)):+.1f} deg, "
         f"{20.0 * math.log10(abs(ratio)):+.1f} dB); measure more points"
@@ -156,13 +156,13 @@ def _passed(strip: Strip, level: float, group: _Group) -> tuple[int, float] | No
     return first + k, float(part[k] / (part[k] - part[k + 1]))
 
 
-def _phase_margins(omega: Real, found: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
+def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
     out, notes = [], []
-    gain, phase = found.log_gain, found.phase
+    gain, phase = result.log_gain, result.phase
     for group in _groups(gain, 0.0):
         at = _passed(gain, 0.0, group)
         if at is None:
-            if not found.unresolved[group.first : group.last + 1].all():  # told already
+            if not result.unresolved[group.first : group.last + 1].all():  # told already
                 notes.append(
                     f"{group.text(omega)} the gain comes as near to one as it is known: "
                     "crossings there are neither sure nor excluded"
@@ -179,20 +179,20 @@ def _phase_margins(omega: Real, found: Bounds) -> tuple[tuple[PhaseMargin, ...],
     return tuple(out), notes
 
 
-def _gain_margins(omega: Real, found: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
+def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
     out, notes = [], []
-    gain, phase = found.log_gain, found.phase
+    gain, phase = result.log_gain, result.phase
     lowest, highest = float(phase.low.min()), float(phase.high.max())
     for m in range(
         math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
     ):
         level = (2 * m + 1) * math.pi
         for group in _groups(phase, level):
-            if found.lost[group.first : group.last + 2].any():
+            if result.lost[group.first : group.last + 2].any():
                 continue
             at = _passed(phase, level, group)
             if at is None:
-                if not found.unresolved[group.first : group.last + 1].all():  # told already
+                if not result.unresolved[group.first : group.last + 1].all():  # told already
                     notes.append(
                         f"{group.text(omega)} the phase comes as near to -180 deg as it is known: "
                         "crossings there are neither sure nor excluded"
@@ -211,12 +211,12 @@ def _inverse(log_gain: float) -> float:
     return math.exp(-log_gain) if log_gain > -700.0 else math.inf
 
 
-def _hidden(omega: Real, found: Bounds) -> list[str]:
+def _hidden(omega: Real, result: Bounds) -> list[str]:
     """Notes on what lies between two points."""
     notes = []
-    places = np.flatnonzero(found.unresolved)
+    places = np.flatnonzero(result.unresolved)
     for k in places[:_TOLD].tolist():
-        deg = math.degrees(found.turn[k])
+        deg = math.degrees(result.turn[k])
         what = "a resonance" if deg < -25.0 else "an antiresonance" if deg > 25.0 else "something steep"
         if abs(deg) > 140.0:
             what = "a resonance or an antiresonance"
@@ -231,10 +231,10 @@ def _hidden(omega: Real, found: Bounds) -> list[str]:
     return notes
 
 
-def _lost(omega: Real, found: Bounds) -> list[str]:
-    if not found.lost.any():
+def _lost(omega: Real, result: Bounds) -> list[str]:
+    if not result.lost.any():
         return []
-    first, count = omega[found.lost.argmax()], np.count_nonzero(found.lost)
+    first, count = omega[result.lost.argmax()], np.count_nonzero(result.lost)
     return [
         f"{count} values are smaller than their noise, the first at {first:.6g} rad/s: no gain margin there"
     ]

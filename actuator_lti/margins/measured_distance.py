@@ -11,14 +11,14 @@ _PIECES = 32  # of an interval between two points
 Range = tuple[float, float]
 
 
-def distance_ranges(L: Complex, radius: Real, found: Bounds) -> tuple[Range, Range]:
+def distance_ranges(L: Complex, radius: Real, bounds: Bounds) -> tuple[Range, Range]:
     """Ranges of min |1 + L| and of min |2 (1 + L)/(1 - L)| over the measured band.
 
     From below: the nearest place of every strip between two points, a piece of a ring about the origin. From
     above: the circle of a measured point, which holds the true value.
     """
-    low, high = _pieces(found.log_gain)
-    first, last = _pieces(found.phase)
+    low, high = _pieces(bounds.log_gain)
+    first, last = _pieces(bounds.phase)
     with np.errstate(over="ignore"):
         a, b = np.exp(low), np.exp(high)
     cos = np.cos(_from_minus_one(first, last))

@@ -48,7 +48,7 @@ def slope_at_dc(response: Callable[[Real], Complex], start: float, most: int) ->
 
 
 def nyquist_count(
-    loop: RationalLoop, found: Crossings, poles: SortedPoles, L_dc: complex, L_end: complex
+    loop: RationalLoop, crossings: Crossings, poles: SortedPoles, L_dc: complex, L_end: complex
 ) -> int:
     """Number of unstable closed-loop poles: open-loop ones less the turns of 1 + L about the origin.
 
@@ -61,8 +61,8 @@ def nyquist_count(
     L_dc, L_end : complex
         L at the ends of the axis; ``L_dc`` where it has no pole there.
     """
-    x = np.concatenate((found.between_x, found.real_x))
-    F = 1.0 + np.concatenate((found.between_L, found.real_L.real))
+    x = np.concatenate((crossings.between_x, crossings.real_x))
+    F = 1.0 + np.concatenate((crossings.between_L, crossings.real_L.real))
     F = F[x.argsort()]
     angle, first = 0.0, complex(1.0 + L_dc.real)
     if poles.at_dc:

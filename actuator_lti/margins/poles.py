@@ -121,9 +121,9 @@ def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[C
     order = distance.argsort()
     for m in range(min(_MOST_INTEGRATORS, values.size), 0, -1):
         beyond = float(distance[order[m]]) if m < values.size else norm
-        reach = float(distance[order[m - 1]])
+        farthest = float(distance[order[m - 1]])
         scatter = _SCATTER * (_EPS * norm) ** (1.0 / m) * beyond ** (1.0 - 1.0 / m)
-        if reach <= (scatter if m > 1 else radius[order[0]]) and reach <= 1e-6 * beyond:
+        if farthest <= (scatter if m > 1 else radius[order[0]]) and farthest <= 1e-6 * beyond:
             values, radius = values.copy(), radius.copy()
             values[order[:m]], radius[order[:m]] = centre, 0.0
             break

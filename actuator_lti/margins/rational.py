@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from actuator_lti.margins.assemble import Figures, assembled, delay_margins
-from actuator_lti.margins.circles import Circles
 from actuator_lti.margins.crossings import Crossings, find_crossings
 from actuator_lti.margins.extremes import DISK, FAR, MODULUS, Criterion, smallest
+from actuator_lti.margins.level_crossings import LevelCrossings
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.nyquist import nyquist_count
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
@@ -55,23 +55,23 @@ def _margins(loop: RationalLoop) -> StabilityMargins:
     poles = sorted_poles(loop.A, loop.in_z)
     closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     _trust(loop, poles, closed)
-    circles = Circles(loop, poles.values)
-    found = find_crossings(loop, circles, _typical(loop, poles))
+    levels = LevelCrossings(loop, poles.values)
+    crossings = find_crossings(loop, levels, _typical(loop, poles))
     dc, end = _ends(loop, poles)
-    _trust_crossings(loop, found, dc, end)
-    count = nyquist_count(loop, found, poles, dc, end)
+    _trust_crossings(loop, crossings, dc, end)
+    count = nyquist_count(loop, crossings, poles, dc, end)
     if count != closed.unstable:
         raise Doubtful("poles and Nyquist count disagree")
-    x, L = _starts(loop, found, closed, dc, end)
-    modulus = smallest(loop, circles, MODULUS, x, L, loop.end)
-    disk = smallest(loop, circles, DISK, x, L, loop.end)
+    x, L = _starts(loop, crossings, closed, dc, end)
+    modulus = smallest(loop, levels, MODULUS, x, L, loop.end)
+    disk = smallest(loop, levels, DISK, x, L, loop.end)
     way = "Hamiltonian matrix" if loop.period_s is None else "symplectic pencil"
     return assembled(
         loop.period_s,
         Agreement(closed.unstable, count, 0),
         Figures(
-            _gain_margins(loop, found, dc, end),
-            _phase_margins(loop, found),
+            _gain_margins(loop, crossings, dc, end),
+            _phase_margins(loop, crossings),
             (modulus[0], loop.frequency(modulus[1])),
             (disk[0], loop.frequency(disk[1])),
         ),
@@ -96,17 +96,17 @@ def _trust(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles) -> None:
         raise Doubtful("poles over too many decades")
 
 
-def _trust_crossings(loop: RationalLoop, found: Crossings, dc: complex, end: complex) -> None:
+def _trust_crossings(loop: RationalLoop, crossings: Crossings, dc: complex, end: complex) -> None:
     """Parity of the crossovers against the gain at both ends, and the error bound of every crossing."""
     sides = [math.log(max(abs(L), 1e-300)) for L in (dc, end)]
     if min(map(abs, sides)) < _NEAR_ONE:
         raise Doubtful("the gain is one at an end of the axis")
-    if found.gain_x.size % 2 != (sides[0] > 0.0) ^ (sides[1] > 0.0):
+    if crossings.gain_x.size % 2 != (sides[0] > 0.0) ^ (sides[1] > 0.0):
         raise Doubtful("the number of gain crossovers does not fit the gain at both ends")
     ends = [x for x, L in ((0.0, dc), (loop.end, end)) if 0.0 < abs(L) < FAR]
     if loop.numerator is None and not loop.in_z:
         ends = [x for x in ends if x < math.inf]  # the direct feed-through is an entry: exact
-    at = np.concatenate((found.gain_x, found.real_x, ends))
+    at = np.concatenate((crossings.gain_x, crossings.real_x, ends))
     if not (error_bound(loop, at) <= MOST_ERROR).all():
         raise Doubtful("the loop is too badly conditioned")
 
@@ -124,25 +124,27 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
     at_dc = any(pole.x == 0.0 for pole in poles.border)
     x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else loop.response(np.zeros(1)))
-    return smallest(loop, Circles(loop, poles.values), criterion, x, L, end_x)
+    return smallest(loop, LevelCrossings(loop, poles.values), criterion, x, L, end_x)
 
 
-def _gain_margins(loop: RationalLoop, found: Crossings, dc: complex, end: complex) -> tuple[GainMargin, ...]:
+def _gain_margins(
+    loop: RationalLoop, crossings: Crossings, dc: complex, end: complex
+) -> tuple[GainMargin, ...]:
     at_dc = [GainMargin(-1.0 / dc.real, 0.0)] if dc.real < 0.0 else []
     at_end = [GainMargin(-1.0 / end.real, loop.frequency(loop.end))] if end.real < 0.0 else []
     crossed = [
         GainMargin(float(1.0 / abs(L)), loop.frequency(x))
-        for x, L in zip(found.real_x, found.real_L, strict=True)
+        for x, L in zip(crossings.real_x, crossings.real_L, strict=True)
         if L.real < 0.0
     ]
     return (*at_dc, *crossed, *at_end)
 
 
-def _phase_margins(loop: RationalLoop, found: Crossings) -> tuple[PhaseMargin, ...]:
-    margins = np.degrees(np.angle(-found.gain_L))
+def _phase_margins(loop: RationalLoop, crossings: Crossings) -> tuple[PhaseMargin, ...]:
+    margins = np.degrees(np.angle(-crossings.gain_L))
     return tuple(
         PhaseMargin(float(deg) if deg > -180.0 else 180.0, loop.frequency(x))
-        for deg, x in zip(margins, found.gain_x, strict=True)
+        for deg, x in zip(margins, crossings.gain_x, strict=True)
     )
 
 
@@ -175,12 +177,14 @@ def _ends(loop: RationalLoop, poles: SortedPoles) -> tuple[complex, complex]:
 
 
 def _starts(
-    loop: RationalLoop, found: Crossings, closed: SortedPoles, dc: complex, end: complex
+    loop: RationalLoop, crossings: Crossings, closed: SortedPoles, dc: complex, end: complex
 ) -> tuple[Real, Complex]:
     """Where to look for the smallest distance first: crossings, and the resonances of the closed loop."""
     values = closed.values
     own = np.abs(np.angle(values)) if loop.in_z else np.abs(values)
     own = own[(values.imag >= 0.0) & (own > 1e-9 * own.max()) & (own < math.pi if loop.in_z else own > 0.0)]
-    x = np.concatenate((found.gain_x, found.real_x, found.between_x, own, [0.0, loop.end]))
-    L = np.concatenate((found.gain_L, found.real_L, found.between_L, loop.response(own), [dc, end]))
+    x = np.concatenate((crossings.gain_x, crossings.real_x, crossings.between_x, own, [0.0, loop.end]))
+    L = np.concatenate(
+        (crossings.gain_L, crossings.real_L, crossings.between_L, loop.response(own), [dc, end])
+    )
     return x, L

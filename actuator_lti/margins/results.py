@@ -166,8 +166,8 @@ class StabilityMargins:
         return margins_html(self)
 
 
-def _within(found: tuple[float, float] | None) -> str:
-    return "" if found is None else f", in [{found[0]:.4g}, {found[1]:.4g}]"
+def _within(result: tuple[float, float] | None) -> str:
+    return "" if result is None else f", in [{result[0]:.4g}, {result[1]:.4g}]"
 
 
 def _lines(m: StabilityMargins) -> list[str]:

@@ -49,8 +49,8 @@ def square_free(p: fmpz_poly) -> list[tuple[fmpz_poly, int]]:
 
 @lru_cache(maxsize=8)  # asked again at a higher precision
 def _factors(coefficients: tuple[fmpz, ...]) -> tuple[tuple[tuple[fmpz, ...], int], ...]:
-    _, found = fmpz_poly(list(coefficients)).factor_squarefree()
-    return tuple((tuple(factor.coeffs()), int(times)) for factor, times in found)
+    _, result = fmpz_poly(list(coefficients)).factor_squarefree()
+    return tuple((tuple(factor.coeffs()), int(times)) for factor, times in result)
 
 
 @lru_cache(maxsize=8)
@@ -222,17 +222,17 @@ class _Polished:
         raise NotIsolated("the slope at a root could not be told from zero")
 
 
-def _refuse_common_points(found: list[tuple[acb, arb]]) -> None:
+def _refuse_common_points(result: list[tuple[acb, arb]]) -> None:
     """Compare all centres in double precision; only pairs that it cannot part are compared exactly."""
-    z = np.array([complex(x) for x, _ in found])
+    z = np.array([complex(x) for x, _ in result])
     size = np.abs(z)
     apart = np.abs(z[:, None] - z[None, :])
     unclear = np.argwhere(apart <= 1e-9 * (size[:, None] + size[None, :]))
     for i, j in unclear[unclear[:, 0] < unclear[:, 1]]:
-        (a, r), (b, s) = found[i], found[j]
+        (a, r), (b, s) = result[i], result[j]
         if not bool(abs(a - b) > r + s):
             raise NotIsolated("two discs with a common point")
-    if any(not bool(radius <= 1e-12 * abs(x)) for x, radius in found):
+    if any(not bool(radius <= 1e-12 * abs(x)) for x, radius in result):
         raise NotIsolated("a disc too wide")
 
 

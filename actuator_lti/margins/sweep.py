@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.delay_form import Cells, DelayForm, cells
+from actuator_lti.margins.delay_form import DelayForm, Intervals, evaluate_intervals
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import TOUCH
 
@@ -21,12 +21,12 @@ _STEPS = 80
 _CLOSE = 1e-14
 
 
-def reach(form: DelayForm, found: Cells) -> Real:
+def variation(form: DelayForm, intervals: Intervals) -> Real:
     """Bound of |L - L(x)| inside each interval, the series delay included."""
-    return found.spread + np.abs(found.L) * np.minimum(found.half * form.series, 2.0)
+    return intervals.spread + np.abs(intervals.L) * np.minimum(intervals.half * form.series, 2.0)
 
 
-def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Cells], Mask]) -> Cells:
+def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Intervals], Mask]) -> Intervals:
     """Split the intervals between ``edges`` in two until ``resolved`` holds in each; in order of x.
 
     Raises
@@ -36,13 +36,13 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Cells], Mask]) 
         holds too many turns of the delay.
     """
     low, high = edges[:-1], edges[1:]
-    done: list[Cells] = []
+    done: list[Intervals] = []
     count = 0
     while low.size:
-        found = cells(form, low, high)
+        intervals = evaluate_intervals(form, low, high)
         count += low.size
-        good = resolved(found)
-        done.append(_taken(found, good))
+        good = resolved(intervals)
+        done.append(_taken(intervals, good))
         low, high = low[~good], high[~good]
         if count > _MOST:
             raise NumericalError(
@@ -58,15 +58,15 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Cells], Mask]) 
     return joined(done)
 
 
-def _taken(found: Cells, mask: Mask) -> Cells:
-    return Cells(*(getattr(found, name)[mask] for name in Cells.__dataclass_fields__))
+def _taken(intervals: Intervals, mask: Mask) -> Intervals:
+    return Intervals(*(getattr(intervals, name)[mask] for name in Intervals.__dataclass_fields__))
 
 
-def joined(parts: list[Cells]) -> Cells:
+def joined(parts: list[Intervals]) -> Intervals:
     """Several sets of intervals as one, in order of x."""
     order = np.concatenate([p.x for p in parts]).argsort()
-    return Cells(
-        *(np.concatenate([getattr(p, name) for p in parts])[order] for name in Cells.__dataclass_fields__)
+    return Intervals(
+        *(np.concatenate([getattr(p, name) for p in parts])[order] for name in Intervals.__dataclass_fields__)
     )
 
 
@@ -83,7 +83,7 @@ GAIN = Level(lambda L: np.log(np.abs(L)), lambda L, d: (d / L).real, lambda L: n
 PHASE = Level(lambda L: np.angle(-L), lambda L, d: (d / L).imag, lambda L: L.real < 0.0)
 
 
-def crossings(form: DelayForm, found: Cells, level: Level, skip: Mask) -> tuple[Real, Mask]:
+def crossings(form: DelayForm, intervals: Intervals, level: Level, skip: Mask) -> tuple[Real, Mask]:
     """Zeros of a level between neighbouring middles; ``skip`` marks intervals that cannot hold one.
 
     Returns
@@ -93,23 +93,23 @@ def crossings(form: DelayForm, found: Cells, level: Level, skip: Mask) -> tuple[
     touch : array of bool
         Whether the level is only touched there.
     """
-    value, rate = level.value(found.L), level.rate(found.L, found.slope)
+    value, rate = level.value(intervals.L), level.rate(intervals.L, intervals.slope)
     near = ~(skip[1:] & skip[:-1]) & (np.abs(value[1:] - value[:-1]) < 3.0)  # else the angle wraps
-    x = _roots(form, level, found.x, value, np.flatnonzero(near & (value[1:] * value[:-1] <= 0.0)))
+    x = _roots(form, level, intervals.x, value, np.flatnonzero(near & (value[1:] * value[:-1] <= 0.0)))
     turns = (
         near & (value[:-1] * rate[:-1] < 0.0) & (value[1:] * rate[1:] > 0.0) & (value[1:] * value[:-1] > 0.0)
     )
     pairs: list[tuple[float, bool]] = []
     for k in np.flatnonzero(turns):
-        pairs += _near_turn(form, level, float(found.x[k]), float(found.x[k + 1]), float(value[k]))
+        pairs += _near_turn(form, level, float(intervals.x[k]), float(intervals.x[k + 1]), float(value[k]))
     all_x = np.concatenate((x, [at for at, _ in pairs]))
     touch = np.concatenate((np.zeros(x.size, dtype=bool), [flat for _, flat in pairs])).astype(bool)
     order = all_x.argsort()
     return all_x[order], touch[order]
 
 
-def _at(form: DelayForm, x: Real) -> Cells:
-    return cells(form, x, x)
+def _at(form: DelayForm, x: Real) -> Intervals:
+    return evaluate_intervals(form, x, x)
 
 
 def _roots(form: DelayForm, level: Level, x: Real, value: Real, hit: NDArray[np.intp]) -> Real:

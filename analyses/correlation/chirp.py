@@ -76,7 +76,7 @@ def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.0
             start_s=begin + float(p[2]), end_s=end, relative_residual=residual,
         )  # fmt: skip
 
-    found: ChirpLaw | None = None
+    result: ChirpLaw | None = None
     end = float(crossing[3])
     while end <= time_s[-1]:
         part = (time_s >= begin) & (time_s <= end)
@@ -86,11 +86,11 @@ def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.0
         newest = t > end - 0.1
         if size > tolerance or np.max(np.abs(fit.fun[newest]), initial=0.0) > 5.0 * tolerance * amplitude:
             break
-        p, found = fit.x, law(fit.x, end, size)
+        p, result = fit.x, law(fit.x, end, size)
         end += 0.05
-    if found is None:
+    if result is None:
         raise InputError("no chirp: the beginning does not follow an exponential law to 1 %")
-    return found
+    return result
 
 
 def predict_chirp(

@@ -163,25 +163,25 @@ def measured_signals(
     A signal that is zero throughout is left out.
     """
     notes = [] if notes is None else notes
-    found = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
-    for name in [name for name, values in found.items() if not np.any(values)]:
-        del found[name]
+    result = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
+    for name in [name for name, values in result.items() if not np.any(values)]:
+        del result[name]
         notes.append(f"{name} is zero throughout: not compared")
     gain = design.effective_motor.source_gain_Nm_V
     if design.axis == "linear":
         place, rate = "position", "velocity"
-        if "force" not in found and "voltage" in found and gain is not None:
-            found["force"] = gain * found["voltage"]
+        if "force" not in result and "voltage" in result and gain is not None:
+            result["force"] = gain * result["voltage"]
             notes.append(f"measured force: {gain:g} N/V times the recorded voltage")
     else:
-        place, rate = ("angle" if "angle" in found else "output_angle"), "speed"
-    if derive and rate not in found and place in found:
+        place, rate = ("angle" if "angle" in result else "output_angle"), "speed"
+    if derive and rate not in result and place in result:
         cutoff = min(VELOCITY_CUTOFF_HZ, 0.2 / record.period_s)
-        motion = filtered_motion(found[place], record.period_s, cutoff_hz=cutoff, order=4)
+        motion = filtered_motion(result[place], record.period_s, cutoff_hz=cutoff, order=4)
         ratio = design.total_ratio if place == "output_angle" else 1.0
-        found[rate] = ratio * motion.velocity
+        result[rate] = ratio * motion.velocity
         notes.append(f"measured {rate}: derivative of the {place}, filtered at {cutoff:g} Hz without phase")
-    return found
+    return result
 
 
 def model_signals(

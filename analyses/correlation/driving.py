@@ -84,8 +84,8 @@ def command_of(design: Design, record: Record, signal: str | None = None) -> Dri
         if signal not in allowed:
             raise InputError(f'command "{signal}": one of {", ".join(allowed)}', where=design.name)
         return _driven(design, record, signal, allowed[signal])
-    found = next((name for name in names if name in record.signals), None)
-    return None if found is None else _driven(design, record, found, names[found])
+    result = next((name for name in names if name in record.signals), None)
+    return None if result is None else _driven(design, record, result, names[result])
 
 
 def needed_command(design: Design, record: Record, signal: str | None = None) -> Driven:

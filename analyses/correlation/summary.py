@@ -38,12 +38,12 @@ def summarise(results: Sequence[CorrelationResult]) -> tuple[SignalSummary, ...]
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
-    found = [(result, signal) for result in results for signal in result.signals if signal.name == name]
-    signals = [signal for _, signal in found]
+    outcome = [(result, signal) for result in results for signal in result.signals if signal.name == name]
+    signals = [signal for _, signal in outcome]
     samples = np.array([signal.samples for signal in signals])
     squared = np.array([signal.rms_error**2 for signal in signals]) * samples
     measured = np.array([float(np.sum(signal.measured**2)) for signal in signals])
-    worst = max(found, key=lambda pair: pair[1].relative_error)
+    worst = max(outcome, key=lambda pair: pair[1].relative_error)
     return SignalSummary(
         name=name,
         unit=signals[0].unit,

@@ -33,8 +33,8 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> found = duty(load_design("joint"))
-    >>> found.rms_A <= found.peak_A
+    >>> result = duty(load_design("joint"))
+    >>> result.rms_A <= result.peak_A
     True
     """
     if not design.motor.has_electrical_dynamics:

@@ -39,8 +39,8 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> found = failures(load_design("ilr33-amber"))
-    >>> found.case("jam").at_detection_rad < found.case("hard-over").at_detection_rad
+    >>> result = failures(load_design("ilr33-amber"))
+    >>> result.case("jam").at_detection_rad < result.case("hard-over").at_detection_rad
     True
     """
     asked = Asked.of(design) if asked is None else asked
@@ -78,7 +78,7 @@ def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     Ts = rig.design.controller.period_s
     start = rig.measured().output_angle_rad
     if case.at_rad is not None:
-        _reach(rig, case, start, ceil(LONGEST_S / Ts))
+        _run_to_speed(rig, case, start, ceil(LONGEST_S / Ts))
         start = rig.measured().output_angle_rad
     case.broken(rig)
     rows = []
@@ -91,7 +91,7 @@ def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     return _judged(case, asked, *np.array(rows).T)
 
 
-def _reach(rig: Rig, case: Case, start: float, most: int) -> None:
+def _run_to_speed(rig: Rig, case: Case, start: float, most: int) -> None:
     """Follow the command until the output is where the failure happens."""
     assert case.at_rad is not None
     for k in range(most):

@@ -58,13 +58,13 @@ def foreseen_cycles(design: Design, load_Nm: float, top_speed_rad_s: float) -> t
 
     grid = math.log(top_speed_rad_s) - np.linspace(DECADES, 0.0, POINTS) * math.log(10.0)
     values = [excess(float(point)) for point in grid]
-    found = []
+    result = []
     for k in range(len(grid) - 1):
         a, b = values[k], values[k + 1]
         if a * b < 0.0 and max(abs(a), abs(b)) > BORDER:
             root = float(brentq(excess, grid[k], grid[k + 1], xtol=1e-12))
-            found.append(_cycle(design, load_Nm, math.exp(root), stable=a > 0.0))
-    return tuple(cycle for cycle in found if cycle.frequency_hz > 0.0)
+            result.append(_cycle(design, load_Nm, math.exp(root), stable=a > 0.0))
+    return tuple(cycle for cycle in result if cycle.frequency_hz > 0.0)
 
 
 def at_load(cycle: ForeseenCycle, design: Design, from_load_Nm: float, load_Nm: float) -> ForeseenCycle:

@@ -106,10 +106,10 @@ def _point(
     design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[ForeseenCycle, ...]
 ) -> FrictionPoint:
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    found = threshold(design, load_Nm, settling_ticks)
-    loop = None if found is None else hysteresis(design, load_Nm, found.static, settling_ticks)
+    result = threshold(design, load_Nm, settling_ticks)
+    loop = None if result is None else hysteresis(design, load_Nm, result.static, settling_ticks)
     dry = design.friction.dry_Nm(load_Nm, 1)
-    breakaway = None if found is None else found.static.forward_rad
-    slips = None if found is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
+    breakaway = None if result is None else result.static.forward_rad
+    slips = None if result is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
     cycles = limit_cycles(design, load_Nm, step, breakaway, slips, described)
-    return FrictionPoint(load_Nm, dry, found, loop, cycles)
+    return FrictionPoint(load_Nm, dry, result, loop, cycles)

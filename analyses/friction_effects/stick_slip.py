@@ -110,8 +110,8 @@ def stick_slip_cycle(
     grid = threshold * np.geomspace(SMALLEST, LARGEST, POINTS)
 
     def surplus(error: float) -> float:
-        found = slip.from_error(error)
-        return -error if found is None else -found[0] - error
+        result = slip.from_error(error)
+        return -error if result is None else -result[0] - error
 
     values = np.array([surplus(float(error)) for error in grid])
     falls = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))
@@ -119,12 +119,12 @@ def stick_slip_cycle(
         return None
     k = int(falls[-1])
     error = float(brentq(surplus, grid[k], grid[k + 1], xtol=1e-12 * grid[k]))
-    found = slip.from_error(error)
-    if found is None or not math.isfinite(found[2]):
+    result = slip.from_error(error)
+    if result is None or not math.isfinite(result[2]):
         return None
     step = SLOPE_STEP * error
     slope = (surplus(error + step) - surplus(error - step)) / (2.0 * step) + 1.0
-    _, slipping, resting = found
+    _, slipping, resting = result
     hz = 0.5 / (slipping + resting)
     return StickSlipCycle(error / design.total_ratio, hz, slipping, resting, slope)
 

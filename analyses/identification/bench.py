@@ -154,8 +154,8 @@ def _fitted(
     recipe, fixed = _recipe(used[0], settings), _held(start, settings)
     gravity = settings.gravity or start.load.gravity is not None
     if settings.form == "map":
-        found = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
-        return found.model, found.laws
+        fit = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
+        return fit.model, fit.laws
     model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
     return model, ()
 
@@ -186,7 +186,7 @@ def _fit_items(
     design: Design, findings: Mapping[str, tuple[Finding, ...]], model: JointModel, limit: float
 ) -> tuple[Item, ...]:
     return (
-        *(inputs_item(name, found) for name, found in findings.items()),
+        *(inputs_item(name, result) for name, result in findings.items()),
         size_item(design, model),
         rows_item(model.rows_used, len(model.names)),
         residual_item(model.relative_residual, limit),

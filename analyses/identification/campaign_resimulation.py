@@ -32,7 +32,7 @@ def steady_current_error(
     period = design.controller.period_s
     if constant is None or duration / period > MOST_TICKS:
         return None
-    wanted, found = [], []
+    wanted, result = [], []
     for k, point in enumerate(points, 1):
         command = commands.ramp(point.direction * point.speed_rad_s / design.total_ratio)
         try:
@@ -43,9 +43,9 @@ def steady_current_error(
         speed = point.direction * float(np.mean(run.motor_speed_rad_s[late]))
         if abs(speed - point.speed_rad_s) <= SPEED_REACHED * point.speed_rad_s:
             wanted.append(point.torque_Nm)
-            found.append(point.direction * constant * float(np.mean(run.current_A[late])))
+            result.append(point.direction * constant * float(np.mean(run.current_A[late])))
         if progress is not None:
             progress(k, len(points))
     if not wanted:
         return None
-    return float(np.linalg.norm(np.subtract(found, wanted)) / np.linalg.norm(wanted))
+    return float(np.linalg.norm(np.subtract(result, wanted)) / np.linalg.norm(wanted))

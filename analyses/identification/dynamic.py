@@ -171,15 +171,15 @@ def _least_squares(
             f"the motion does not excite all of {', '.join(NAMES[form])} (condition {condition:.2g}): "
             "it needs several speeds and accelerations, and for per-direction both directions"
         )
-    found = solve(w, y)
+    result = solve(w, y)
     return DynamicModel(
         form=form,
         names=NAMES[form],
-        values=found.values,
-        standard_errors=np.sqrt(np.diag(found.white)),
-        covariance=found.white,
-        relative_residual=float(np.linalg.norm(found.residual) / np.linalg.norm(y)),
-        residual=found.residual,
+        values=result.values,
+        standard_errors=np.sqrt(np.diag(result.white)),
+        covariance=result.white,
+        relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(y)),
+        residual=result.residual,
         rows_in=rows_in,
         rows_used=len(y),
         recipe=recipe,

@@ -65,10 +65,10 @@ def fit_electrical(
     """
     control = design.controller
     late = control.computing_delay_s + 0.5 * control.period_s
-    found = _fitted([_rows(design, record, late) for record in records], only=only or NAMES)
-    early = _fitted([_rows(design, record, 0.0) for record in records], only=found.names)
-    moved = found.values - early.values
-    whole = replace(found, covariance=found.covariance + np.outer(moved, moved) / 3.0)
+    result = _fitted([_rows(design, record, late) for record in records], only=only or NAMES)
+    early = _fitted([_rows(design, record, 0.0) for record in records], only=result.names)
+    moved = result.values - early.values
+    whole = replace(result, covariance=result.covariance + np.outer(moved, moved) / 3.0)
     if only is not None or "inductance" not in whole.names:
         return whole
     value, std = whole["inductance"], whole.std("inductance")
@@ -95,17 +95,17 @@ def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> Elec
                 not_shown[one.name] = str(one)
             names = [names[k] for k in kept]
             continue
-        found = solve(w, u, ends)
+        result = solve(w, u, ends)
         break
     for name in ("resistance", "back_emf"):
         if name in not_shown:
             raise InputError(f"{KEYS[name]}: {not_shown[name]}; vary speed and load, not together only")
     return ElectricalFit(
         names=tuple(names),
-        values=found.values,
-        covariance=found.correlated,
+        values=result.values,
+        covariance=result.correlated,
         not_shown=not_shown,
-        relative_residual=float(np.linalg.norm(found.residual) / np.linalg.norm(u)),
+        relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
     )
 
 

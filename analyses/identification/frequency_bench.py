@@ -124,7 +124,7 @@ def identify_frequency(
     text = write_design(made)
     records = [record] if play_record is None else [record, play_record]
     findings = {one.name: check_record(design, one) for one in records}
-    items = [inputs_item(name, found) for name, found in findings.items()]
+    items = [inputs_item(name, result) for name, result in findings.items()]
     items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name)]
     return FrequencyResult(
         record=record,
@@ -181,8 +181,8 @@ def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[
         for other in other_starts(start, lines, reduction):
             with suppress(NumericalError, np.linalg.LinAlgError):
                 again = {**other, **held}
-                found = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
-                start, fit = (again, found) if found.misfit < fit.misfit else (start, fit)
+                result = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
+                start, fit = (again, result) if result.misfit < fit.misfit else (start, fit)
             if fit.misfit <= MISFIT_LIMIT:
                 break
     weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
@@ -269,10 +269,10 @@ def _resolution(values: FloatArray) -> float:
 
 def _misfit_item(fit: TwoMass) -> Item:
     good = fit.misfit <= MISFIT_LIMIT
-    found = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
+    result = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
     return Item(
         id="misfit",
-        label=f"The two-mass model explains the lines ({found})",
+        label=f"The two-mass model explains the lines ({result})",
         passed=good,
         reason="" if good else "play, friction or another resonance: excite on one flank, in motion",
     )

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from analyses.identification.dynamic import Recipe
-from analyses.identification.hats import hats
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel
+from analyses.identification.linear_basis import linear_basis
 from analyses.identification.means import correlation_time
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
@@ -75,16 +75,16 @@ def fit_map(
     n = len(rest) / correlation_time(plain.residual)
     best: tuple[float, JointModel, tuple[float, ...] | None] = (_bic(plain, n), plain, None)
     laws = [_law("plain, C0 + Cv |w|", None, plain, 0.0, taken=False)]
-    found: tuple[float, ...] = ()
+    result: tuple[float, ...] = ()
     for count in range(1, MOST_BREAKS + 1):
-        found = _one_more(speed, rest, top, found)
-        if len(found) < count:
+        result = _one_more(speed, rest, top, result)
+        if len(result) < count:
             break
-        knots = (0.0, *found, top)
+        knots = (0.0, *result, top)
         model = fitted(knots)
         own = _bic(model, n)
         gain = own - _bic(plain, n)
-        laws.append(_law(f"map, {count} break points", found, model, gain, taken=False))
+        laws.append(_law(f"map, {count} break points", result, model, gain, taken=False))
         if own < best[0] - (CLEARLY_BETTER if best[2] is None else 0.0):
             best = (own, model, knots)
     chosen = 0 if best[2] is None else len(best[2]) - 2
@@ -130,21 +130,23 @@ def _plain_residual(rows: Sequence[Rows], plain: JointModel) -> tuple[FloatArray
     return np.concatenate(speeds), np.concatenate(rests)
 
 
-def _one_more(speed: FloatArray, rest: FloatArray, top: float, found: tuple[float, ...]) -> tuple[float, ...]:
+def _one_more(
+    speed: FloatArray, rest: FloatArray, top: float, result: tuple[float, ...]
+) -> tuple[float, ...]:
     """The break points with the best one more, then each moved in turn."""
     grid = np.geomspace(LEAST_SHARE * top, 0.95 * top, GRID)
     size, side = np.abs(speed), np.sign(speed)
 
     def misfit(breaks: Sequence[float]) -> float:
-        w = hats(size, (0.0, *sorted(breaks), top)) * side[:, None]
+        w = linear_basis(size, (0.0, *sorted(breaks), top)) * side[:, None]
         w = np.column_stack([w, np.ones(len(w))])
         left = rest - w @ np.linalg.lstsq(w, rest, rcond=None)[0]
         return float(left @ left)
 
-    free = [v for v in grid if all(abs(np.log(v / b)) > 0.1 for b in found)]
+    free = [v for v in grid if all(abs(np.log(v / b)) > 0.1 for b in result)]
     if not free:
-        return found
-    chosen = [*found, min(free, key=lambda v: misfit([*found, v]))]
+        return result
+    chosen = [*result, min(free, key=lambda v: misfit([*result, v]))]
     for k in range(len(chosen)):
         chosen[k] = _moved(chosen, k, top, misfit)
     return tuple(sorted(float(v) for v in chosen))

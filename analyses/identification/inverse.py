@@ -190,9 +190,9 @@ def _singles(
             for name, value in zip(free, values, strict=True)
             if name not in own
         }
-        found = _joint([block], own, {**fixed, **rest}, np.ones(1))
-        std = np.sqrt(np.diag(found.correlated))
-        out.append({n: (float(v), float(s)) for n, v, s in zip(own, found.values, std, strict=True)})
+        result = _joint([block], own, {**fixed, **rest}, np.ones(1))
+        std = np.sqrt(np.diag(result.correlated))
+        out.append({n: (float(v), float(s)) for n, v, s in zip(own, result.values, std, strict=True)})
     return out
 
 

@@ -75,8 +75,8 @@ def refine_by_output_error(
     scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
 
     def values_at(moved: FloatArray) -> dict[str, float]:
-        found = start + scale * (moved - 1.0)
-        return {path: _allowed(path, float(v)) for path, v in zip(paths, found, strict=True)}
+        result = start + scale * (moved - 1.0)
+        return {path: _allowed(path, float(v)) for path, v in zip(paths, result, strict=True)}
 
     def residual(moved: FloatArray) -> FloatArray:
         output = simulate_output(with_values(design, values_at(moved), check=False))

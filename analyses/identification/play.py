@@ -99,9 +99,9 @@ def find_play(
         y = (twist_rad - inertial_Nm / k)[touching]
         kept, _ = told_apart(w, names)
         told = tuple(names[j] for j in kept)
-        found = solve(w[:, list(kept)], y)
-        values = dict(zip(told, found.values.tolist(), strict=True))
-        std = np.sqrt(np.diag(found.correlated))
+        result = solve(w[:, list(kept)], y)
+        values = dict(zip(told, result.values.tolist(), strict=True))
+        std = np.sqrt(np.diag(result.correlated))
         middle, half = values["middle"], values["play"]
         new = {name: max(values.get(name, own[name]), 0.0) for name in own}
         if all(abs(new[name] - own[name]) <= 1e-9 * abs(new[name]) for name in own):

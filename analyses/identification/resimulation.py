@@ -44,8 +44,8 @@ def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     try:
         return _simulated(design, record)
     except InputError as error:  # a part that the simulator does not have
-        found = _needed(design, record, form)
-        return replace(found, how=f"{found.how} ({error.message})")
+        result = _needed(design, record, form)
+        return replace(result, how=f"{result.how} ({error.message})")
 
 
 def _simulated(design: Design, record: Record) -> Resimulated:
@@ -53,8 +53,8 @@ def _simulated(design: Design, record: Record) -> Resimulated:
     rows = int(MOST_TICKS * design.controller.period_s / record.period_s)
     part = record if len(record) <= rows else record.slice(0, max(rows, 2))
     how = f"{name}, simulated" if part is record else f"{name}, its first {len(part)} rows simulated"
-    found = correlate_record(design, part)[name]
-    return Resimulated(record=record.name, signal=name, relative_error=found.relative_error, how=how)
+    result = correlate_record(design, part)[name]
+    return Resimulated(record=record.name, signal=name, relative_error=result.relative_error, how=how)
 
 
 def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:

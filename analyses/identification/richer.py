@@ -133,9 +133,9 @@ def _predicted(
     scale = np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
     a = with_shared(rows[seen] / scale, data.shared[seen])
     b = np.concatenate([torque[seen], np.zeros(data.shared.shape[1])])
-    found = np.linalg.lstsq(a, b, rcond=None)[0]
-    errors = torque[unseen] - np.column_stack([rows[unseen] / scale, data.shared[unseen]]) @ found
-    return errors, float(np.sum((b - a @ found) ** 2))
+    result = np.linalg.lstsq(a, b, rcond=None)[0]
+    errors = torque[unseen] - np.column_stack([rows[unseen] / scale, data.shared[unseen]]) @ result
+    return errors, float(np.sum((b - a @ result) ** 2))
 
 
 def _stribeck_errors(data: _Data, folds: NDArray[np.int64]) -> FloatArray:

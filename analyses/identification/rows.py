@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.differentiation import Motion, decimated, filtered_motion
 from analyses.identification.dynamic import NAMES, FrictionForm, Recipe, base_columns
-from analyses.identification.hats import hats
+from analyses.identification.linear_basis import linear_basis
 from analyses.records.consistency import place_of
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
@@ -154,7 +154,7 @@ def _friction_columns(
     if knots_rad_s is None:
         return list(NAMES[form]), base_columns(motion, form)
     side = np.sign(motion.velocity)
-    table = hats(np.abs(motion.velocity), knots_rad_s) * side[:, None]
+    table = linear_basis(np.abs(motion.velocity), knots_rad_s) * side[:, None]
     names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
     return names, np.column_stack([motion.acceleration, table, np.ones_like(side)])
 

@@ -40,12 +40,12 @@ def check_runs(
     good, bad, findings = [], [], {}
     for point in points:
         run = by_id[point.run]
-        found = (*_settings(run, point, instruments), *check_record(design, run.record))
+        result = (*_settings(run, point, instruments), *check_record(design, run.record))
         if run.id in shared:
             text = f"the sensor's file is that of run {shared[run.id]} as well"
-            found = (*found, Finding(subject="sensor file", passed=False, text=text))
-        findings[run.id] = found
-        wrong = [one for one in found if one.passed is False]
+            result = (*result, Finding(subject="sensor file", passed=False, text=text))
+        findings[run.id] = result
+        wrong = [one for one in result if one.passed is False]
         if wrong:
             bad.append(SetAside(id=run.id, reason="; ".join(f"{w.subject}: {w.text}" for w in wrong)))
         else:
@@ -68,16 +68,16 @@ def _shared_files(runs: Sequence[ImportedRun]) -> dict[str, str]:
 
 
 def _settings(run: ImportedRun, point: SteadyPoint, instruments: Instruments) -> tuple[Finding, ...]:
-    found = []
+    result = []
     if run.speed_rad_s:
-        found.append(
+        result.append(
             _against("set speed", "speed", "rad/s", point.speed_rad_s, abs(run.speed_rad_s), SPEED_TOLERANCE)
         )
     if run.load_Nm and not run.load_is_zero:
         sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / abs(run.load_Nm)
         allowed = LOAD_TOLERANCE + sensor
-        found.append(_against("set load", "load", "N m", point.load_Nm, abs(run.load_Nm), allowed))
-    return tuple(found)
+        result.append(_against("set load", "load", "N m", point.load_Nm, abs(run.load_Nm), allowed))
+    return tuple(result)
 
 
 def _against(subject: str, what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:

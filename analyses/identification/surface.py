@@ -66,13 +66,15 @@ def fit_surface(
     start = _ordinary(x, y, held)
     errors = shared_errors(used, instruments, start[2], torque_constant_Nm_A)
     free, rest = _free(x, y, held)
-    found = find_outliers(free, rest, _own_variance(used, start), effects_of(errors, len(y)))
+    result = find_outliers(free, rest, _own_variance(used, start), effects_of(errors, len(y)))
     named = tuple(
-        Outlier(run=names[k], standardised=float(value), limit=found.limit, set_aside=outliers == "set-aside")
-        for k, value in zip(found.rows, found.standardised, strict=True)
+        Outlier(
+            run=names[k], standardised=float(value), limit=result.limit, set_aside=outliers == "set-aside"
+        )
+        for k, value in zip(result.rows, result.standardised, strict=True)
     )
     if outliers == "set-aside" and named:
-        used = tuple(point for k, point in enumerate(used) if k not in set(found.rows))
+        used = tuple(point for k, point in enumerate(used) if k not in set(result.rows))
         held = _held(used, dict(fixed or {}), kept)
     return _fitted(used, instruments, torque_constant_Nm_A, named, held)
 

@@ -20,7 +20,7 @@ from analyses.identification.surface_fit import PATHS, SurfaceFit
 FloatArray = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.005
-REACH = 6.5
+TRUNCATION_STD = 6.5
 """Standard deviations that a normal distribution is sampled to."""
 
 
@@ -68,7 +68,7 @@ def joint_estimate(
     InputError
         If the design's other inertias alone exceed the identified one.
     """
-    found = dict(zip(model.names, model.values.tolist(), strict=True))
+    result = dict(zip(model.names, model.values.tolist(), strict=True))
     paths: list[str] = []
     values: list[float] = []
     slopes = np.zeros((0, len(model.names)))
@@ -80,7 +80,7 @@ def joint_estimate(
         row = [slope.get(name, 0.0) for name in model.names]
         slopes = np.vstack([slopes, row])
 
-    for name, value in found.items():
+    for name, value in result.items():
         if name == "inertia":
             given, scale = inertia_share(design, value, inertia_to)
             add(inertia_to, given, inertia=scale)
@@ -88,8 +88,8 @@ def joint_estimate(
             add(KEYS[name], value, **{name: 1.0})
         elif name.startswith("map_"):
             add(f"friction.point.{int(name[4:]) + 1}.torque", value, **{name: 1.0})
-    if {"gravity_sin", "gravity_cos"} <= set(found):
-        _add_gravity(design, found["gravity_sin"], found["gravity_cos"], add)
+    if {"gravity_sin", "gravity_cos"} <= set(result):
+        _add_gravity(design, result["gravity_sin"], result["gravity_cos"], add)
     covariance = slopes @ model.covariance @ slopes.T
     return Estimate(paths=tuple(paths), values=np.array(values), covariance=covariance, source=source)
 
@@ -232,10 +232,13 @@ def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
     if not std > 0.0:
         return None
     allowed = field_of(path)
-    if allowed is None or allowed.accepts(value - REACH * std):
+    if allowed is None or allowed.accepts(value - TRUNCATION_STD * std):
         return Tolerance(kind="normal", std=std)
     return Tolerance(
-        kind="truncated-normal", std=std, lower=max(allowed.low, 1e-6 * abs(value)), upper=value + REACH * std
+        kind="truncated-normal",
+        std=std,
+        lower=max(allowed.low, 1e-6 * abs(value)),
+        upper=value + TRUNCATION_STD * std,
     )
 
 

@@ -138,18 +138,18 @@ def fit_two_mass(
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
     begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
-    found = least_squares(residual, begin, x_scale="jac", max_nfev=400, method="lm")
-    if not found.success:
-        raise NumericalError(f"the two-mass fit does not converge: {found.message}")
-    size = np.linalg.norm(found.jac, axis=0)
+    fit = least_squares(residual, begin, x_scale="jac", max_nfev=400, method="lm")
+    if not fit.success:
+        raise NumericalError(f"the two-mass fit does not converge: {fit.message}")
+    size = np.linalg.norm(fit.jac, axis=0)
     if np.any(size == 0.0):
         raise NumericalError(f"the lines do not tell {names[int(np.argmin(size))]}; hold it with --fix")
-    freedom = max(len(found.fun) - len(names), 1)
-    misfit = float(np.sqrt(2.0 * found.cost / freedom))
-    inverse = np.linalg.inv((found.jac / size).T @ (found.jac / size)) / np.outer(size, size)
+    freedom = max(len(fit.fun) - len(names), 1)
+    misfit = float(np.sqrt(2.0 * fit.cost / freedom))
+    inverse = np.linalg.inv((fit.jac / size).T @ (fit.jac / size)) / np.outer(size, size)
     few = (lines.periods - 1) / max(lines.periods - 1 - len(outputs), 1)
     covariance = inverse * few * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
-    own = unpacked(found.x)
+    own = unpacked(fit.x)
     return TwoMass(
         names=names,
         values=np.array([own[name] for name in names]),
@@ -226,10 +226,10 @@ def other_starts(start: Mapping[str, float], lines: Lines, reduction: float) -> 
     """
     whole = start["motor_inertia"] + start["load_inertia"] / reduction**2
     low, high = float(np.min(lines.omega_rad_s)), float(np.max(lines.omega_rad_s))
-    found = []
+    result = []
     for share in (0.5, 0.2, 0.8):
         for valley in np.geomspace(low, high, 8)[1:-1]:
             behind = (1.0 - share) * whole * reduction**2
             sides = {"motor_inertia": share * whole, "load_inertia": behind}
-            found.append({**start, **sides, "stiffness": behind * float(valley) ** 2})
-    return found
+            result.append({**start, **sides, "stiffness": behind * float(valley) ** 2})
+    return result

@@ -148,9 +148,9 @@ def sizes_item(ratios: Mapping[str, float], more: Mapping[float, str], leading: 
 
 def _common(ratios: Mapping[str, float], more: Mapping[float, str]) -> tuple[float, str] | None:
     """A named factor that two or more ratios share."""
-    found = {name: named_factor(ratio, more) for name, ratio in ratios.items()}
-    names = {one for one in found.values() if one}
-    if len(ratios) >= 2 and len(names) == 1 and all(found.values()):
+    result = {name: named_factor(ratio, more) for name, ratio in ratios.items()}
+    names = {one for one in result.values() if one}
+    if len(ratios) >= 2 and len(names) == 1 and all(result.values()):
         product = 1.0
         for ratio in ratios.values():
             product *= ratio

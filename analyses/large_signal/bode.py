@@ -54,28 +54,28 @@ class AmplitudeBode:
     linear_minus90deg_hz: float | None
 
 
-def amplitude_bode(design: Design, found: AmplitudeMap) -> AmplitudeBode:
+def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode:
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
     fractions = tuple(sorted(design.validation.amplitude_fractions))
-    places = [int(np.argmin(np.abs(found.amplitude_rad - fraction * full))) for fraction in fractions]
-    hz, unsteady = found.frequency_hz, found.waveform == WAVEFORMS.index("not steady")
-    gain = np.where(unsteady, np.nan, found.gain_db)
-    phase = np.where(unsteady, np.nan, found.phase_deg)
-    linear_db = 20.0 * np.log10(np.abs(found.linear))
-    linear_deg = np.degrees(np.unwrap(np.angle(found.linear)))
+    places = [int(np.argmin(np.abs(amplitude_map.amplitude_rad - fraction * full))) for fraction in fractions]
+    hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
+    gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
+    phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
+    linear_db = 20.0 * np.log10(np.abs(amplitude_map.linear))
+    linear_deg = np.degrees(np.unwrap(np.angle(amplitude_map.linear)))
     first_3 = np.array([_crossing(hz, row, MINUS_3DB) for row in gain])
     first_90 = np.array([_crossing(hz, row, -90.0) for row in phase])
     return AmplitudeBode(
-        load_Nm=found.load_Nm,
+        load_Nm=amplitude_map.load_Nm,
         frequency_hz=hz,
         fractions=fractions,
-        amplitude_rad=found.amplitude_rad[places],
+        amplitude_rad=amplitude_map.amplitude_rad[places],
         gain_db=gain[places],
         phase_deg=phase[places],
         linear_db=linear_db,
         linear_deg=linear_deg,
-        all_amplitude_rad=found.amplitude_rad,
+        all_amplitude_rad=amplitude_map.amplitude_rad,
         minus3db_hz=first_3,
         minus90deg_hz=first_90,
         below_from_start=gain[:, 0] < MINUS_3DB,

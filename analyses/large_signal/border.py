@@ -120,12 +120,14 @@ def check_border(
             )  # fmt: skip
             return limiter_fractions(result)
 
-        found, first = _bisect(acting, foreseen, tries, rounds)
-        if tries != WIDE and np.isnan(found).any():  # it is not about where it was foreseen: look for it
+        amplitudes, first = _bisect(acting, foreseen, tries, rounds)
+        if tries != WIDE and np.isnan(amplitudes).any():  # it is not about where it was foreseen: look for it
             further, names_further = _bisect(acting, foreseen, WIDE, rounds)
-            first = [b if np.isnan(x) else a for a, b, x in zip(first, names_further, found, strict=True)]
-            found = np.where(np.isnan(found), further, found)
-        simulated[limited] = found
+            first = [
+                b if np.isnan(x) else a for a, b, x in zip(first, names_further, amplitudes, strict=True)
+            ]
+            amplitudes = np.where(np.isnan(amplitudes), further, amplitudes)
+        simulated[limited] = amplitudes
         for place, name in zip(limited, first, strict=True):
             names[place] = name
     return BorderCheck(

@@ -1,4 +1,4 @@
-"""What a cell of the map shows: which limit acts, and what the output looks like; criteria stated here."""
+"""What a point of the map shows: which limit acts, and what the output looks like; criteria stated here."""
 
 from __future__ import annotations
 

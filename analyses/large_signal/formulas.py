@@ -48,8 +48,8 @@ def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> Rat
 
     Examples
     --------
-    >>> found = rate_limited(10.0, 2 * math.pi * 5.0, 150.0)
-    >>> round(found.gain, 6), round(found.lag_deg, 4), found.peak
+    >>> result = rate_limited(10.0, 2 * math.pi * 5.0, 150.0)
+    >>> round(result.gain, 6), round(result.lag_deg, 4), result.peak
     (0.607927, 41.4096, 7.5)
     """
     x = omega_rad_s * amplitude / rate_limit
@@ -90,8 +90,8 @@ def acceleration_limited(acceleration: float, frequency_hz: float) -> ParabolaTr
 
     Examples
     --------
-    >>> found = acceleration_limited(20_000.0, 20.0)
-    >>> round(found.peak, 4), round(found.fundamental, 4)
+    >>> result = acceleration_limited(20_000.0, 20.0)
+    >>> round(result.peak, 4), round(result.fundamental, 4)
     (1.5625, 1.6126)
     """
     square = acceleration / frequency_hz**2

@@ -28,7 +28,7 @@ BELOW_ONSET = 0.95
 
 @dataclass(frozen=True)
 class AmplitudeMap:
-    """Sines of many amplitudes and frequencies, each settled; arrays of cells are (amplitude, frequency).
+    """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency).
 
     Attributes
     ----------
@@ -93,16 +93,16 @@ class AmplitudeMap:
         return np.asarray(np.degrees(np.angle(self.response / self.linear)))
 
     def plot_map(self, axes: Any = None, *, linear_axis: bool = False) -> Axes:
-        """Draw what acts in each cell, and the linear onset lines; gives matplotlib's axes."""
-        from actuator_lti.plotting import plot_cells
+        """Draw what acts at each point, and the linear onset lines; gives matplotlib's axes."""
+        from actuator_lti.plotting import plot_map
 
-        return plot_cells(
+        return plot_map(
             self.frequency_hz, self.amplitude_rad, self.cause, CAUSES,
             onset_rad=self.onset_rad, linear_axis=linear_axis, axes=axes,
         )  # fmt: skip
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A data frame with one row a cell: command, what acts, waveform, fundamental (pandas needed)."""
+        """A data frame with one row a point: command, what acts, waveform, fundamental (pandas needed)."""
         from actuator_lti.extras import need
 
         frame = need("pandas", "tables", "to_pandas")
@@ -121,7 +121,7 @@ class AmplitudeMap:
         )
 
     def share(self, names: tuple[str, ...], kinds: tuple[str, ...] = CAUSES) -> float:
-        """Fraction of the cells with one of these causes (or waveforms, with ``kinds=WAVEFORMS``)."""
+        """Fraction of the points with one of these causes (or waveforms, with ``kinds=WAVEFORMS``)."""
         table = self.waveform if kinds is WAVEFORMS else self.cause
         return float(np.isin(table, [kinds.index(name) for name in names]).mean())
 

@@ -80,7 +80,7 @@ def large_signals(
             progress(done, 4)
 
     loops = assemble_loops(design) if loops is None else loops
-    found = amplitude_map(design, loops, counts=counts)
+    map_ = amplitude_map(design, loops, counts=counts)
     step(1)
     border = check_border(design, loops)
     step(2)
@@ -89,4 +89,4 @@ def large_signals(
     step(3)
     teeth = sawtooth(design)
     step(4)
-    return LargeSignals(design, found, border, shifted, amplitude_bode(design, found), teeth)
+    return LargeSignals(design, map_, border, shifted, amplitude_bode(design, map_), teeth)

@@ -126,7 +126,7 @@ def sawtooth(
         reason = "the drive has no speed limit of its own, so its output is no sawtooth"
         return Sawtooth(amplitude, 0.0, math.inf, 0.0, 0.0, False, (), reason)
     figures = [drive_figures(design, load) for load in design.validation.loads_Nm]
-    slowest = min(found.output_rate_rad_s for found in figures)
+    slowest = min(result.output_rate_rad_s for result in figures)
     rate = limit / design.total_ratio
     if slowest < rate * (1.0 - 1e-9):
         reason = f"not every load lets the drive reach its speed limit: it stays at {slowest / rate:.0%}"
@@ -138,7 +138,7 @@ def sawtooth(
         for load in design.validation.loads_Nm
     )
     swift = design.controller.position_loop.gain / chosen.omega_rad_s
-    push = min(found.acceleration_rad_s2 for found in figures)
+    push = min(result.acceleration_rad_s2 for result in figures)
     reversal = math.degrees(2.0 * rate / push * chosen.omega_rad_s)
     electric = design.motor.has_electrical_dynamics
     return Sawtooth(amplitude, chosen.frequency_hz, rate, swift, reversal, electric, runs)

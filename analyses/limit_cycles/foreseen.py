@@ -66,15 +66,15 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
     modes: list[_Mode | None] = []
     for A in grid:
         modes.append(_at_twist(design, float(A), friction, modes[-1] if modes else None))
-    found = []
+    result = []
     for k in range(POINTS - 1):
         a, b = modes[k], modes[k + 1]
         if a is None or b is None or (a.radius - 1.0) * (b.radius - 1.0) >= 0.0:
             continue
         made = _border(design, friction, (float(grid[k]), float(grid[k + 1])), a)
         if made is not None and made[1].frequency_hz > 0.0:
-            found.append(_cycle(design, *made, friction, stable=a.radius > 1.0))
-    return tuple(found)
+            result.append(_cycle(design, *made, friction, stable=a.radius > 1.0))
+    return tuple(result)
 
 
 def _border(
@@ -86,8 +86,8 @@ def _border(
         return _at_twist(design, exp(log_A), friction, near)
 
     def excess(log_A: float) -> float:
-        found = mode(log_A)
-        return -1.0 if found is None else found.radius - 1.0
+        result = mode(log_A)
+        return -1.0 if result is None else result.radius - 1.0
 
     low, high = map(log, ends)
     if excess(low) * excess(high) >= 0.0:

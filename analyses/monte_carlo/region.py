@@ -57,8 +57,8 @@ class Group:
         """Points of the unit cube for scores; those beyond the ellipsoid are brought back to it."""
         e = scores @ np.linalg.pinv(self.axes).T / self.radius
         length = np.linalg.norm(e, axis=1, keepdims=True)
-        reach = np.maximum(np.max(np.abs(e), axis=1, keepdims=True), 1e-300)
-        x = e / reach * np.minimum(length, 1.0)
+        largest = np.maximum(np.max(np.abs(e), axis=1, keepdims=True), 1e-300)
+        x = e / largest * np.minimum(length, 1.0)
         return np.asarray(0.5 + 0.5 * x)
 
 
@@ -80,12 +80,12 @@ class Region:
         return tuple(Group.of(columns, self.sampler.correlation) for columns in sorted(sets))
 
     def _set_of(self, k: int) -> tuple[int, ...]:
-        found, new = {k}, [k]
+        result, new = {k}, [k]
         while new:
             near = np.flatnonzero(self.sampler.correlation[new.pop()]).tolist()
-            new += [j for j in near if j not in found]
-            found.update(near)
-        return tuple(sorted(found))
+            new += [j for j in near if j not in result]
+            result.update(near)
+        return tuple(sorted(result))
 
     @property
     def dimensions(self) -> int:
@@ -106,8 +106,8 @@ class Region:
             rank = group.axes.shape[1]
             scores = group.scores(cube[:, at : at + rank])
             for column, score in zip(group.columns, scores.T, strict=True):
-                found = sampler.factors[column].quantile(_probability(sampler.factors[column], score, group))
-                out[:, column] = np.clip(found, lower[column], upper[column])
+                result = sampler.factors[column].quantile(_probability(sampler.factors[column], score, group))
+                out[:, column] = np.clip(result, lower[column], upper[column])
             at += rank
         if sampler.table is not None:
             rows = sampler.table.rows

@@ -162,8 +162,8 @@ class _Tally:
         self.passed += int(judged.passed.sum())
         self.count += len(judged.passed)
         order = np.argsort(judged.distance, kind="stable")[:_WORST_KEPT]
-        found = [(float(judged.distance[k]), int(block["sample"][k]), float(judged.value[k])) for k in order]
-        self.worst = sorted(self.worst + found)[:_WORST_KEPT]
+        result = [(float(judged.distance[k]), int(block["sample"][k]), float(judged.value[k])) for k in order]
+        self.worst = sorted(self.worst + result)[:_WORST_KEPT]
         return judged.passed
 
     def odds(self, design: Design, nominal: Mapping[str, np.ndarray]) -> Odds:
@@ -181,7 +181,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
     from actuator_lti.design import with_values, write_design
     from analyses.slugs import slug
 
-    found = []
+    result = []
     for place, tally in enumerate(tallies):
         timed = QUANTITIES[tally.requirement.quantity].timed
         quick = replace(task, step=None, time_figures=timed)
@@ -195,8 +195,8 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
         )
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())
-        found.append(replace(case, file=path))
-    return tuple(found)
+        result.append(replace(case, file=path))
+    return tuple(result)
 
 
 def _notes(task: SampleTask) -> tuple[str, ...]:

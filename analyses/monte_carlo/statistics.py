@@ -101,8 +101,8 @@ class _Running:
     def choose(self, ranks: Iterable[int]) -> None:
         """Note the bins that hold the wanted ranks (from 0, among the finite values)."""
         ends = np.cumsum(self.histogram)
-        found = {int(np.searchsorted(ends, r, side="right")) for r in ranks if 0 <= r < self.finite}
-        self.wanted = tuple(sorted(found)) if self.maximum > self.minimum else ()
+        result = {int(np.searchsorted(ends, r, side="right")) for r in ranks if 0 <= r < self.finite}
+        self.wanted = tuple(sorted(result)) if self.maximum > self.minimum else ()
 
     def third_pass(self, values: np.ndarray) -> None:
         finite = values[np.isfinite(values)]

@@ -55,11 +55,11 @@ class Store:
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
         if path.exists():
-            found = _read_manifest(path)
-            if {key: found.get(key) for key in wanted} != wanted:
+            result = _read_manifest(path)
+            if {key: result.get(key) for key in wanted} != wanted:
                 raise InputError("holds another study (design, seed, settings or code); take another folder",
                                  where=str(folder))  # fmt: skip
-            return cls(folder, int(found["chunk"]))
+            return cls(folder, int(result["chunk"]))
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
         write_bytes(path, text.encode())
         return cls(folder, chunk)
@@ -106,12 +106,12 @@ class Store:
 
 def _read_manifest(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        result = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {error}", where=str(path)) from error
-    if not isinstance(found, dict) or not isinstance(found.get("chunk"), int) or found["chunk"] < 1:
+    if not isinstance(result, dict) or not isinstance(result.get("chunk"), int) or result["chunk"] < 1:
         raise InputError("is no manifest of a study", where=str(path))
-    return found
+    return result
 
 
 def _whole(path: Path, count: int) -> bool:

@@ -68,9 +68,9 @@ def worst_case(
     drawn = np.vstack([task.sampler.draw(int(k), 1) for k in worst_samples])
     edges = corners(np.zeros(size), np.ones(size), task.sampler.seed)
     pool = np.vstack([edges, region.cube(drawn)])
-    found = cost(pool.T)
+    distance = cost(pool.T)
     many = max(12, min(40, 4 * size))
-    population = _padded(pool[np.argsort(found, kind="stable")[:many]], many, task.sampler.seed)
+    population = _padded(pool[np.argsort(distance, kind="stable")[:many]], many, task.sampler.seed)
     result = differential_evolution(
         cost, [(0.0, 1.0)] * size, init=population, maxiter=effort, tol=1e-10, polish=False,
         vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
@@ -80,7 +80,7 @@ def worst_case(
         bounds=[(0.0, 1.0)] * size,
         options={"maxfev": 60 * size, "xatol": 1e-9, "fatol": 1e-12},
     )  # fmt: skip
-    candidates = np.vstack([fine.x, result.x, pool[np.argmin(found)]])
+    candidates = np.vstack([fine.x, result.x, pool[np.argmin(distance)]])
     best = candidates[np.argmin(cost(candidates.T))]
     return _described(task, requirement, region.values(best[None])[0], int(worst_samples[0]), looked_at)
 

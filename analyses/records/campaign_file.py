@@ -156,7 +156,7 @@ def _run(table: Table, folder: Path) -> RunEntry:
 
 
 def _instruments(table: Table) -> Instruments:
-    found = {
+    result = {
         "torque_full_scale_Nm": table.quantity("torque_full_scale", "N*m", 10.0),
         "torque_accuracy": table.quantity("torque_accuracy", "", 0.0),
         "current_gain": table.quantity("current_gain", "", 0.0),
@@ -164,10 +164,10 @@ def _instruments(table: Table) -> Instruments:
         "torque_constant_gain": table.quantity("torque_constant", "", 0.0),
     }
     table.done()
-    for name, value in found.items():
+    for name, value in result.items():
         if value is None or value < 0.0:
             raise InputError(f"instruments: {name} = {value}: must be 0 or more", where=table.origin)
-    return Instruments(**{name: float(value or 0.0) for name, value in found.items()})
+    return Instruments(**{name: float(value or 0.0) for name, value in result.items()})
 
 
 def _spec(table: Table) -> RecordSpec:

@@ -49,7 +49,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
         _supply,
         _load,
     )
-    return tuple(found for check in checks if (found := check(design, record)) is not None)
+    return tuple(result for check in checks if (result := check(design, record)) is not None)
 
 
 def place_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
@@ -183,13 +183,13 @@ def _electrical(design: Design, record: Record) -> Finding | None:
     size = np.linalg.norm(table, axis=0)
     if not np.all(size > 0.03 * np.linalg.norm(u)) or np.linalg.cond(table / size) > 100.0:
         return _electrical_size(u, table)
-    found = np.linalg.lstsq(table, u, rcond=None)[0]
+    result = np.linalg.lstsq(table, u, rcond=None)[0]
     parts = []
-    for name, ratio in zip(("R i", "kE w"), found, strict=True):
+    for name, ratio in zip(("R i", "kE w"), result, strict=True):
         if not 1.0 / ELECTRICAL_FACTOR < ratio < ELECTRICAL_FACTOR:
             factor = named_factor(1.0 / ratio) if ratio else None
             parts.append(f"{name} counts {ratio:.3g} times" + (f": factor {factor}" if factor else ""))
-    told = "; ".join(parts) or f"R counts {found[0]:.3g} times, kE {found[1]:.3g} times"
+    told = "; ".join(parts) or f"R counts {result[0]:.3g} times, kE {result[1]:.3g} times"
     return Finding(subject="voltage against R i + kE w", passed=not parts, text=told)
 
 
@@ -234,15 +234,15 @@ def _command(design: Design, record: Record) -> Finding | None:
     return None
 
 
-def _within(subject: str, what: str, found: float, limit: float, unit: str) -> Finding | None:
+def _within(subject: str, what: str, result: float, limit: float, unit: str) -> Finding | None:
     """A largest value against a limit of the design."""
     if not isfinite(limit) or limit <= 0.0:
         return None
-    passed = found <= OVER * limit
-    text = f"{what} up to {found:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
+    passed = result <= OVER * limit
+    text = f"{what} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
     if not passed:
-        factor = explaining(found / limit, unit)
-        times = f", {found / limit:.3g} times"
+        factor = explaining(result / limit, unit)
+        times = f", {result / limit:.3g} times"
         text += times + (f": factor {factor}" if factor else "; is the unit right?")
     return Finding(subject=subject, passed=passed, text=text)
 

@@ -47,13 +47,13 @@ def fit_by_correlation(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: Float
 
 
 def _grid(time: FloatArray, values: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """Means over cells of one step, at the mean time of each cell; empty cells by interpolation."""
-    cell = np.floor((time - time[0]) / step).astype(np.int64)
-    counts = np.bincount(cell)
+    """Means over bins of one step, at the mean time of each bin; empty bins by interpolation."""
+    place = np.floor((time - time[0]) / step).astype(np.int64)
+    counts = np.bincount(place)
     centres = time[0] + (np.arange(len(counts)) + 0.5) * step
     filled = counts > 0
-    means = np.bincount(cell, values)[filled] / counts[filled]
-    times = np.bincount(cell, time)[filled] / counts[filled]
+    means = np.bincount(place, values)[filled] / counts[filled]
+    times = np.bincount(place, time)[filled] / counts[filled]
     return centres, np.interp(centres, times, means)
 
 

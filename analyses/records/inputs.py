@@ -18,15 +18,15 @@ def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ..
         return columns[column - 1] if isinstance(column, int) and column <= len(columns) else str(column)
 
     time = spec.time
-    found = []
+    result = []
     if time.column is not None:
         unit = f"ticks of {time.tick_s:g} s" if time.tick_s else time.unit
-        found.append(InputColumn(column=name(time.column), signal="time", unit=unit))
-    found += [
+        result.append(InputColumn(column=name(time.column), signal="time", unit=unit))
+    result += [
         InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals
     ]
-    read = {one.column for one in found}
-    return (*found, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
+    read = {one.column for one in result}
+    return (*result, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
 
 
 def spec_of_names(
@@ -52,11 +52,11 @@ def spec_of_names(
             else:
                 why[column] = f"the time is read from {time}"
             continue
-        found = _signal(column, why)
-        if found is not None and found.name in signals:
-            why[column] = f"{MEANINGS[found.name]} is read from {signals[found.name].column}"
-        elif found is not None:
-            signals[found.name] = found
+        result = _signal(column, why)
+        if result is not None and result.name in signals:
+            why[column] = f"{MEANINGS[result.name]} is read from {signals[result.name].column}"
+        elif result is not None:
+            signals[result.name] = result
     if time is None or not signals:
         return None, why
     unit = taken_apart(time).unit or "s"
@@ -74,8 +74,8 @@ def _signal(column: str, why: dict[str, str]) -> SignalColumn | None:
     if NOT_NEEDED.get(parts.base) == parts.unit:
         why[column] = "the position once more"
         return None
-    found = signal_of(parts.base, parts.unit)
-    if found is None:
+    signal = signal_of(parts.base, parts.unit)
+    if signal is None:
         why[column] = "no name and unit that are known together"
         return None
-    return SignalColumn(name=found.name, column=column, unit=parts.unit, value="rms" if parts.rms else "dc")
+    return SignalColumn(name=signal.name, column=column, unit=parts.unit, value="rms" if parts.rms else "dc")

@@ -126,7 +126,7 @@ def _take_text(name: str, parts: Parts, order: str, content: MatContent) -> None
 def _take_cell(name: str, parts: Parts, order: str, content: MatContent) -> None:
     """A cell array whose cells are all texts of one row."""
     inner = MatContent()
-    found: list[str] = []
+    result: list[str] = []
     for kind, body, place in parts[3:]:
         inner.texts.clear()
         if kind == MATRIX and _class_of(body, order) == TEXT:
@@ -135,8 +135,8 @@ def _take_cell(name: str, parts: Parts, order: str, content: MatContent) -> None
         if len(texts) != 1:
             content.passed_over.append(name)
             return
-        found += texts
-    content.texts[name] = tuple(found)
+        result += texts
+    content.texts[name] = tuple(result)
 
 
 def _take_structure(name: str, parts: Parts, order: str, content: MatContent) -> None:

@@ -135,8 +135,8 @@ def _words(base: str, unit: str | None) -> ColumnName:
 
 def is_time(column: str) -> bool:
     """Whether a column name means the time, in a unit of time."""
-    found = taken_apart(column)
-    return found.base in TIME_NAMES and found.unit is not None and fits(found.unit, "s")
+    result = taken_apart(column)
+    return result.base in TIME_NAMES and result.unit is not None and fits(result.unit, "s")
 
 
 def fits(unit: str, known: str) -> bool:
@@ -167,9 +167,9 @@ def canonical(name: str, unit: str, where: str = "") -> str:
         For a name that nothing reads, or one whose unit does not fit.
     """
     base = "_".join(word for word in re.split(r"[^a-z0-9]+", name.lower()) if word)
-    found = signal_of(base, unit)
-    if found is not None:
-        return found.name
+    result = signal_of(base, unit)
+    if result is not None:
+        return result.name
     by_name = [signal for signal in SIGNALS if base == signal.name or base in signal.also]
     if by_name:
         wanted = " or ".join(dict.fromkeys(signal.unit for signal in by_name))

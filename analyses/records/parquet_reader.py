@@ -45,12 +45,12 @@ def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
         table = file.read()
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"is no Parquet file: {error}", where=where) from None
-    found = {}
+    result = {}
     for field in table.schema:
         if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
             column = table.column(field.name).cast(pa.float64(), safe=False)
-            found[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
-    return found
+            result[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
+    return result
 
 
 def _digest(path: Path) -> str:

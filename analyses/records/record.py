@@ -138,11 +138,11 @@ class Record:
 def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
     """How far straight lines over a gap are from a signal, as a share of its range (95 % point)."""
     span = max(2, round(gap))
-    reach = float(np.ptp(values))
-    if len(values) <= span or reach == 0.0:
-        return 0.0 if reach == 0.0 else 1.0
+    span_of_values = float(np.ptp(values))
+    if len(values) <= span or span_of_values == 0.0:
+        return 0.0 if span_of_values == 0.0 else 1.0
     half = span // 2
     share = (time_s[half : half + len(values) - span] - time_s[:-span]) / (time_s[span:] - time_s[:-span])
     line = values[:-span] + (values[span:] - values[:-span]) * share
-    error = float(np.quantile(np.abs(values[half : half + len(line)] - line), 0.95)) / reach
+    error = float(np.quantile(np.abs(values[half : half + len(line)] - line), 0.95)) / span_of_values
     return error if gap >= 1.5 else 0.25 * error

@@ -26,13 +26,13 @@ class Converter:
 def unit_factor(unit: str, known: str | None, what: str) -> float:
     """Factor from ``unit`` to SI; refused where its dimension is not that of ``known``."""
     try:
-        found = parse_unit(unit)
+        result = parse_unit(unit)
         wanted = parse_unit(known) if known is not None else None
     except ValueError as error:
         raise InputError(f'{what}.unit = "{unit}": {error}') from None
-    if wanted is not None and not compatible(found, wanted):
+    if wanted is not None and not compatible(result, wanted):
         raise InputError(f'{what}.unit = "{unit}": must be a unit like {known}')
-    return found.factor
+    return result.factor
 
 
 def converter(signal: SignalColumn) -> Converter:

@@ -85,17 +85,17 @@ def manoeuvres(
         How long the linear loop takes to settle.
     """
     full = design.validation.full_deflection_rad
-    found = []
+    result = []
     travel = full / rate_rad_s if 0.0 < rate_rad_s < math.inf else 0.0
     swing = 2.0 * math.sqrt(full / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else 0.0
     time = min(travel + 4.0 * swing + 4.0 * settling_s, LONGEST_TICKS * design.controller.period_s)
-    found.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
+    result.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
     slow = _sine_hz(full, rate_rad_s, acceleration_rad_s2)
     names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
     for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True):
         if slow is not None:
-            found.append(_sine(design, name, full, share * slow, load_Nm))
-    return tuple(found)
+            result.append(_sine(design, name, full, share * slow, load_Nm))
+    return tuple(result)
 
 
 def _sine_hz(full: float, rate: float, acceleration: float) -> float | None:

@@ -71,19 +71,19 @@ def specification(
     loops = assemble_loops(design) if loops is None else loops
     settling_s = linear_steady_state(loops, np.array([1.0])).settling_ticks * design.controller.period_s
     loads = design.validation.loads_Nm
-    found = tuple(capability(design, load, settling_s) for load in loads)
+    result = tuple(capability(design, load, settling_s) for load in loads)
     step(1)
-    rate = min(one.figures.output_rate_rad_s for one in found)
-    push = min(one.figures.acceleration_rad_s2 for one in found)
+    rate = min(one.figures.output_rate_rad_s for one in result)
+    push = min(one.figures.acceleration_rad_s2 for one in result)
     times = step_times(design, rate, push, settling_s)
     step(2)
     moves = tuple(
         move
-        for load, one in zip(loads, found, strict=True)
+        for load, one in zip(loads, result, strict=True)
         for move in manoeuvres(
             design, load, one.figures.output_rate_rad_s, one.figures.acceleration_rad_s2, settling_s
         )
     )
     step(3)
-    top = max(one.figures.output_rate_rad_s for one in found) * design.total_ratio
-    return Specification(design, found, times, torque_speed_plane(design, top), moves)
+    top = max(one.figures.output_rate_rad_s for one in result) * design.total_ratio
+    return Specification(design, result, times, torque_speed_plane(design, top), moves)

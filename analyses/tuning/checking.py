@@ -18,12 +18,12 @@ _SMALL = 0.05
 
 
 def nonlinear_checks(
-    tuned: Design, problem: Problem, gains: np.ndarray, found: np.ndarray
+    tuned: Design, problem: Problem, gains: np.ndarray, result: np.ndarray
 ) -> tuple[NonlinearCheck, ...]:
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
     from analyses.variant_figures import LargeSignal
 
-    worst = int(np.argmin(found.min(axis=1)))
+    worst = int(np.argmin(result.min(axis=1)))
     plan = LargeSignal.plan(tuned)
     rows = {"nominal": problem.all_corners[0], "worst corner": problem.all_corners[worst]}
     population = Population(

@@ -74,8 +74,8 @@ class Problem:
         points = np.tile(nominal, (2 * len(nominal) + 1, 1))
         for k in range(len(nominal)):
             points[2 * k + 1 : 2 * k + 3, k] = ends[k]
-        found = self._distances(self.start[None, :], points, self.toleranced)[0]
-        moved = np.abs(found[1:] - found[0]).max(axis=1).reshape(-1, 2).max(axis=1)
+        result = self._distances(self.start[None, :], points, self.toleranced)[0]
+        moved = np.abs(result[1:] - result[0]).max(axis=1).reshape(-1, 2).max(axis=1)
         chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
         return tuple(self.toleranced[k] for k in chosen)
 
@@ -96,8 +96,8 @@ class Problem:
         if np.array_equal(matrix, np.eye(size)):
             return np.vstack([nominal, np.where(bits, upper, lower)])
         moved = np.clip((2.0 * bits - 1.0) @ semidefinite_root(matrix).T, -1.0, 1.0)
-        reach = np.where(moved > 0.0, upper - nominal, nominal - lower)
-        return np.vstack([nominal, np.unique(nominal + moved * reach, axis=0)])
+        half_range = np.where(moved > 0.0, upper - nominal, nominal - lower)
+        return np.vstack([nominal, np.unique(nominal + moved * half_range, axis=0)])
 
     def distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).
@@ -119,8 +119,8 @@ class Problem:
         out = np.empty((population.count, len(self.requirements)))
         radius = np.max([linear.pole_radius(loop) for loop in linear.loops], axis=0)
         for k, requirement in enumerate(self.requirements):
-            found = judge(requirement, self.design, columns).distance / size_of(requirement)
-            out[:, k] = np.where(np.isneginf(found), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), found)
+            result = judge(requirement, self.design, columns).distance / size_of(requirement)
+            out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
         return np.minimum(out, 10.0).reshape(count, many, len(self.requirements))
 
     def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:

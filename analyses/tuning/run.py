@@ -76,15 +76,15 @@ def tune(
     tell(2, 5)
     gains = _rounded(problem, solution) if settings.rounded else solution.gains
     tell(3, 5)
-    found = problem.distances(gains[None, :], problem.all_corners)[0]
+    result = problem.distances(gains[None, :], problem.all_corners)[0]
     tuned = _tuned(problem, gains)
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(4, 5)
-    requirements = _binding(problem, gains, found)
-    checks = nonlinear_checks(tuned, problem, gains, found) if settings.check else ()
+    requirements = _binding(problem, gains, result)
+    checks = nonlinear_checks(tuned, problem, gains, result) if settings.check else ()
     tell(5, 5)
     return TuningResult(
-        bool(found.min() >= 0.0),
+        bool(result.min() >= 0.0),
         design,
         tuned,
         _settings(problem, rules, solution.gains, gains),
@@ -94,7 +94,7 @@ def tune(
         checks,
         curve,
         problem.evaluations,
-        _notes(problem, gains, found),
+        _notes(problem, gains, result),
     )
 
 
@@ -119,14 +119,14 @@ def _tuned(problem: Problem, gains: np.ndarray) -> Design:
     return replace(changed, name=f"{problem.design.name}-tuned")
 
 
-def _binding(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[BindingRequirement, ...]:
+def _binding(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[BindingRequirement, ...]:
     """Every requirement at its worst corner."""
-    smallest = float(found.min())
+    smallest = float(result.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
     made = []
     for k, requirement in enumerate(problem.requirements):
-        corner = int(np.argmin(found[:, k]))
-        relative = float(found[corner, k])
+        corner = int(np.argmin(result[:, k]))
+        relative = float(result[corner, k])
         known = -3.0 < relative < 10.0
         distance = relative * size_of(requirement) if known else None
         made.append(
@@ -173,7 +173,7 @@ def _settings(
     return tuple(made)
 
 
-def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str, ...]:
+def _notes(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[str, ...]:
     notes = [
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
         "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
@@ -181,8 +181,8 @@ def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str,
     left = [f.path for f in problem.toleranced if f not in problem.factors]
     if left:
         notes.append(f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}.")
-    if found.min() < 0.0:
-        missed = [r.id for k, r in enumerate(problem.requirements) if found[:, k].min() < 0.0]
+    if result.min() < 0.0:
+        missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
         notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")
     at_end = (gains <= problem.lower * (1 + 1e-9)) | (gains >= problem.upper * (1 - 1e-9))
     ends = [path for path, at in zip(problem.paths, at_end, strict=True) if at]

@@ -32,21 +32,21 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
     if not np.isfinite(centre):
         return ()
     targets = [float(hz) for hz in centre * np.geomspace(*_SPAN, POINTS)]
-    found: list[np.ndarray] = []
+    result: list[np.ndarray] = []
     for wanted in targets:
-        starts = [gains, *found[-1:]]
+        starts = [gains, *result[-1:]]
         tried = [_best(problem, start, working, wanted, others) for start in starts]
-        found.append(_better(problem, [*starts, *tried], working, wanted, others))
+        result.append(_better(problem, [*starts, *tried], working, wanted, others))
     for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
-        found[k] = _better(problem, found[k : k + 2], working, targets[k], others)
-    points = [_point(problem, one, working, others) for one in found]
+        result[k] = _better(problem, result[k : k + 2], working, targets[k], others)
+    points = [_point(problem, one, working, others) for one in result]
     return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
 
 
 def _margins(problem: Problem, rows: np.ndarray, working: np.ndarray) -> np.ndarray:
     """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
-    found = [problem.figure("phase_margin", loop, rows, working) for loop in loops_of(problem.design)]
-    return np.clip(np.concatenate(found, axis=1), -180.0, 180.0)
+    result = [problem.figure("phase_margin", loop, rows, working) for loop in loops_of(problem.design)]
+    return np.clip(np.concatenate(result, axis=1), -180.0, 180.0)
 
 
 def _better(

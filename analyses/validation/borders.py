@@ -40,7 +40,9 @@ FAINTEST = 3e-5  # where a reversal, or a coupling that comes free, may end a mo
 FAINT_IN_GRAVITY = 1e-9  # which is proportional to the angle only where that is small: growth takes its time
 GROWN = 1e5  # times the kick: no motion that dies out reaches that
 NOTHING = 1e-6  # of the kick: what is left counts as nothing
-NOTHING_RIDING = 1e-4  # the same on a ride, where rounding of the growing angle is seen in a speed estimate
+NOTHING_MOVING = (
+    1e-4  # the same on a bias motion, where rounding of the growing angle is seen in a speed estimate
+)
 NEAR = 0.01  # relative width of the bracket from which on the frequency seen is that at the border
 OFF_FREQUENCY = 1e-2  # relative: so far off, the windows are fitted anew
 ATTEMPTS = 3  # at a border, each with more time to settle
@@ -62,8 +64,9 @@ class Search:
     Attributes
     ----------
     setup : Rig
-        The loop; it rides. For the border of the linear loop limits are off: at many times the gain a signal
-        that dies out may still reach a limit on its way (where they are on, that counts as growth).
+        The loop, on its bias motion. For the border of the linear loop limits are off: at many times the
+        gain a signal that dies out may still reach a limit on its way (where they are on, that counts as
+        growth).
     kind : {"gain up", "gain down", "delay"}
         What is varied at the rig's point: the loop gain as a factor from 1 up or down, or a delay in samples
         of the point from 0 up.
@@ -71,7 +74,7 @@ class Search:
         Where the oscillation is expected: sets the length of the windows, not the answer.
     settle_ticks : int
         Before the two windows.
-    reach : float
+    search_range : float
         Largest factor of gain (up or down).
     cycles : int
         Periods in a window.
@@ -90,7 +93,7 @@ class Search:
     kind: Kind
     frequency_hz: float
     settle_ticks: int
-    reach: float = GAIN_RANGE
+    search_range: float = GAIN_RANGE
     cycles: int = CYCLES
     close: float = CLOSE
     smooth: bool = True
@@ -148,23 +151,23 @@ class Search:
         signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
         room = replace(self.setup, limits_on=True).room[signal[self.setup.point]]
         if room == inf:
-            room = max(abs(self.setup.ride.speed_rad_s), 1.0)
+            room = max(abs(self.setup.bias.speed_rad_s), 1.0)
         if self.setup.design.load.gravity is not None:
             return FAINT_IN_GRAVITY * room
-        return (FAINTEST if self.setup.ride.delicate else FAINT) * room
+        return (FAINTEST if self.setup.bias.delicate else FAINT) * room
 
     def growth(self, result: BatchResult) -> Floats:
         """Growth of the oscillation from window to window as a logarithm; +-inf where it is plain."""
         last, earlier = (self.size(result, k) for k in (0, 1))
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.log(last / earlier)
-        nothing = NOTHING_RIDING if self.setup.ride.speed_rad_s else NOTHING
-        gone = (last <= nothing * self.kick) | ~np.isfinite(found)
+            rate = np.log(last / earlier)
+        nothing = NOTHING_MOVING if self.setup.bias.speed_rad_s else NOTHING
+        gone = (last <= nothing * self.kick) | ~np.isfinite(rate)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
-        burst = ~result.ok | limited | ((result.events > 0) & self.setup.ride.delicate)
+        burst = ~result.ok | limited | ((result.events > 0) & self.setup.bias.delicate)
         if self.setup.design.load.gravity is not None:  # a motion that has grown large is bounded by it
             burst |= last > GROWN * self.kick
-        return np.where(burst, inf, np.where(gone, -inf, found))
+        return np.where(burst, inf, np.where(gone, -inf, rate))
 
     def size(self, result: BatchResult, last: int) -> Floats:
         """Size in a window: of the fundamental, or from crest to crest where no frequency is expected."""
@@ -177,7 +180,7 @@ class Search:
         """First values to try, outwards from the nominal drive."""
         if self.kind == "delay":
             return np.geomspace(SHORTEST_DELAY_SAMPLES, LONGEST_DELAY_SAMPLES, 2 * VALUES)
-        steps = np.geomspace(1.0 + 1e-3, self.reach, 2 * VALUES if self.smooth else VALUES)
+        steps = np.geomspace(1.0 + 1e-3, self.search_range, 2 * VALUES if self.smooth else VALUES)
         return steps if self.kind == "gain up" else 1.0 / steps
 
     def frequency(self, result: BatchResult) -> Floats:
@@ -202,7 +205,7 @@ class Border:
     Attributes
     ----------
     value : float or None
-        Factor of the gain, or delay in samples of the point; ``None`` where none was found within the reach.
+        Factor of the gain, or delay in samples of the point; ``None``: none in the search range.
     bracket : tuple of float
         Decays at the first, grows at the second (the ends of the search where none was found).
     frequency_hz : float or None
@@ -236,7 +239,7 @@ class _Hunt:
     beside: tuple[tuple[float, float], ...] = ()
     frequency_hz: float | None = None
     runs: int = 0
-    found: bool | None = None
+    bracketed: bool | None = None
     spoiled: str = ""
     shift: float | None = None
     size: float = 0.0
@@ -247,10 +250,10 @@ class _Hunt:
         growth, hertz = self.search.growth(result), self.search.frequency(result)
         self.runs += growth.size
         above = np.flatnonzero(growth >= 0.0)
-        if self.found is None:
-            self.found = bool(above.size)
+        if self.bracketed is None:
+            self.bracketed = bool(above.size)
             self.low, self.high = self.nominal(), float(self.values[-1])
-            if not self.found:
+            if not self.bracketed:
                 return
         k = int(above[0]) if above.size else growth.size
         if k > 0:
@@ -273,17 +276,17 @@ class _Hunt:
 
     @property
     def done(self) -> bool:
-        if self.found is None:
+        if self.bracketed is None:
             return False
         narrow = abs(log(self.high / self.low)) < self.search.close
-        return not self.found or (narrow and (not self.search.smooth or all(np.isfinite(self.growths))))
+        return not self.bracketed or (narrow and (not self.search.smooth or all(np.isfinite(self.growths))))
 
     def border(self, *, stopped: bool = False) -> Border:
         """Interpolate the growth between the ends."""
         bracket = (self.low, self.high)
         if self.spoiled or (stopped and not self.done):
             return Border(None, bracket, None, self.runs, self.spoiled or CUT)
-        if not self.found:
+        if not self.bracketed:
             return Border(None, bracket, None, self.runs)
         width = abs(log(self.high / self.low))
         if self.deceived:
@@ -301,7 +304,7 @@ class _Hunt:
     @property
     def smooth(self) -> bool:
         """Whether a border has been found between two growth rates."""
-        return bool(self.found and self.done and self.search.smooth and np.isfinite(self.growths).all())
+        return bool(self.bracketed and self.done and self.search.smooth and np.isfinite(self.growths).all())
 
     @property
     def looked_at_again(self) -> Floats:
@@ -384,7 +387,7 @@ def find_borders(
     """
     hunts = [_Hunt(search, search.grid()) for search in searches]
     for k in range(ATTEMPTS):
-        open_ = [hunt for hunt in hunts if hunt.found is None and not hunt.spoiled]
+        open_ = [hunt for hunt in hunts if hunt.bracketed is None and not hunt.spoiled]
         if not _hunt(open_, threads, progress):
             return [hunt.border(stopped=True) for hunt in hunts]
         if k < ATTEMPTS - 1:
@@ -441,7 +444,7 @@ def _control(hunts: list[_Hunt], threads: int | None) -> None:
     for k, hunt in enumerate(ones):
         own = result.part(slice(k, k + 1))
         met = [f"{name} limit" for name in LIMITERS if own.limit_fraction(name)[0] > 0.0]
-        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.ride.delicate else []
+        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.bias.delicate else []
         if not met and not hunt.search.smooth and 0.0 <= float(hunt.search.growth(own)[0]) < inf:
             hunt.spoiled = "the drive as it is has not come to rest within the time given"
         if met and bool(own.ok[0]):

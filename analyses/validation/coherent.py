@@ -44,8 +44,8 @@ def coherent(
 
     Examples
     --------
-    >>> found = coherent([333.0, 2.0], 1e-4, base_ticks=2)
-    >>> found.ticks.tolist(), found.cycles.tolist()
+    >>> result = coherent([333.0, 2.0], 1e-4, base_ticks=2)
+    >>> result.ticks.tolist(), result.cycles.tolist()
     ([810, 5000], [27, 1])
     """
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))

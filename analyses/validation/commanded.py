@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from analyses.validation.bias_motion import BiasMotion, bias_motion, may_stand, standing
 from analyses.validation.coherent import coherent
 from analyses.validation.response import Sweep
-from analyses.validation.riding import Ride, may_stand, ride, standing
 from analyses.validation.rig import every, stages_of
 from nonlinear import Rows, Trajectory
 
@@ -49,9 +49,9 @@ def command_sweep(design: Design, frequency_hz: Floats, settle_ticks: int) -> Sw
     """
     base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
     window = coherent(frequency_hz, design.controller.period_s, base)
-    found = standing(design) if may_stand(design) else ride(design)
+    motion = standing(design) if may_stand(design) else bias_motion(design)
     points = [
-        _point(design, found, int(ticks), float(hertz), base, settle_ticks)
+        _point(design, motion, int(ticks), float(hertz), base, settle_ticks)
         for ticks, hertz in zip(window.ticks, window.frequency_hz, strict=True)
     ]
     nothing = np.full(len(points), np.nan, complex)
@@ -69,7 +69,7 @@ def command_sweep(design: Design, frequency_hz: Floats, settle_ticks: int) -> Sw
         distortion=np.zeros(len(points)),
         unsteadiness=np.array([point.unsteadiness for point in points]),
         reason=tuple(point.reason for point in points),
-        speed_rad_s=found.speed_rad_s,
+        speed_rad_s=motion.speed_rad_s,
     )
 
 
@@ -83,12 +83,14 @@ class _Point:
     reason: str
 
 
-def _point(design: Design, found: Ride, ticks: int, hertz: float, base: int, settle_ticks: int) -> _Point:
+def _point(
+    design: Design, motion: BiasMotion, ticks: int, hertz: float, base: int, settle_ticks: int
+) -> _Point:
     """Run one frequency, again with less amplitude or more time where it asks for it."""
     amplitude = FAINT * _full(design)
     for attempt in range(TRIES):
-        run = _run(design, found, amplitude, hertz, settle_ticks + 2 * ticks, base)
-        point = _read(design, found, run, amplitude, hertz, ticks // base)
+        run = _run(design, motion, amplitude, hertz, settle_ticks + 2 * ticks, base)
+        point = _read(design, motion, run, amplitude, hertz, ticks // base)
         if not point.reason or attempt == TRIES - 1:
             break
         if point.reason == "not steady":
@@ -109,24 +111,26 @@ def _full(design: Design) -> float:
     return design.limits.voltage_V if stage == "voltage" else sizes[stage]
 
 
-def _run(design: Design, found: Ride, amplitude: float, hertz: float, ticks: int, base: int) -> Trajectory:
+def _run(
+    design: Design, motion: BiasMotion, amplitude: float, hertz: float, ticks: int, base: int
+) -> Trajectory:
     """The run, recorded at the instants of the outermost stage."""
-    row = Rows.of(design, friction_on=found.friction_on, limits_on=False)
-    found.load(row)
-    row["twist_start"] = found.twist_rad
-    if not found.speed_rad_s and found.twist_rad and design.controller.position is not None:
-        angle = design.ratio_to_coupling * found.twist_rad  # the output stands at zero
+    row = Rows.of(design, friction_on=motion.friction_on, limits_on=False)
+    motion.load(row)
+    row["twist_start"] = motion.twist_rad
+    if not motion.speed_rad_s and motion.twist_rad and design.controller.position is not None:
+        angle = design.ratio_to_coupling * motion.twist_rad  # the output stands at zero
         row["angle_start"] = angle
         if design.controller.position.sensor == "motor":
             row.step("bias", angle / design.total_ratio, -1.0)
     row["friction_feedforward"] = 0.0  # the sign of the command's motion: no part of a linear response
     row["ticks"], row["record_every"] = ticks, base
     row.sine("command", amplitude, hertz)
-    if found.speed_rad_s:
-        row["speed_start"], row["current_start"] = found.speed_rad_s, found.current_A
-        row["load_speed_start"] = found.speed_rad_s / design.ratio_to_coupling
-        under = {"current": found.current_A, "voltage": found.voltage_V}
-        bias = under.get(design.controller.outermost, found.speed_rad_s / design.total_ratio)
+    if motion.speed_rad_s:
+        row["speed_start"], row["current_start"] = motion.speed_rad_s, motion.current_A
+        row["load_speed_start"] = motion.speed_rad_s / design.ratio_to_coupling
+        under = {"current": motion.current_A, "voltage": motion.voltage_V}
+        bias = under.get(design.controller.outermost, motion.speed_rad_s / design.total_ratio)
         if design.controller.outermost == "position":
             row.ramp("bias", bias)
         else:
@@ -135,12 +139,12 @@ def _run(design: Design, found: Ride, amplitude: float, hertz: float, ticks: int
 
 
 def _read(
-    design: Design, found: Ride, run: Trajectory, amplitude: float, hertz: float, samples: int
+    design: Design, motion: BiasMotion, run: Trajectory, amplitude: float, hertz: float, samples: int
 ) -> _Point:
     """Response over the last window of whole periods, and its change from the one before."""
     values = getattr(run, SIGNAL.get(design.controller.outermost, "motor_speed_rad_s"))
     if design.controller.outermost == "position":
-        values = values - found.speed_rad_s / design.total_ratio * run.time_s
+        values = values - motion.speed_rad_s / design.total_ratio * run.time_s
     turned = np.exp(-2j * np.pi * hertz * run.time_s)
     n = values.size
     last, before = (
@@ -155,11 +159,11 @@ def _read(
         reason = run.status
     elif acting:
         reason = f"{acting[0]} limit"
-    elif found.friction_on and speed.min() <= 0.0:
+    elif motion.friction_on and speed.min() <= 0.0:
         reason = "speed reversal"
     elif design.load.gravity is not None and np.ptp(run.output_angle_rad) > SMALL_ANGLE_RAD:
         reason = "gravity is not proportional to the angle"
-    elif found.coupling_Nm and _parted(run, n - samples):
+    elif motion.coupling_Nm and _parted(run, n - samples):
         reason = "the coupling comes free"
     # a speed is commanded at the output, and predicted at the motor
     commanded = amplitude * (design.total_ratio if design.controller.outermost == "velocity" else 1.0)

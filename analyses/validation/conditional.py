@@ -23,9 +23,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
+from analyses.validation.bias_motion import full_torque_Nm
 from analyses.validation.confirm import oscillation_hz
 from analyses.validation.release import full_range
-from analyses.validation.riding import full_torque_Nm
 from analyses.validation.rig import points_of
 from nonlinear import LIMITERS, Rows
 
@@ -122,14 +122,14 @@ class Conditional:
     end_rad: float | None = None
 
     @property
-    def found(self) -> bool:
+    def diverges(self) -> bool:
         """Whether a command within full deflection does not settle."""
         return self.threshold_rad is not None
 
     @property
     def hidden(self) -> bool:
         """Whether the linear margins call this drive stable all the same."""
-        return self.found and all(m.stable for m in self.margins.values())
+        return self.diverges and all(m.stable for m in self.margins.values())
 
 
 def saturation_gain(ratio: float) -> float:
@@ -175,12 +175,12 @@ def conditional_stability(
         for point in points_of(design)
         if point != "output"
     }
-    found = [
+    result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
         if margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
-    predictions = tuple(one for one in found if one is not None)
+    predictions = tuple(one for one in result if one is not None)
     design = _quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
     hertz, amplitude, end = None, None, None
@@ -216,14 +216,14 @@ def _quiet(design: Design) -> Design:
 def _limits(design: Design) -> list[tuple[str, float, str]]:
     """Every limit behind a controller whose loop may have a lower gain margin: point, limit, name."""
     limits, points = design.limits, points_of(design)
-    found = [("u", limits.voltage_V, "voltage limit")]
+    result = [("u", limits.voltage_V, "voltage limit")]
     if "i_ref" in points:
         short = limits.voltage_V / (design.effective_motor.resistance_ohm or 1.0)
         name = "current limit" if limits.peak_current_A <= short else "voltage limit as a current, U/R"
-        found = [("i_ref", min(limits.peak_current_A, short), name)]
+        result = [("i_ref", min(limits.peak_current_A, short), name)]
     if "w_ref" in points:
-        found.append(("w_ref", limits.speed_rad_s, "speed limit"))
-    return [item for item in found if isfinite(item[1])]
+        result.append(("w_ref", limits.speed_rad_s, "speed limit"))
+    return [item for item in result if isfinite(item[1])]
 
 
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:

@@ -48,7 +48,7 @@ class Confirmation:
     kind : {"gain up", "gain down", "delay", "computing delay"}
     predicted : float or None
         Factor of the loop gain, or delay in samples of the point (computing delay: in ticks); ``None`` where
-        the linear loop has no such margin within the reach of the search.
+        the linear loop has no such margin within the search range.
     predicted_hz : float or None
         Where the linear loop would oscillate; 0 where a real pole leaves the unit circle at 1 (it drifts).
     instrument : float or None
@@ -152,25 +152,25 @@ def confirm_margins(
 ) -> tuple[Confirmation, ...]:
     """Put all questions to the simulator together; see `stage_questions`, `point_questions`."""
     borders = find_borders([q.search for q in questions], threads=threads, progress=progress)
-    found = [question.answer(border) for question, border in zip(questions, borders, strict=True)]
-    return tuple(_doubted(questions, found, threads))
+    result = [question.answer(border) for question, border in zip(questions, borders, strict=True)]
+    return tuple(_doubted(questions, result, threads))
 
 
 def _doubted(
-    questions: Sequence[Question], found: list[Confirmation], threads: int | None
+    questions: Sequence[Question], result: list[Confirmation], threads: int | None
 ) -> list[Confirmation]:
     """Look again, with a longer wait, for what contradicts: a slow motion may look like growth."""
-    odd = [k for k, item in enumerate(found) if not item.passed or item.border.unknown == SLOW]
+    odd = [k for k, item in enumerate(result) if not item.passed or item.border.unknown == SLOW]
     if not odd:
-        return found
+        return result
     searches = []
     for k in odd:
         search = questions[k].search
         wait = min(AGAIN * search.settle_ticks, max(LONGEST_AGAIN_TICKS, search.settle_ticks))
         searches.append(replace(search, settle_ticks=wait))
     for k, search, border in zip(odd, searches, find_borders(searches, threads=threads), strict=True):
-        found[k] = replace(questions[k], search=search).answer(border)
-    return found
+        result[k] = replace(questions[k], search=search).answer(border)
+    return result
 
 
 def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_ticks: int) -> list[Question]:
@@ -178,14 +178,14 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     ups = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio > 1.0]
     downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
     up, down = min(ups, default=None), max(downs, default=None)
-    found = [_gain(setup, "gain up", up, settle_ticks), _gain(setup, "gain down", down, settle_ticks)]
+    result = [_gain(setup, "gain up", up, settle_ticks), _gain(setup, "gain down", down, settle_ticks)]
     delay = margins.delay_margin
     if delay is not None and delay.samples is not None and isfinite(delay.samples):
         hertz = delay.frequency_rad_s / (2.0 * pi)
         best = instrument_delay(loop.open_loop, delay.samples, delay.frequency_rad_s * loop.period_s)
         search = Search(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
-        found.append(Question(search, "delay", delay.samples, hertz, best))
-    return found
+        result.append(Question(search, "delay", delay.samples, hertz, best))
+    return result
 
 
 def point_questions(
@@ -201,7 +201,7 @@ def point_questions(
     """
     from actuator_lti.loops import exact_margins
 
-    found = []
+    result = []
     for point, setup in setups.items():
         exact, loop = (margins or {}).get(point) or exact_margins(loops, point), loops.break_points[point]
         if not exact.stable:
@@ -212,13 +212,13 @@ def point_questions(
             there = isfinite(ratio) and ratio > 0.0
             border = (ratio, 2.0 * pi * oscillation_hz(loop, gain=ratio)) if there else None
             asked = _gain(setup, kind, border, settle_ticks)  # type: ignore[arg-type]
-            found.append(replace(asked, settles_ticks=max(own, asked.settles_ticks)))
+            result.append(replace(asked, settles_ticks=max(own, asked.settles_ticks)))
         if exact.delay_s is not None and isfinite(exact.delay_s):
             ticks = exact.delay_s / setup.design.controller.period_s
             hertz = oscillation_hz(loop, delay_s=exact.delay_s)
             search = ComputingDelay(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
-            found.append(Question(search, "computing delay", ticks, hertz))
-    return found
+            result.append(Question(search, "computing delay", ticks, hertz))
+    return result
 
 
 def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
@@ -236,11 +236,11 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
     values = distance(grid)
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
-    found = []
+    result = []
     for k in dips:  # a narrow one is deeper than the grid shows
         ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
-        found.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
-    best = min(found, key=lambda item: float(item.fun))
+        result.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
+    best = min(result, key=lambda item: float(item.fun))
     nyquist = 0.5 / loop.period_s
     at_minus_one = float(distance(np.log(nyquist))[0])
     if values[0] <= min(best.fun, at_minus_one):
@@ -249,7 +249,7 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
 
 
 def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
-    """A gain margin; where none is predicted within reach the search looks all the same."""
+    """A gain margin; where none is predicted within the search range the search looks all the same."""
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
         return Question(_blind(setup, kind, settle_ticks), kind, None, None, settles_ticks=settle_ticks)
     ratio, omega = predicted
@@ -269,9 +269,9 @@ def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
     wait = min(settle_ticks, LONGEST_BLIND_TICKS)
     if kind == "gain up":
         hertz = min(0.0625 / setup.period_s, CYCLES / (0.5 * wait * setup.design.controller.period_s))
-        return Search(setup, kind, hertz, wait, reach=100.0, smooth=False)
+        return Search(setup, kind, hertz, wait, search_range=100.0, smooth=False)
     hertz = 3.0 / (max(wait, 100) * setup.design.controller.period_s)
-    return Search(setup, kind, hertz, 2 * wait, reach=10.0, cycles=6, smooth=False)
+    return Search(setup, kind, hertz, 2 * wait, search_range=10.0, cycles=6, smooth=False)
 
 
 def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Search:

@@ -205,7 +205,7 @@ def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], waited_ticks: floa
     tick_s = control.period_s
     span = encoder.difference_samples * velocity.every * tick_s
     per_angle = 1.0 / span if encoder.speed == "difference" else 2.0 * (encoder.bandwidth_rad_s or 0.0)
-    angle = abs(setup.ride.speed_rad_s) * (waited_ticks + 2.0 * window) * tick_s
+    angle = abs(setup.bias.speed_rad_s) * (waited_ticks + 2.0 * window) * tick_s
     speed = np.spacing(np.maximum(angle, 1e-300)) * per_angle
     stage = producer(setup.design, setup.point)
     gain = 1.0 if stage == "position" else velocity.gain
@@ -309,15 +309,15 @@ def _phase_margin(sweep: Sweep, error: float) -> tuple[Reading, Reading]:
     with np.errstate(divide="ignore"):
         f, gain = distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
     _, phase = distinct(sweep.frequency_hz, np.degrees(_phase(sweep.open_loop)))
-    found = []
+    result = []
     for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
         if not np.isfinite(gain[k : k + 2]).all():
             continue  # a point that could not be measured hides what lies between
         hertz = crossing(f, gain, int(k), 0.0, error)
         angle = value_at(f, phase, int(k), hertz, float(np.degrees(error)))
         assert angle.value is not None
-        found.append((hertz, Reading((angle.value + 360.0) % 360.0 - 180.0, angle.error)))
-    return min(found, key=lambda item: abs(item[1].value or 0.0), default=(NOTHING, NOTHING))
+        result.append((hertz, Reading((angle.value + 360.0) % 360.0 - 180.0, angle.error)))
+    return min(result, key=lambda item: abs(item[1].value or 0.0), default=(NOTHING, NOTHING))
 
 
 def _phase(response: npt.NDArray[np.complex128]) -> Floats:
@@ -331,19 +331,19 @@ def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
     """Step added at the rig's point: what comes back is the step response of T."""
     signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
     room = setup.room[signal]
-    size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.ride.speed_rad_s), 1.0))
+    size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
     for _ in range(3):
         time_s, response, reason, turned = _step(setup, size, settle_ticks)
         bent = setup.design.load.gravity is not None and turned > SMALL_ANGLE_RAD
         if not reason and not bent:
             break
         size *= SMALL_ANGLE_RAD / turned if bent else 0.2
-    found = step_figures_of(time_s, response, reason)
+    figures = step_figures_of(time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
         small = small_rig(setup.design, setup.loop, held=setup.held)
         time_s, response, reason, _ = _step(small, size, settle_ticks)
-        found = step_figures_of(time_s, response, reason)
-    return found
+        figures = step_figures_of(time_s, response, reason)
+    return figures
 
 
 def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
@@ -362,7 +362,7 @@ def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, s
     reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
     if run.status != "ok":
         reason = run.status
-    elif not reason and run.events and setup.ride.delicate:
+    elif not reason and run.events and setup.bias.delicate:
         reason = "speed reversal"
     before, without = (one.probes[setup.point].before[::n] for one in (run, steady))
     turned = float(np.abs(run.output_angle_rad - steady.output_angle_rad).max())

@@ -106,8 +106,8 @@ def rest_entries(
             ("overshoot", "%", figures.step.overshoot_percent, steps.overshoot_percent[k], STEP_PERCENT),
             ("settling_time", "s", figures.step.settling_time_s, steps.settling_time_s[k], sample),
         ):
-            found = Reading(float(seen) if np.isfinite(seen) else None)
-            rows.append(_judge(quantity, of, condition, wanted, found, steps.reasons[k], least))
+            reading = Reading(float(seen) if np.isfinite(seen) else None)
+            rows.append(_judge(quantity, of, condition, wanted, reading, steps.reasons[k], least))
     return rows
 
 
@@ -116,14 +116,14 @@ def _judge(
     unit: str,
     condition: str,
     predicted: float | None,
-    found: Reading,
+    reading: Reading,
     reason: str,
     least: float = 0.0,
 ) -> Entry:
     """Judge where nothing speaks against it; else show it with the reason."""
     if reason:
-        return not_judged("position", quantity, unit, predicted, found.value, reason, condition)
-    return entry("position", quantity, unit, predicted, found, condition, least)
+        return not_judged("position", quantity, unit, predicted, reading.value, reason, condition)
+    return entry("position", quantity, unit, predicted, reading, condition, least)
 
 
 def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep) -> list[Entry]:
@@ -146,6 +146,6 @@ def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep) -> li
         ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5), spread),
         ("bandwidth_90deg", band.minus90deg_hz, phase, -90.0, float(np.degrees(spread))),
     ):
-        found = first_fall(sweep.frequency_hz, values, level, error)
-        rows.append(_judge(quantity, "Hz", condition, predicted, found, reason))
+        result = first_fall(sweep.frequency_hz, values, level, error)
+        rows.append(_judge(quantity, "Hz", condition, predicted, result, reason))
     return rows

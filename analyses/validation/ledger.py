@@ -76,7 +76,7 @@ def entry(
     quantity: str,
     unit: str,
     predicted: float | None,
-    found: Reading,
+    reading: Reading,
     condition: str = SMALL,
     least: float = 0.0,
 ) -> Entry:
@@ -84,9 +84,9 @@ def entry(
 
     ``least`` is the resolution of the figure: a sample of the time, say.
     """
-    known = [None if x is None or not isfinite(x) else float(x) for x in (predicted, found.value)]
+    known = [None if x is None or not isfinite(x) else float(x) for x in (predicted, reading.value)]
     reason = ""
-    tolerance = float(least + allowed(found.error, known[0] or 0.0))
+    tolerance = float(least + allowed(reading.error, known[0] or 0.0))
     if known[0] is None and known[1] is None:
         passed, reason = True, "predicted and measured: there is none"
     elif known[0] is None or known[1] is None:
@@ -100,7 +100,7 @@ def entry(
 def loop_entries(
     name: str,
     figures: LoopFigures,
-    found: Measured,
+    measured: Measured,
     confirmed: Sequence[Confirmation],
     errors: Sequence[SweepErrors],
     condition: str,
@@ -109,21 +109,21 @@ def loop_entries(
     margins, words = figures.margins, f"{SMALL}, {condition}"
     phase = None if margins.phase_margin is None else margins.phase_margin.deg
     rows = [
-        *response_entries(name, errors, found, words),
-        *_band_entries(name, figures, found),
-        entry(name, "phase_margin", "deg", phase, found.phase_margin),
+        *response_entries(name, errors, measured, words),
+        *_band_entries(name, figures, measured),
+        entry(name, "phase_margin", "deg", phase, measured.phase_margin),
         *(_confirmed(name, item) for item in confirmed),
     ]
     if figures.peaks is not None:
         peaks = figures.peaks
-        rows.append(entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, found.sensitivity_peak))
+        rows.append(entry(name, "sensitivity_peak", "dB", peaks.sensitivity_db, measured.sensitivity_peak))
         T = peaks.complementary_db
-        if found.no_dc:
-            rows.append(not_judged(name, "complementary_peak", "dB", T, None, found.no_dc))
+        if measured.no_dc:
+            rows.append(not_judged(name, "complementary_peak", "dB", T, None, measured.no_dc))
         else:
-            rows.append(entry(name, "complementary_peak", "dB", T, found.complementary_peak))
-    rows = [_unless_hidden(row, figures, found) for row in rows]
-    rows += _step_entries(name, figures, found)
+            rows.append(entry(name, "complementary_peak", "dB", T, measured.complementary_peak))
+    rows = [_unless_hidden(row, figures, measured) for row in rows]
+    rows += _step_entries(name, figures, measured)
     return [replace(row, condition=words) if row.condition == SMALL else row for row in rows]
 
 
@@ -131,31 +131,31 @@ RESPONSES = ("response_open", "response_closed")
 
 
 def response_entries(
-    name: str, errors: Sequence[SweepErrors], found: Measured, condition: str
+    name: str, errors: Sequence[SweepErrors], measured: Measured, condition: str
 ) -> list[Entry]:
     """The worst point of each response: its distance from the linear one, over what that point may be off."""
     rows = []
-    valid = found.sweep.valid
+    valid = measured.sweep.valid
     for quantity, error in zip(RESPONSES, errors, strict=False):
         off = np.hypot(error.gain_db / DECIBEL, np.radians(error.phase_deg))[valid]
-        may = allowed(found.point_error[valid], 1.0)
+        may = allowed(measured.point_error[valid], 1.0)
         if not off.size:
             continue
         k = int(np.argmax(off / may))
-        hertz = found.sweep.frequency_hz[valid][k]
+        hertz = measured.sweep.frequency_hz[valid][k]
         passed = bool(off[k] <= may[k])
         where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"
         rows.append(Entry(name, quantity, "%", condition, 0.0, 100.0 * off[k], 100.0 * may[k], passed, where))
     return rows
 
 
-def _unless_hidden(row: Entry, figures: LoopFigures, found: Measured) -> Entry:
+def _unless_hidden(row: Entry, figures: LoopFigures, measured: Measured) -> Entry:
     """An entry, not judged where the frequencies that decide it could not be measured."""
-    sweep = found.sweep
+    sweep = measured.sweep
     if row.passed is None or "margin_" in row.quantity or row.quantity in ("delay_margin", *RESPONSES):
         return row
-    if found.cut:
-        return replace(row, passed=None, tolerance=inf, reason=f"{found.cut}: no time left to measure it")
+    if measured.cut:
+        return replace(row, passed=None, tolerance=inf, reason=f"{measured.cut}: no time left to measure it")
     if row.passed:
         return row
     band, peaks, margins = figures.bandwidth, figures.peaks, figures.margins
@@ -189,25 +189,25 @@ def point_entries(name: str, confirmed: Sequence[Confirmation]) -> list[Entry]:
     return [_confirmed(name, item) for item in confirmed]
 
 
-def _band_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entry]:
+def _band_entries(name: str, figures: LoopFigures, measured: Measured) -> list[Entry]:
     """Bandwidths and resonance."""
     band = figures.bandwidth
     if band is None:
-        return [not_judged(name, "bandwidth", "Hz", None, found.bandwidth.value, _why(figures))]
-    if found.no_dc:
-        return [not_judged(name, "bandwidth", "Hz", hertz(band.minus3db_rad_s), None, found.no_dc)]
+        return [not_judged(name, "bandwidth", "Hz", None, measured.bandwidth.value, _why(figures))]
+    if measured.no_dc:
+        return [not_judged(name, "bandwidth", "Hz", hertz(band.minus3db_rad_s), None, measured.no_dc)]
     if band.resonance_peak_db > NO_DC_DB:
         why = "the loop has no gain at zero frequency that bandwidth and resonance could be related to"
         return [not_judged(name, "bandwidth", "Hz", None, None, why)]
     fall, turn = hertz(band.minus3db_rad_s), hertz(band.minus90deg_rad_s)
-    top = found.sweep.frequency_hz[-1]
+    top = measured.sweep.frequency_hz[-1]
     rows = [
-        entry(name, "bandwidth", "Hz", _within(fall, top), found.bandwidth),
-        entry(name, "bandwidth_90deg", "Hz", _within(turn, top), found.minus90deg),
-        entry(name, "resonance_peak", "dB", band.resonance_peak_db, found.resonance_peak),
+        entry(name, "bandwidth", "Hz", _within(fall, top), measured.bandwidth),
+        entry(name, "bandwidth_90deg", "Hz", _within(turn, top), measured.minus90deg),
+        entry(name, "resonance_peak", "dB", band.resonance_peak_db, measured.resonance_peak),
     ]
     if band.resonance_peak_db > 0.05:
-        rows.append(entry(name, "resonance", "Hz", band.resonance_hz, found.resonance))
+        rows.append(entry(name, "resonance", "Hz", band.resonance_hz, measured.resonance))
     return rows
 
 
@@ -220,9 +220,9 @@ def _why(figures: LoopFigures) -> str:
     return "; ".join(figures.notes) or "no such figure"
 
 
-def _step_entries(name: str, figures: LoopFigures, found: Measured) -> list[Entry]:
+def _step_entries(name: str, figures: LoopFigures, measured: Measured) -> list[Entry]:
     """Rise, overshoot and settling; times are those of samples."""
-    step, seen = figures.step, found.step
+    step, seen = figures.step, measured.step
     if step is None or seen.reason:
         return [not_judged(name, "rise_time", "s", None, None, seen.reason or _why(figures))]
     sample = step.period_s or 0.0  # both are read at samples: a level met at one may be met at the next
@@ -294,8 +294,8 @@ def _confirmed(name: str, item: Confirmation) -> Entry:
     least = DECIBEL * PREDICTED if unit == "dB" else 0.0
     row = entry(name, quantity, unit, values[0], Reading(values[1], error), words, least)
     if row.passed and row.predicted is None:
-        reach = max(item.border.bracket)
-        far = max(reach, 1.0 / min(item.border.bracket)) if unit == "dB" else reach
+        furthest = max(item.border.bracket)
+        far = max(furthest, 1.0 / min(item.border.bracket)) if unit == "dB" else furthest
         text = f"{20.0 * log10(far):.0f} dB" if unit == "dB" else f"{far * item.period_s:.3g} s"
         return replace(row, reason=f"predicted and found: none within {text}")
     return row

@@ -55,15 +55,15 @@ def crossing(frequency_hz: Floats, values: Floats, k: int, level: float, spread:
     from scipy.optimize import brentq
 
     a, b = np.log(frequency_hz[k]), np.log(frequency_hz[k + 1])
-    found = []
+    result = []
     for points in (NEAREST, FEWER):
         curve = local(frequency_hz, values - level, k, points)
-        found.append(float(brentq(curve, a, b, xtol=1e-13)))
-    x = found[0]
+        result.append(float(brentq(curve, a, b, xtol=1e-13)))
+    x = result[0]
     slope = _slope(local(frequency_hz, values, k), x, b - a)
     by_points = spread / abs(slope) if slope else np.inf
     hertz = float(np.exp(x))
-    return Reading(hertz, hertz * (abs(found[0] - found[1]) + min(by_points, b - a)))
+    return Reading(hertz, hertz * (abs(result[0] - result[1]) + min(by_points, b - a)))
 
 
 def maximum(frequency_hz: Floats, values: Floats, spread: float = 0.0) -> tuple[Reading, Reading]:
@@ -86,8 +86,8 @@ def maximum(frequency_hz: Floats, values: Floats, spread: float = 0.0) -> tuple[
 def _top(curve: Curve, ends: tuple[float, float]) -> tuple[float, float]:
     from scipy.optimize import minimize_scalar
 
-    found = minimize_scalar(lambda x: -curve(x), bounds=ends, method="bounded", options={"xatol": 1e-9})
-    return float(found.x), -float(found.fun)
+    minimum = minimize_scalar(lambda x: -curve(x), bounds=ends, method="bounded", options={"xatol": 1e-9})
+    return float(minimum.x), -float(minimum.fun)
 
 
 def _slope(curve: Curve, x: float, apart: float) -> float:

@@ -1,7 +1,7 @@
 """Margins at small, medium and large amplitude, with dry friction and without: the drive let go from there.
 
-Nothing rides: the drive is released from an initial deviation (angle, speed or current, as a part of its
-full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which the
+There is no bias motion: the drive is released from an initial deviation (angle, speed or current, a part of
+its full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which the
 oscillation that follows does not die out.  Saturation takes gain away, friction takes energy away: the
 border found need not be the linear one, and is reported, not judged.
 """
@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from analyses.validation.bias_motion import BiasMotion, full_torque_Nm
 from analyses.validation.borders import Border, Search, find_borders
 from analyses.validation.confirm import Confirmation
-from analyses.validation.riding import Ride, full_torque_Nm
 from analyses.validation.rig import Rig
 from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
@@ -215,7 +215,7 @@ def _release(setup: Rig, item: Confirmation, part: float, friction_on: bool, set
         ceil(CYCLES / (hertz * tick_s)), min(settle_ticks, 2000)
     )
     return Release(
-        Rig(design, setup.loop, Ride(0.0, 0.0, 0.0, friction_on)),
+        Rig(design, setup.loop, BiasMotion(0.0, 0.0, 0.0, friction_on)),
         "delay" if item.kind == "delay" else "gain up",
         hertz,
         wait,

@@ -40,7 +40,7 @@ class Sweep:
         Empty where the point is valid; otherwise ``"not steady"``, the limiter that acted, or ``"speed
         reversal"``.
     speed_rad_s : float
-        Of the ride, motor side.
+        Of the bias motion, motor side.
     """
 
     design_name: str

@@ -128,7 +128,7 @@ class Validation:
     def passed(self) -> bool:
         """Whether predictions were judged, all hold, and no command within full deflection diverges."""
         unstable = any(not loop.figures.stable for loop in self.loops.values())
-        diverges = self.conditional is not None and self.conditional.found
+        diverges = self.conditional is not None and self.conditional.diverges
         border = None if self.large_signals is None else self.large_signals.border
         off = border is not None and border.passed is False
         return self.judged and not (self.failed or unstable or diverges or off)
@@ -140,7 +140,7 @@ class Validation:
             return f"{self.design.name}: nothing judged: no linear prediction could be compared"
         words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
-        if self.conditional is not None and self.conditional.found:
+        if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
             words += f"; a command within full deflection makes the drive {does}"

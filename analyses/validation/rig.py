@@ -18,11 +18,11 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.riding import (
-    Ride,
+from analyses.validation.bias_motion import (
+    BiasMotion,
+    bias_motion,
     current_state,
     may_stand,
-    ride,
     standing,
     velocity_state,
 )
@@ -45,7 +45,7 @@ class Rig:
     loop : str
         ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
         ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
-    ride : Ride
+    bias : BiasMotion
         The motion underneath.
     limits_on : bool
     held : bool
@@ -54,7 +54,7 @@ class Rig:
 
     design: Design
     loop: str
-    ride: Ride
+    bias: BiasMotion
     limits_on: bool = True
     held: bool = False
 
@@ -106,18 +106,18 @@ class Rig:
     def condition(self) -> str:
         """On which motion it is tested, in words."""
         if self.held:
-            return "rotor held" + (" at a constant speed" if self.ride.speed_rad_s else "")
-        if self.ride.speed_rad_s:
-            pressed = ", coupling pressed by a constant moment" if self.ride.coupling_Nm else ""
+            return "rotor held" + (" at a constant speed" if self.bias.speed_rad_s else "")
+        if self.bias.speed_rad_s:
+            pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 
     def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
-        """Parameters of a run that starts in the steady state of the ride; see `rows`."""
+        """Parameters of a run that starts in the steady state of the bias motion; see `rows`."""
         return self.rows(np.array([gain]), np.array([delay_samples]))
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
-        """Parameters of runs that start in the steady state of the ride, one a value.
+        """Parameters of runs that start in the steady state of the bias motion, one a value.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class Rig:
     @cached_property
     def _base(self) -> Rows:
         """The row without instrument and state."""
-        row = Rows.of(self.design, friction_on=self.ride.friction_on, limits_on=self.limits_on)
+        row = Rows.of(self.design, friction_on=self.bias.friction_on, limits_on=self.limits_on)
         for name in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
             row[name] = 0.0
         if self.outer != "position":
@@ -153,12 +153,12 @@ class Rig:
 
     def _start(self, row: Rows) -> None:
         """Write the steady state, from the motor outwards."""
-        self.ride.load(row)
-        row["speed_start"], row["current_start"] = self.ride.speed_rad_s, self.ride.current_A
-        row["twist_start"] = self.ride.twist_rad
+        self.bias.load(row)
+        row["speed_start"], row["current_start"] = self.bias.speed_rad_s, self.bias.current_A
+        row["twist_start"] = self.bias.twist_rad
         row["angle_start"] = self.twisted
-        row["load_speed_start"] = self.ride.speed_rad_s / self.design.ratio_to_coupling
-        wanted: Value = self.ride.voltage_V
+        row["load_speed_start"] = self.bias.speed_rad_s / self.design.ratio_to_coupling
+        wanted: Value = self.bias.voltage_V
         point = "u"
         row["voltage_start"] = wanted
         for stage in self._running:
@@ -177,43 +177,43 @@ class Rig:
 
     def _current(self, row: Rows) -> Value:
         """The current controller in its steady state; returns the current command."""
-        found = current_state(
-            self.ride,
+        steady = current_state(
+            self.bias,
             row["current_gain"],
             row.value("current_integral") != 0.0,
             row["back_emf_feedforward"],
             row["resistance_feedforward"],
         )
-        row["current_integrator_start"] = found.integrator
-        return found.command
+        row["current_integrator_start"] = steady.integrator
+        return steady.command
 
     def _velocity(self, row: Rows, wanted: Value) -> Value:
         """The velocity controller in its steady state; returns the speed command."""
         integral = row.value("velocity_integral") != 0.0
-        found = velocity_state(self.design, self.ride, wanted, row["velocity_gain"], integral)
-        row["velocity_integrator_start"] = found.integrator
-        row["current_command_start"] = found.output  # what the torque filters begin with
-        return found.command
+        steady = velocity_state(self.design, self.bias, wanted, row["velocity_gain"], integral)
+        row["velocity_integrator_start"] = steady.integrator
+        row["current_command_start"] = steady.output  # what the torque filters begin with
+        return steady.command
 
     def _position(self, row: Rows, wanted: Value) -> None:
         """Let the command run with the drive, the motor behind it by what the controller needs."""
         row["angle_start"] = self.twisted - wanted / row["position_gain"]
         seen = 0.0 if self.design.controller.position_loop.sensor == "output" else self.twisted
-        if self.ride.speed_rad_s == 0.0:
+        if self.bias.speed_rad_s == 0.0:
             row.step("bias", seen / self.design.total_ratio, -1.0)
             return
         row["angle_start"] -= seen
-        row.ramp("bias", self.ride.speed_rad_s / self.design.total_ratio)
+        row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
 
     @property
     def twisted(self) -> float:
         """Motor angle at which the output stands at zero."""
-        return self.design.ratio_to_coupling * self.ride.twist_rad
+        return self.design.ratio_to_coupling * self.bias.twist_rad
 
     @property
     def steady_start(self) -> bool:
         """Whether the steady state is known that a run begins in."""
-        return not (self.outer == "position" and remembers(self.design) and self.ride.speed_rad_s != 0.0)
+        return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
 
     @staticmethod
     def _constant(row: Rows, point: str, value: Value) -> None:
@@ -224,11 +224,11 @@ class Rig:
     def room(self) -> dict[str, float]:
         """How far each signal may move from its steady value: to its limit, and the speed to zero."""
         row, limits = self.row(), self.design.limits
-        moving = self.ride.speed_rad_s != 0.0
-        room = {"motor_speed_rad_s": self.ride.room_rad_s if moving else inf}
+        moving = self.bias.speed_rad_s != 0.0
+        room = {"motor_speed_rad_s": self.bias.room_rad_s if moving else inf}
         room["voltage_V"] = limits.voltage_V - abs(row.value("voltage_start"))
         room["current_command_A"] = limits.peak_current_A - abs(row.value("current_command_start"))
-        room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.ride.speed_rad_s)
+        room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.bias.speed_rad_s)
         if not self.limits_on:
             room = {name: value if name == "motor_speed_rad_s" else inf for name, value in room.items()}
         return room
@@ -242,7 +242,7 @@ GAINS = {
 
 
 def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
-    """Set a drive up for one loop, riding on a constant speed that the code chooses.
+    """Set a drive up for one loop, on a bias motion that the code chooses.
 
     A position controller with an integral or a derivative part cannot be started in the steady state of a
     ramp: then the drive stands, where it has no slope of its own about rest.
@@ -250,27 +250,27 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     Raises
     ------
     InputError
-        If the design has no such loop or break point, or cannot ride.
+        If the design has no such loop or break point, or has no bias motion.
     """
     known = (*stages_of(design), *points_of(design))
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    found = Rig(design, loop, ride(design), limits_on, held)
-    if found.outer == "position" and remembers(design) and may_stand(design):
+    result = Rig(design, loop, bias_motion(design), limits_on, held)
+    if result.outer == "position" and remembers(design) and may_stand(design):
         return Rig(design, loop, standing(design), limits_on, held)
-    return found
+    return result
 
 
 def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
     """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
 
     At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
-    growth.  With play, or friction that differs by direction, the drive has to ride on: these have a slope of
+    growth.  With play, or friction that differs by direction, the drive has to move on: these have a slope of
     their own about rest.
     """
-    found = rig(design, loop, limits_on=False, held=held)
+    setup = rig(design, loop, limits_on=False, held=held)
     if not may_stand(design):
-        return found
+        return setup
     return Rig(design, loop, standing(design), limits_on=False, held=held)
 
 

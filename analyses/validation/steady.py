@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.validation.bias_motion import bias_motion, bias_motion_at
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
 from analyses.validation.release import full_range
-from analyses.validation.riding import ride, riding_at
 from analyses.validation.rig import Rig, stages_of
 
 ROUNDING = 1e-9  # of the largest current: a drive without friction takes none
@@ -34,11 +34,11 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     source = not design.motor.has_electrical_dynamics
     quantity, unit = ("steady_voltage", "V") if source else ("steady_current", "A")
     name = design.controller.outermost
-    found = ride(design)
-    if not found.speed_rad_s:
+    motion = bias_motion(design)
+    if not motion.speed_rad_s:
         why = "the drive has no steady motion within its limits, or its load changes with the angle"
         return not_judged(name, quantity, unit, None, None, why, CONDITION)
-    rigs = [Rig(design, stage, found) for stage in reversed(stages_of(design))]
+    rigs = [Rig(design, stage, motion) for stage in reversed(stages_of(design))]
     setup = next((one for one in rigs if one.steady_start), None)
     if setup is None:
         why = "the position controller remembers: no run begins in its steady state"
@@ -53,7 +53,7 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     signal = "voltage_V" if source else "current_A"
     last, before = (float(result.mean(signal, k)[0]) for k in (0, 1))
     speed = float(result.mean("motor_speed_rad_s")[0])
-    wanted = riding_at(model, speed, found.load_Nm)
+    wanted = bias_motion_at(model, speed, motion.load_Nm)
     predicted = wanted.voltage_V if source else wanted.current_A
     full = design.limits.voltage_V if source else full_range(design)["current"]
     seen = Reading(last, 3.0 * abs(last - before))

@@ -3,7 +3,7 @@
 A sine is added at the break point; in front of the instrument the loop answers ``before = -L after``, so one
 run gives the open loop ``-before/after``, the closed loop ``-before/injected``, the sensitivity
 ``after/injected`` and the plant ``measured/after``.  The fundamentals come from correlation over whole
-periods that fill whole ticks (of the slowest loop), so there is no leakage.  The drive rides on a constant
+periods that fill whole ticks (of the slowest loop), so there is no leakage.  The drive moves at a constant
 speed, where dry friction is a constant torque; amplitudes are chosen so that no limit acts and the speed
 keeps its sign, and both are checked.
 """
@@ -65,7 +65,7 @@ def frequency_response(
     Raises
     ------
     InputError
-        For an unknown loop, a frequency that is not below Nyquist, or a drive that cannot ride.
+        For an unknown loop, a frequency that is not below Nyquist, or a drive that has no bias motion.
 
     Examples
     --------
@@ -186,13 +186,13 @@ def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint:
 def _contact_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
     """Amplitude at which the coupling's torque would change its sign, by what moves the load."""
     design = setup.design
-    if setup.ride.coupling_Nm == 0.0:
+    if setup.bias.coupling_Nm == 0.0:
         return np.full(faint.size, inf)
     friction, omega = design.load.friction, 2.0 * np.pi * window.frequency_hz
     viscous = 0.0 if friction is None else friction.viscous_Nms_rad
     moved = np.abs(phasor(setup, result, "output_angle_rad")) * design.ratio_behind_coupling * omega
     swing = moved * np.abs(1j * omega * design.load_side_inertia_kgm2 + viscous)
-    return abs(setup.ride.coupling_Nm) * faint / np.maximum(swing, 1e-300)
+    return abs(setup.bias.coupling_Nm) * faint / np.maximum(swing, 1e-300)
 
 
 def _gravity_room(setup: Rig, result: BatchResult, faint: Floats) -> Floats:
@@ -227,7 +227,7 @@ def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Float
             reasons[k] = "run stopped"
         elif acting:
             reasons[k] = f"{acting[0]} limit"
-        elif result.events[k] and setup.ride.delicate:
+        elif result.events[k] and setup.bias.delicate:
             reasons[k] = "speed reversal"
         elif not steady[k]:
             reasons[k] = "not steady"
@@ -238,24 +238,24 @@ def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Float
 
 def unsteadiness(setup: Rig, result: BatchResult) -> Floats:
     """Change between the last two windows, the larger of both sides of the instrument."""
-    found = np.zeros(result.status.size)
+    change = np.zeros(result.status.size)
     for signal in (setup.before, setup.after):
         a, b = (phasor(setup, result, signal, last) for last in (0, 1))
-        found = np.maximum(found, np.abs(a - b) / np.maximum(np.abs(a), 1e-300))
-    return found
+        change = np.maximum(change, np.abs(a - b) / np.maximum(np.abs(a), 1e-300))
+    return change
 
 
 def phasor(setup: Rig, result: BatchResult, signal: str, last: int = 0) -> Complexes:
-    """Fundamental of a signal, freed from the ramp of the ride where it is an angle."""
-    found = result.phasor(signal, 1, last)
+    """Fundamental of a signal, freed from the ramp of the bias motion where it is an angle."""
+    phasors = result.phasor(signal, 1, last)
     if "output" not in signal and "reference" not in signal:
-        return found
+        return phasors
     from analyses.validation.coherent import ramp_phasor
 
     ticks, length = result.column("ticks"), result.column("window")
-    window = Coherent(found.real, length.astype(np.int64), result.column("cycles").astype(np.int64))
-    slope = setup.ride.speed_rad_s / setup.design.total_ratio * setup.design.controller.period_s
-    return found - ramp_phasor(slope, window, ticks - (last + 1) * length)
+    window = Coherent(phasors.real, length.astype(np.int64), result.column("cycles").astype(np.int64))
+    slope = setup.bias.speed_rad_s / setup.design.total_ratio * setup.design.controller.period_s
+    return phasors - ramp_phasor(slope, window, ticks - (last + 1) * length)
 
 
 def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult) -> Sweep:
@@ -283,7 +283,7 @@ def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult)
         distortion=_distortion(setup, result, held),
         unsteadiness=unsteadiness(setup, result),
         reason=tuple(reasons),
-        speed_rad_s=setup.ride.speed_rad_s,
+        speed_rad_s=setup.bias.speed_rad_s,
     )
 
 

@@ -61,8 +61,8 @@ def multisine_response(design: Design, loop: str, frequency_hz: npt.ArrayLike, *
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> found = multisine_response(load_design("ilr33-amber"), "velocity", [20.0, 60.0, 300.0])
-    >>> bool(found.coherence.min() > 0.999)
+    >>> result = multisine_response(load_design("ilr33-amber"), "velocity", [20.0, 60.0, 300.0])
+    >>> bool(result.coherence.min() > 0.999)
     True
     """
     if loop not in STAGES:
@@ -109,7 +109,7 @@ def _measure(
     power_after, power_before = (np.abs(x**2).sum(axis=0) for x in (after, before))
     change = np.abs(before[-1] - before[-2]).max() / np.abs(before[-1]).max()
     limited = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
-    reversal = "speed reversal" if run.events and setup.ride.friction_on else ""
+    reversal = "speed reversal" if run.events and setup.bias.friction_on else ""
     return ToneSweep(
         frequency_hz=lines / (samples * setup.period_s),
         open_loop=-cross / power_after,

@@ -20,6 +20,7 @@ from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench import on_the_bench
+from analyses.validation.bias_motion import bias_motion, has_to_stand, may_stand, on_its_stand
 from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.commanded import command_sweep
 from analyses.validation.conditional import Conditional, conditional_stability
@@ -43,7 +44,6 @@ from analyses.validation.ledger import (
 from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import Sweep, linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.riding import has_to_stand, may_stand, on_its_stand, ride
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.steady import steady_entry
@@ -108,8 +108,8 @@ def validate(
     --------
     >>> from actuator_lti.design import load_design
     >>> from analyses.validation.settings import QUICK
-    >>> found = validate(load_design("ilr33-amber"), QUICK)
-    >>> found.passed
+    >>> result = validate(load_design("ilr33-amber"), QUICK)
+    >>> result.passed
     True
     """
     return _Work(design, settings or Settings(), progress, model or design).run()
@@ -153,7 +153,7 @@ class _Work:
     def run(self) -> Validation:
         with self.timed("linear loops"):
             self.loops = self._assemble()
-        stable = all(found.stable for found in self.figures.values())
+        stable = all(result.stable for result in self.figures.values())
         if not stable:
             self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
         placed = self.design.controller.position is not None
@@ -249,7 +249,9 @@ class _Work:
         """The linear loops, their figures, and the rigs to test them on."""
         from actuator_lti.loops import assemble_loops
 
-        point = ride(self.linear).operating(self.linear)  # a drive without steady motion cannot be tested
+        point = bias_motion(self.linear).operating(
+            self.linear
+        )  # a drive without steady motion cannot be tested
         at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
         model = on_the_bench(self.model)
         model = on_its_stand(model) if has_to_stand(self.linear) else model
@@ -327,26 +329,26 @@ class _Work:
 
     def _marks(self, name: str) -> list[float]:
         """Where the linear loop has figures, Hz: there a grid may miss a narrow dip or peak."""
-        found = self.figures[name]
-        marks = [m.frequency_hz for m in found.margins.phase_margins]
-        if found.bandwidth is not None:
-            band = found.bandwidth
+        result = self.figures[name]
+        marks = [m.frequency_hz for m in result.margins.phase_margins]
+        if result.bandwidth is not None:
+            band = result.bandwidth
             marks += [x for x in (band.minus3db_hz, band.minus90deg_hz, band.resonance_hz) if x]
-        if found.peaks is not None:
+        if result.peaks is not None:
             marks += [
-                hertz(x) or 0.0 for x in (found.peaks.sensitivity_rad_s, found.peaks.complementary_rad_s)
+                hertz(x) or 0.0 for x in (result.peaks.sensitivity_rad_s, result.peaks.complementary_rad_s)
             ]
         return [x for x in marks if x > 0.0]
 
     def _lowest(self, name: str) -> float:
         """Where the sweep of a loop begins, Hz."""
-        found, period = self.figures[name], self.loops.present[name].period_s or 1.0
+        result, period = self.figures[name], self.loops.present[name].period_s or 1.0
         marks = [0.1 / period]
-        if found.margins.phase_margin is not None:
-            marks.append(found.margins.phase_margin.frequency_hz)
-        if found.bandwidth is not None:
-            marks += [x for x in (found.bandwidth.minus3db_hz, found.bandwidth.minus90deg_hz) if x]
-            marks += [found.bandwidth.resonance_hz] if found.bandwidth.resonance_hz > 0.0 else []
+        if result.margins.phase_margin is not None:
+            marks.append(result.margins.phase_margin.frequency_hz)
+        if result.bandwidth is not None:
+            marks += [x for x in (result.bandwidth.minus3db_hz, result.bandwidth.minus90deg_hz) if x]
+            marks += [result.bandwidth.resonance_hz] if result.bandwidth.resonance_hz > 0.0 else []
         return min(marks) / BELOW
 
     def _confirm(self) -> tuple[Confirmation, ...]:
@@ -379,7 +381,7 @@ class _Work:
 
     def _points(self, confirmed: tuple[Confirmation, ...]) -> dict[str, PointValidation]:
         """Sweeps at the break points with all other loops closed."""
-        found = {}
+        result = {}
         for point in self._inner_points():
             own = tuple(item for item in confirmed if item.loop == point)
             sweep = errors = None
@@ -390,8 +392,8 @@ class _Work:
                 asked = np.geomspace(self._lowest(outermost), top, self.settings.point_frequencies)
                 sweep = stepped_sine(rig(self.linear, point), asked, self.settle[outermost])
                 errors = sweep_errors(sweep, loop)
-            found[point] = PointValidation(point, sweep, errors, own)
-        return found
+            result[point] = PointValidation(point, sweep, errors, own)
+        return result
 
     def _release(self, confirmed: tuple[Confirmation, ...]) -> tuple[AmplitudeMargin, ...]:
         setups: dict[str, Rig] = {name: rig(self.linear, name) for name in self.settle}
@@ -415,7 +417,7 @@ class _Work:
         design, response = self._steered, self.loops.reference_to_output
         if response is None:
             return None
-        # where it stands here, it has the slope of friction at rest, not that of its ride
+        # where it stands here, it has the slope of friction at rest, not that of its bias motion
         self.answer_loops = assemble_loops(self._model_steered) if may_stand(design) else self.loops
         system = self.answer_loops.reference_to_output
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
@@ -492,14 +494,14 @@ class _Work:
             "friction effects": (wanted.friction_effects, lambda: friction_effects(self.design, self.loops)),
             "specification": (wanted.specification, lambda: specification(self.design, self.loops)),
         }
-        found = []
+        outcome = []
         for name, (asked, work) in parts.items():
             result = None
             if asked and stable:
                 with self.timed(name):
                     result = self._within(0.5, name, work, None)
-            found.append(result)
-        return found[0], found[1], found[2]
+            outcome.append(result)
+        return outcome[0], outcome[1], outcome[2]
 
     def _ledger(
         self,

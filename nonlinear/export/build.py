@@ -22,7 +22,7 @@ def system_compiler() -> str | None:
     """Path of the machine's C compiler: ``CC``, else gcc, clang, cc; None where there is none."""
     wanted = os.environ.get("CC")
     names = (wanted,) if wanted else ("gcc", "clang", "cc")
-    return next((found for name in names if name and (found := shutil.which(name))), None)
+    return next((result for name in names if name and (result := shutil.which(name))), None)
 
 
 def zig_command() -> list[str] | None:
@@ -41,9 +41,9 @@ def compiler_for(target: str) -> list[str]:
         Where this machine has none; says which package brings one.
     """
     native = sys.platform == "linux" and os.uname().machine == "x86_64"
-    found = system_compiler()
-    if target == "linux64" and native and found:
-        return [found]
+    compiler = system_compiler()
+    if target == "linux64" and native and compiler:
+        return [compiler]
     zig = zig_command()
     if zig is None:
         wanted = "gcc or clang, or " if target == "linux64" else ""

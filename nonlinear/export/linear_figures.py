@@ -19,8 +19,8 @@ def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary)
         for i in range(n):
             for j in range(n):
                 work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
-        found = eigenvalues(n, work, lent, lent_too, real, imaginary)
-        if found == 0:
+        result = eigenvalues(n, work, lent, lent_too, real, imaginary)
+        if result == 0:
             return 0
         for i in range(n):
             poles[2 * side * n + i] = real[i]
@@ -51,8 +51,8 @@ def figures(
 ):
     """Figures of a loop that was assembled (see ``one_loop``); the points scanned, 0 without poles."""
     fed_back = 0.0 if math.isnan(lead) else 1.0
-    found = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
-    if found == 0:
+    result = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
+    if result == 0:
         return 0
     return one_loop(
         n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged

@@ -86,25 +86,25 @@ def _units(variables: Sequence[Variable], version: int) -> ET.Element:
     definitions = ET.Element("UnitDefinitions")
     for name in names:
         unit = ET.SubElement(definitions, "Unit", name=name)
-        found = parse_unit(name)
-        powers = {_BASE[part]: str(power) for part, power in found.dimension}
-        if found.factor != 1.0:
-            powers["factor"] = repr(found.factor)
-        if "celsius" in str(found.dimension):
+        result = parse_unit(name)
+        powers = {_BASE[part]: str(power) for part, power in result.dimension}
+        if result.factor != 1.0:
+            powers["factor"] = repr(result.factor)
+        if "celsius" in str(result.dimension):
             powers["offset"] = "273.15"
         ET.SubElement(unit, "BaseUnit", powers)
     return definitions
 
 
 def _bounds(item: Variable) -> dict[str, str]:
-    found = {}
+    result = {}
     if item.unit != "1":
-        found["unit"] = item.unit
+        result["unit"] = item.unit
     if item.low > -math.inf:
-        found["min"] = repr(float(item.low))
+        result["min"] = repr(float(item.low))
     if item.high < math.inf:
-        found["max"] = repr(float(item.high))
-    return found
+        result["max"] = repr(float(item.high))
+    return result
 
 
 def _initial(item: Variable) -> dict[str, str]:

@@ -26,7 +26,7 @@ def is_elastic(row: Any) -> bool:
     return bool(row[at.ELASTIC_DRIVE] > 0.0)
 
 
-def reaches_row(design: Design, path: str) -> bool | None:
+def changes_row(design: Design, path: str) -> bool | None:
     """Whether a key has an influence on the row; None where it cannot be followed."""
     traced = Traced(Tape(rounding=True), "k", parameter_value(design, path))
     try:

@@ -138,12 +138,12 @@ _COMMENT = re.compile(r"(/\*.*?\*/)", re.DOTALL)
 _LARGEST, _SMALLEST = 3e38, 1e-37  # of single precision, rounded inwards
 
 
-def _literal(found: re.Match[str]) -> str:
+def _literal(result: re.Match[str]) -> str:
     """A literal in single precision; one beyond its range stands for never, or for almost nothing."""
-    value = float(found[1])
+    value = float(result[1])
     if value > _LARGEST:
         return f"{_LARGEST!r}f"
-    return f"{_SMALLEST!r}f" if 0.0 < value < _SMALLEST else f"{found[1]}f"
+    return f"{_SMALLEST!r}f" if 0.0 < value < _SMALLEST else f"{result[1]}f"
 
 
 def single(text: str) -> str:

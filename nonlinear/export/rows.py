@@ -47,14 +47,14 @@ _UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split(
 @cache
 def words() -> dict[str, str]:
     """Unit and words of each name of the layout, ``""`` where it says no more than its name."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for line in inspect.getsource(at).splitlines():
         match = _LINE.match(line)
         if match:
             said = match["words"] or match["names"].removeprefix("S_").lower().replace("_", " ")
             unit = _UNIT_OF.get(match["names"], "")
-            found[match["names"]] = f"{said} [{unit}]" if unit else said
-    return found
+            result[match["names"]] = f"{said} [{unit}]" if unit else said
+    return result
 
 
 def names_of(first: int, last: int, begin: str = "") -> list[tuple[str, int]]:

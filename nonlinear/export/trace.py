@@ -92,11 +92,11 @@ def _function(name: str) -> Any:
 
 def _rounded(name: str) -> Any:
     def rounded(self: Traced) -> Any:
-        found = np.float64(getattr(math, name)(self.number))
+        result = np.float64(getattr(math, name)(self.number))
         if self.tape.rounding:
-            return self.tape.value(f"{name}({self.name})", float(found))
-        self.tape.condition(f"{name}({self.name}) == {c_number(float(found))}", True)
-        return found
+            return self.tape.value(f"{name}({self.name})", float(result))
+        self.tape.condition(f"{name}({self.name}) == {c_number(float(result))}", True)
+        return result
 
     return rounded
 

@@ -161,13 +161,13 @@ def texts_of(design: Design) -> tuple[tuple[str, str, str], ...]:
     """Keys that are no numbers: path, value, description."""
     about = (("design.name", design.name, "short name"), ("design.title", design.title, "title"),
              ("design.axis", design.axis, "rotary or linear"))  # fmt: skip
-    found = [
+    result = [
         (f"{path}.{field.key}", str(getattr(part, field.attribute)), field.description)
         for section, path, part in parts_of(design)
         for field in fields_in(section.template)
         if field.kind in ("choice", "flag")
     ]
-    return (*about, *found)
+    return (*about, *result)
 
 
 def _texts(design: Design) -> tuple[Variable, ...]:

@@ -65,18 +65,18 @@ class Axis:
         array = np.asarray(values, dtype=float)
         if self.log:
             with np.errstate(divide="ignore", invalid="ignore"):
-                found = np.log(array / low) / math.log(high / low)
-            found = np.where(array > 0.0, found, np.where(array <= 0.0, -1e3, np.nan))
+                result = np.log(array / low) / math.log(high / low)
+            result = np.where(array > 0.0, result, np.where(array <= 0.0, -1e3, np.nan))
         else:
-            found = (array - low) / (high - low)
-        return np.asarray(1.0 - found if self.reversed else found)
+            result = (array - low) / (high - low)
+        return np.asarray(1.0 - result if self.reversed else result)
 
     def named_ticks(self, room: int = 6) -> list[tuple[float, str]]:
         """Give about ``room`` ticks with their labels."""
         low, high = self.span()
         if self.ticks is not None:
-            reach = 1e-9 * (high - low)
-            return [(v, words) for v, words in self.ticks if low - reach <= v <= high + reach]
+            slack = 1e-9 * (high - low)
+            return [(v, words) for v, words in self.ticks if low - slack <= v <= high + slack]
         return log_ticks(low, high, room) if self.log else linear_ticks(low, high, room)
 
 

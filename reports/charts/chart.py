@@ -200,13 +200,13 @@ class Chart:
 
     def labels(self) -> list[tuple[str, Item]]:
         """Give every legend entry once, in the order drawn."""
-        found: dict[str, Item] = {}
+        result: dict[str, Item] = {}
         for column in self.columns:
             for panel in column.panels:
                 for item in panel.items:
                     if not isinstance(item, Note) and item.label:
-                        found.setdefault(item.label, item)
-        return list(found.items())
+                        result.setdefault(item.label, item)
+        return list(result.items())
 
 
 def numbers(values: Values) -> np.ndarray:

@@ -14,7 +14,7 @@ from reports.charts.paint import MARKER_PATHS
 from reports.charts.pen import FAR, Frame, Pen
 
 TICK, LABEL, TITLE = 10.5, 11.5, 12.0
-REACH = 3000  # of rules; longer ones cost a browser dear where they are dashed
+RULE_LENGTH = 3000  # of rules; longer ones cost a browser dear where they are dashed
 
 
 def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
@@ -165,10 +165,10 @@ def _rule(item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str
     axis = panel.x if item.across == "x" else panel.y
     if item.across == "x":
         (at,) = frame.x(axis, [item.at])
-        path, ends = f"M{at:.2f} -{REACH}V{REACH}", ([at, at], [frame.top, frame.bottom])
+        path, ends = f"M{at:.2f} -{RULE_LENGTH}V{RULE_LENGTH}", ([at, at], [frame.top, frame.bottom])
     else:
         (at,) = frame.y(axis, [item.at])
-        path, ends = f"M-{REACH} {at:.2f}H{REACH}", ([frame.left, frame.right], [at, at])
+        path, ends = f"M-{RULE_LENGTH} {at:.2f}H{RULE_LENGTH}", ([frame.left, frame.right], [at, at])
     room.add_line(np.array(ends[0]), np.array(ends[1]))
     return pen.line(path, item.look, f' class="rule"{key}' if pen.page else "")
 

@@ -68,16 +68,16 @@ def about(
 
 def options_by_name() -> dict[str, str]:
     """Long option of every command, by the name of the argument that it becomes."""
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     todo: list[Any] = [typer.main.get_command(build())]
     for command in todo:
         todo.extend(getattr(command, "commands", {}).values())
         for parameter in command.params:
             option = next((word for word in parameter.opts if word.startswith("--")), None)
             if option is not None:
-                found[parameter.name] = option
-                found[option[2:].replace("-", "_")] = option
-    return found
+                result[parameter.name] = option
+                result[option[2:].replace("-", "_")] = option
+    return result
 
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:

@@ -71,7 +71,7 @@ def compare(
     plan = _study(study, change or [])
     assert plan.base.design is not None
     with progress(f"comparing {plan.name}", quiet=quiet) as computing:
-        found = compared(
+        result = compared(
             plan,
             validation=validation,
             progress=computing,
@@ -80,33 +80,33 @@ def compare(
         )
     made = study_document(
         plan.base.design,
-        sections(found),
+        sections(result),
         title=f"{plan.title or plan.name}: variants",
         subtitle=f"{plan.base.name} and {len(plan.variants)} variants",
         kind="compare",
     )
     with progress("drawing figures", quiet=quiet) as drawing:
         page, data = write_pages(made, out, "compare", progress=drawing)
-    untrue = any(entry.passed is False for one in found.all for entry in one.ledger)
-    passed = bool(made["verdict"]["passed"] and not found.refused and not untrue)
+    untrue = any(entry.passed is False for one in result.all for entry in one.ledger)
+    passed = bool(made["verdict"]["passed"] and not result.refused and not untrue)
     if as_json:
         print_json(made)
     else:
-        print_verdict(passed, _verdict(found, untrue))
-        print_blocks([overview(found)])
+        print_verdict(passed, _verdict(result, untrue))
+        print_blocks([overview(result)])
         print_line(f"{page}\n{data}")
     leave_with(passed)
 
 
-def _verdict(found: Comparison, untrue: bool) -> str:
+def _verdict(comparison: Comparison, untrue: bool) -> str:
     """Which designs meet their requirements, in one sentence."""
-    failing = [one.variant.name for one in found.all if any(v.passed is False for v in one.verdicts)]
+    failing = [one.variant.name for one in comparison.all if any(v.passed is False for v in one.verdicts)]
     said = (
         f"{', '.join(failing)}: a requirement is not met"
         if failing
         else "every requirement of every design met"
     )
-    refused = [variant.name for variant in found.refused]
+    refused = [variant.name for variant in comparison.refused]
     said += f"; no design: {', '.join(refused)}" if refused else ""
     return said + ("; a prediction is not confirmed by the simulator" if untrue else "")
 

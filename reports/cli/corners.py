@@ -51,24 +51,24 @@ def corners(
 
     drive = load_drive(design, changes)
     asked = Asked.of(drive, hot_degC=hot, cold_degC=cold, supply_V=supply, cold_viscous=cold_viscous)
-    found = analyse(drive, asked)
+    result = analyse(drive, asked)
     if as_json:
-        print_json(_json(found))
+        print_json(_json(result))
     else:
-        print_verdict(found.passed, f"{drive.name}: {summary(found)}")
-        for corner in found.corners:
+        print_verdict(result.passed, f"{drive.name}: {summary(result)}")
+        for corner in result.corners:
             for line in _lines(corner):
                 print_line(line)
-    leave_with(found.passed)
+    leave_with(result.passed)
 
 
-def _json(found: Corners) -> dict[str, Any]:
+def _json(result: Corners) -> dict[str, Any]:
     from dataclasses import asdict
 
     return {
-        "design": found.design.name,
-        "asked": asdict(found.asked),
-        "passed": found.passed,
+        "design": result.design.name,
+        "asked": asdict(result.asked),
+        "passed": result.passed,
         "corners": [
             {
                 "name": corner.name,
@@ -87,7 +87,7 @@ def _json(found: Corners) -> dict[str, Any]:
                     {"id": one.id, "value": one.value, "passed": one.passed} for one in corner.verdicts
                 ],
             }
-            for corner in found.corners
+            for corner in result.corners
         ],
     }
 
@@ -97,9 +97,9 @@ def _lines(corner: Corner) -> list[str]:
 
     parts = []
     for attribute, words, unit in (("gain_margin_db", "gain", "dB"), ("phase_margin_deg", "phase", "deg")):
-        found = least(corner, attribute)
-        if found is not None:
-            parts.append(f"least {words} margin {found[0]:.1f} {unit} ({found[1]} loop)")
+        result = least(corner, attribute)
+        if result is not None:
+            parts.append(f"least {words} margin {result[0]:.1f} {unit} ({result[1]} loop)")
     missed = unmet(corner)
     parts.append(f"not met: {missed}" if missed else "all met")
     return [f"  {corner.name}: {corner.words}", f"    {', '.join(parts)}"]

@@ -189,17 +189,17 @@ def _predict(steps: list[Path], chirp: Path, out: Path | None, as_json: bool, qu
     if out is not None:
         raise InputError("--out goes with a design; --predict prints its table only")
     motor = fit_step([open_record(path) for path in steps])
-    found = predict_chirp(motor, open_record(chirp))
+    result = predict_chirp(motor, open_record(chirp))
     if as_json:
-        bands = [{"from_hz": a, "to_hz": b, "relative_error": c.relative_error} for a, b, c in found.bands]
+        bands = [{"from_hz": a, "to_hz": b, "relative_error": c.relative_error} for a, b, c in result.bands]
         print_json(
             {
                 "motor": asdict(motor),
-                "chirp": asdict(found.law),
-                "relative_error": found.whole.relative_error,
-                "fit_percent": found.whole.fit_percent,
+                "chirp": asdict(result.law),
+                "relative_error": result.whole.relative_error,
+                "fit_percent": result.whole.fit_percent,
                 "bands": bands,
             }
         )
     else:
-        _show([pages.section(motor, found, chirp.name)], None)
+        _show([pages.section(motor, result, chirp.name)], None)

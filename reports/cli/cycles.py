@@ -26,21 +26,21 @@ def cycles(
     from reports.sections.cycles import summary
     from reports.terminal import print_verdict
 
-    found = limit_cycles(load_drive(design, changes))
+    result = limit_cycles(load_drive(design, changes))
     if as_json:
-        print_json(_json(found))
+        print_json(_json(result))
     else:
-        print_verdict(found.hunting is None, f"{found.design.name}: {summary(found)}")
-        for line in _lines(found):
+        print_verdict(result.hunting is None, f"{result.design.name}: {summary(result)}")
+        for line in _lines(result):
             print_line(line)
-    leave_with(found.hunting is None)
+    leave_with(result.hunting is None)
 
 
-def _json(found: LimitCycles) -> dict[str, Any]:
+def _json(limit_cycles: LimitCycles) -> dict[str, Any]:
     """SI, at the output."""
     return {
-        "design": found.design.name,
-        "looked_for": list(found.looked_for),
+        "design": limit_cycles.design.name,
+        "looked_for": list(limit_cycles.looked_for),
         "foreseen": [
             {
                 "cause": one.cycle.cause,
@@ -51,7 +51,7 @@ def _json(found: LimitCycles) -> dict[str, Any]:
                 "simulated_amplitude": None if one.ratio is None else one.ratio * one.cycle.output_rad,
                 "simulated_hz": one.frequency_hz,
             }
-            for one in found.confirmations
+            for one in limit_cycles.confirmations
         ],
         "steps": [
             {
@@ -62,18 +62,18 @@ def _json(found: LimitCycles) -> dict[str, Any]:
                 "amplitude": one.settling.hunting_rad,
                 "frequency_hz": one.settling.hunting_hz,
             }
-            for one in found.rests
+            for one in limit_cycles.rests
         ],
     }
 
 
-def _lines(found: LimitCycles) -> list[str]:
+def _lines(limit_cycles: LimitCycles) -> list[str]:
     from reports.sections.cycles import CAUSES
     from reports.sections.large_signal import output_unit
 
-    scale, unit = output_unit(found.design)
+    scale, unit = output_unit(limit_cycles.design)
     lines = []
-    for one in found.confirmations:
+    for one in limit_cycles.confirmations:
         cycle = one.cycle
         kind = "attracting" if cycle.stable else "border"
         friction = "with" if cycle.with_friction else "without"

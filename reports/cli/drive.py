@@ -72,13 +72,13 @@ def read_changes(changes: Sequence[str]) -> dict[str, Any]:
     """
     from actuator_lti.errors import InputError
 
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for words in changes:
         key, equals, value = words.partition("=")
         if not equals or not key.strip():
             raise InputError(f"--set {words!r}: allowed: KEY=VALUE, such as limits.voltage='24 V'")
-        found[key.strip()] = _value(value.strip())
-    return found
+        result[key.strip()] = _value(value.strip())
+    return result
 
 
 def _value(words: str) -> Any:

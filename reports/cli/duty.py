@@ -62,35 +62,35 @@ def duty(
         drive, amplitude_rad=output_quantity("--amplitude", amplitude, drive),
         frequency_hz=frequency, load_Nm=load, share=share, cycle_s=cycle,
     )  # fmt: skip
-    found = analyse(drive, asked)
+    result = analyse(drive, asked)
     if as_json:
-        print_json(_json(found))
+        print_json(_json(result))
     else:
-        print_verdict(found.passed, f"{drive.name}: {summary(found)}")
-        for line in _lines(found):
+        print_verdict(result.passed, f"{drive.name}: {summary(result)}")
+        for line in _lines(result):
             print_line(line)
-    leave_with(found.passed)
+    leave_with(result.passed)
 
 
 def _known(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _json(found: Duty) -> dict[str, Any]:
+def _json(result: Duty) -> dict[str, Any]:
     """Everything but the curves, SI."""
     from dataclasses import asdict
 
-    over, heat = found.overload, found.heating
+    over, heat = result.overload, result.heating
     return {
-        "design": found.design.name,
-        "asked": asdict(found.asked),
-        "passed": found.passed,
-        "rms_A": found.rms_A,
-        "moving_rms_A": found.moving_rms_A,
-        "holding_A": found.holding_A,
-        "peak_A": found.peak_A,
-        "continuous_A": _known(found.continuous_A),
-        "limited": list(found.limited),
+        "design": result.design.name,
+        "asked": asdict(result.asked),
+        "passed": result.passed,
+        "rms_A": result.rms_A,
+        "moving_rms_A": result.moving_rms_A,
+        "holding_A": result.holding_A,
+        "peak_A": result.peak_A,
+        "continuous_A": _known(result.continuous_A),
+        "limited": list(result.limited),
         "overload": None if over is None else asdict(over),
         "heating": None
         if heat is None
@@ -103,15 +103,15 @@ def _json(found: Duty) -> dict[str, Any]:
     }
 
 
-def _lines(found: Duty) -> list[str]:
-    over, heat = found.overload, found.heating
-    stated = f"{found.continuous_A:.4g} A" if isfinite(found.continuous_A) else "not stated"
+def _lines(result: Duty) -> list[str]:
+    over, heat = result.overload, result.heating
+    stated = f"{result.continuous_A:.4g} A" if isfinite(result.continuous_A) else "not stated"
     lines = [
-        f"  current {found.rms_A:.4g} A rms (in motion {found.moving_rms_A:.4g} A, "
-        f"peak {found.peak_A:.4g} A), continuous {stated}"
+        f"  current {result.rms_A:.4g} A rms (in motion {result.moving_rms_A:.4g} A, "
+        f"peak {result.peak_A:.4g} A), continuous {stated}"
     ]
-    if found.asked.share < 1.0:
-        lines.append(f"  holding still: {found.holding_A:.4g} A")
+    if result.asked.share < 1.0:
+        lines.append(f"  holding still: {result.holding_A:.4g} A")
     if over is not None:
         acts = "never acts" if over.acts_after_s is None else f"acts after {over.acts_after_s:.3g} s"
         lines.append(f"  overload state up to {over.peak:.3g} of 1: the protection {acts}")
@@ -120,6 +120,6 @@ def _lines(found: Duty) -> list[str]:
         lines.append(
             f"  winding {heat.final_degC:.4g} °C in the long run, limit {heat.limit_degC:.4g} °C{late}"
         )
-    if found.limited:
-        lines.append(f"  limiters that act: {', '.join(found.limited)}; the motion is not followed as asked")
+    if result.limited:
+        lines.append(f"  limiters that act: {', '.join(result.limited)}; the motion is not followed as asked")
     return lines

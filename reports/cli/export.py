@@ -53,16 +53,16 @@ def c(
     texts = c_export(drive, single_precision=single)
     for name in texts:
         refuse_existing(out / name, force)
-    found = _checked(drive) if check else None
-    texts["README.md"] += "\n" + check_text(found, single_precision=single)
+    result = _checked(drive) if check else None
+    texts["README.md"] += "\n" + check_text(result, single_precision=single)
     write_together({out / name: text.encode() for name, text in texts.items()})
     if as_json:
         about = {"files": [str(out / name) for name in texts]}
-        print_json({"schema": "actuator-lti/export-c", "version": 1, **about, **_check_json(found)})
+        print_json({"schema": "actuator-lti/export-c", "version": 1, **about, **_check_json(result)})
     else:
         print_line(f"{out}: {', '.join(texts)}")
-        _say(found)
-    leave_with(found is None or not found.failed)
+        _say(result)
+    leave_with(result is None or not result.failed)
 
 
 def _checked(drive: Design) -> CodeCheck:
@@ -73,19 +73,23 @@ def _checked(drive: Design) -> CodeCheck:
         return check_code(drive)
 
 
-def _say(found: CodeCheck | None) -> None:
+def _say(code_check: CodeCheck | None) -> None:
     """Print what the check has found."""
     from reports.cli.output import print_line
     from reports.export_check import summary
 
-    if found is not None:
-        print_line(summary(found))
+    if code_check is not None:
+        print_line(summary(code_check))
 
 
-def _check_json(found: CodeCheck | None) -> dict[str, Any]:
+def _check_json(code_check: CodeCheck | None) -> dict[str, Any]:
     from reports.export_check import summary
 
-    return {} if found is None else {"check": {"passed": not found.failed, "result": summary(found)}}
+    return (
+        {}
+        if code_check is None
+        else {"check": {"passed": not code_check.failed, "result": summary(code_check)}}
+    )
 
 
 @app.command("fmu")
@@ -120,20 +124,20 @@ def fmu(
     refuse_existing(target, force)
     platforms = tuple(dict.fromkeys(platform or PLATFORMS))
     refuse_unknown(version, platforms)
-    found = _checked(drive) if check and not plain else None
+    result = _checked(drive) if check and not plain else None
     data = fmu_bytes(
         drive,
         version,  # type: ignore[arg-type]
         platforms,
-        documents={} if plain else export_documents(drive, found),
+        documents={} if plain else export_documents(drive, result),
         picture=model_png(drive),
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)
     if as_json:
         about = {"file": str(target), "fmi": version, "platforms": platforms, "bytes": len(data)}
-        print_json({"schema": "actuator-lti/export-fmu", "version": 1, **about, **_check_json(found)})
+        print_json({"schema": "actuator-lti/export-fmu", "version": 1, **about, **_check_json(result)})
     else:
         print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
-        _say(found)
-    leave_with(found is None or not found.failed)
+        _say(result)
+    leave_with(result is None or not result.failed)

@@ -67,15 +67,15 @@ def failures(
         watched_s=duration,
         load_Nm=load,
     )
-    found = analyse(drive, asked)
+    result = analyse(drive, asked)
     if as_json:
-        print_json(_json(found))
+        print_json(_json(result))
         return
-    for line in _lines(found):
+    for line in _lines(result):
         print_line(line)
 
 
-def _json(found: Failures) -> dict[str, Any]:
+def _json(result: Failures) -> dict[str, Any]:
     """Everything but the curves, SI."""
     from dataclasses import asdict, fields
 
@@ -86,48 +86,48 @@ def _json(found: Failures) -> dict[str, Any]:
         if each.name not in ("time_s", "deflection_rad", "current_A", "moment_Nm")
     ]  # fmt: skip
     return {
-        "design": found.design.name,
-        "axis": found.design.axis,
-        "asked": asdict(found.asked),
-        "cases": [{name: getattr(case, name) for name in scalars} for case in found.cases],
-        "left_out": found.left_out,
+        "design": result.design.name,
+        "axis": result.design.axis,
+        "asked": asdict(result.asked),
+        "cases": [{name: getattr(case, name) for name in scalars} for case in result.cases],
+        "left_out": result.left_out,
     }
 
 
-def _lines(found: Failures) -> list[str]:
+def _lines(result: Failures) -> list[str]:
     """The same for people."""
     from reports.sections.failures import NAMES, summary
     from reports.sections.large_signal import load_unit, output_unit
 
-    scale, unit = output_unit(found.design)
-    asked = found.asked
+    scale, unit = output_unit(result.design)
+    asked = result.asked
     lines = [
-        f"{found.design.name}: {summary(found)}",
+        f"{result.design.name}: {summary(result)}",
         f"  stop at {scale * asked.stop_rad:.4g} {unit}, detected after "
-        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(found.design)}",
+        f"{1e3 * asked.detection_s:.4g} ms, load {asked.load_Nm:g} {load_unit(result.design)}",
     ]
-    for case in found.cases:
-        lines += [f"  {NAMES[case.name]}: {case.words}", f"    {_figures(found, case)}"]
-    lines += [f"  {NAMES[name]}: not for this drive, as {why}" for name, why in found.left_out.items()]
+    for case in result.cases:
+        lines += [f"  {NAMES[case.name]}: {case.words}", f"    {_figures(result, case)}"]
+    lines += [f"  {NAMES[name]}: not for this drive, as {why}" for name, why in result.left_out.items()]
     return lines
 
 
-def _figures(found: Failures, case: FailureCase) -> str:
+def _figures(result: Failures, case: FailureCase) -> str:
     from reports.sections.large_signal import load_unit, output_unit
 
-    scale, unit = output_unit(found.design)
+    scale, unit = output_unit(result.design)
     parts = []
     if case.to_deflection_s is not None:
         parts.append(
-            f"{scale * found.asked.deflection_rad:.4g} {unit} after {1e3 * case.to_deflection_s:.4g} ms"
+            f"{scale * result.asked.deflection_rad:.4g} {unit} after {1e3 * case.to_deflection_s:.4g} ms"
         )
     parts.append(
         "stop not reached" if case.to_stop_s is None else f"stop after {1e3 * case.to_stop_s:.4g} ms"
     )
     parts.append(f"{scale * case.at_detection_rad:.4g} {unit} until detected")
-    if found.design.motor.has_electrical_dynamics:
+    if result.design.motor.has_electrical_dynamics:
         parts.append(f"up to {case.peak_current_A:.4g} A")
-    parts.append(f"up to {case.peak_moment_Nm:.4g} {load_unit(found.design)}")
+    parts.append(f"up to {case.peak_moment_Nm:.4g} {load_unit(result.design)}")
     if case.protected_s is not None:
         parts.append(f"overload protection after {1e3 * case.protected_s:.4g} ms")
     return ", ".join(parts)

@@ -39,20 +39,20 @@ def fixed_values(design: Design, texts: Sequence[str]) -> dict[str, float]:
     from actuator_lti.design.units import parse_quantity
     from actuator_lti.errors import InputError
 
-    found = {}
+    result = {}
     for text in texts:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not value:
             raise InputError(f'--fix "{text}": KEY=VALUE is wanted, such as friction.load_coefficient=0')
         field, _ = located(design, key)
         try:
-            found[key] = float(value)
+            result[key] = float(value)
         except ValueError:
             try:
-                found[key] = parse_quantity(value, field.unit(Structure.of(design)))
+                result[key] = parse_quantity(value, field.unit(Structure.of(design)))
             except InputError as error:
                 raise InputError(f"--fix {key} = {value}: {error.message}") from None
-    return found
+    return result
 
 
 def finish(

@@ -59,7 +59,7 @@ def as_data(result: FrequencyResult, written: Path | None) -> dict[str, Any]:
         },
         "play": None if result.play is None else asdict(result.play),
         "inputs": inputs_json(result.record, result.used),
-        "findings": {name: [asdict(one) for one in found] for name, found in result.findings.items()},
+        "findings": {name: [asdict(one) for one in outcome] for name, outcome in result.findings.items()},
         "checks": items_json(result.items),
         "passed": result.passed,
         "design": None if written is None else str(written),

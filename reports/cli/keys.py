@@ -24,19 +24,19 @@ def keys(match: MatchArgument = "", linear: LinearOption = False, as_json: JsonO
     from actuator_lti.errors import InputError
     from reports.cli.output import console, print_json
 
-    found = [
+    result = [
         key
         for key in key_reference("linear" if linear else "rotary")
         if match.lower() in key.path.lower() or match.lower() in key.description.lower()
     ]
-    if not found:
+    if not result:
         raise InputError(f"{match!r}: no key has it in its name or meaning; allowed: see actuator-lti keys")
     if as_json:
-        print_json({"schema": "actuator-lti/keys", "version": 1, "keys": [key.as_dict() for key in found]})
+        print_json({"schema": "actuator-lti/keys", "version": 1, "keys": [key.as_dict() for key in result]})
         return
     out = console()
     section = ""
-    for key in found:
+    for key in result:
         if key.section != section:
             section = key.section
             out.print(f"\n[bold]\\[{section}][/bold]", highlight=False)

@@ -84,7 +84,7 @@ def margins(
     else:
         _print_tables(where, figures, verdicts, outer)
     every = [*figures.values(), *outer.values()]
-    leave_with(all_pass(verdicts) and all(found.margins.stable for found in every))
+    leave_with(all_pass(verdicts) and all(result.margins.stable for result in every))
 
 
 def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str, LoopFigures]:
@@ -111,11 +111,11 @@ def _print_json(
     from reports.loop_json import loop_json
     from reports.sections.requirements import item
 
-    loops = {name: loop_json(found) for name, found in figures.items()}
+    loops = {name: loop_json(result) for name, result in figures.items()}
     passed = all_pass(tuple(verdicts)) and all(
-        found.margins.stable for found in (*figures.values(), *outer.values())
+        result.margins.stable for result in (*figures.values(), *outer.values())
     )
-    around = {"around": {name: loop_json(found) for name, found in outer.items()}} if outer else {}
+    around = {"around": {name: loop_json(result) for name, result in outer.items()}} if outer else {}
     print_json(
         {
             **where,
@@ -141,9 +141,9 @@ def _print_tables(
     from reports.terminal import print_blocks, print_verdict, side_by_side
 
     made = section(verdicts, where["load_unit"])
-    named = {**{LOOPS[name]: found for name, found in figures.items()}, **outer}
-    unstable = [name for name, found in named.items() if found.margins.stable is False]
-    unknown = [name for name, found in named.items() if found.margins.stable is None]
+    named = {**{LOOPS[name]: result for name, result in figures.items()}, **outer}
+    unstable = [name for name, result in named.items() if result.margins.stable is False]
+    unknown = [name for name, result in named.items() if result.margins.stable is None]
     loops = f"not stable: {', '.join(unstable)}" if unstable else "every loop is stable"
     loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
     good = all_pass(tuple(verdicts)) and not unstable
@@ -155,7 +155,9 @@ def _print_tables(
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
-    counts = [len(found.margins.gain_margins) + len(found.margins.phase_margins) for found in named.values()]
+    counts = [
+        len(result.margins.gain_margins) + len(result.margins.phase_margins) for result in named.values()
+    ]
     if max(counts, default=0) > 2:
         blocks.append(crossing_table(named))
     notes = [*evidence_notes(named), *(n for f in named.values() for n in (*f.margins.notes, *f.notes))]

@@ -62,8 +62,8 @@ def read_load(text: str) -> float:
     for unit in ("N*m", "N"):
         try:
             load = Load(parse_quantity(text, unit))
-        except InputError as found:
-            message = found.message
+        except InputError as error:
+            message = error.message
         else:
             load.unit = unit
             return load

@@ -24,49 +24,49 @@ def stiffness(
     from reports.cli.output import print_json, print_line
     from reports.terminal import print_verdict
 
-    found = analyse(load_drive(design, changes))
+    result = analyse(load_drive(design, changes))
     if as_json:
-        print_json(_json(found))
+        print_json(_json(result))
     else:
-        print_verdict(found.agrees, f"{found.design.name}: {_verdict(found)}")
-        for line in _lines(found):
+        print_verdict(result.agrees, f"{result.design.name}: {_verdict(result)}")
+        for line in _lines(result):
             print_line(line)
-    leave_with(found.agrees)
+    leave_with(result.agrees)
 
 
-def _verdict(found: Stiffness) -> str:
+def _verdict(result: Stiffness) -> str:
     """Whether the simulator confirms the linear stiffness, and how well."""
-    if not found.checks:
+    if not result.checks:
         return (
             "self-locking, no moment moves the output"
-            if _rigid(found)
+            if _rigid(result)
             else "no stiffness was put to the simulator"
         )
-    most = max(check.difference for check in found.checks)
-    said = "confirms" if found.agrees else "does not confirm"
+    most = max(check.difference for check in result.checks)
+    said = "confirms" if result.agrees else "does not confirm"
     return f"an injected moment {said} the dynamic stiffness (relative difference up to {most:.1e})"
 
 
-def _rigid(found: Stiffness) -> bool:
+def _rigid(result: Stiffness) -> bool:
     """Whether the output holds against any moment."""
     from math import isinf
 
-    return all(isinf(curve.static_Nm_rad) for curve in found.curves)
+    return all(isinf(curve.static_Nm_rad) for curve in result.curves)
 
 
 def _known(value: float | None) -> float | None:
     return None if value is None or not isfinite(value) else float(value)
 
 
-def _json(found: Stiffness) -> dict[str, Any]:
+def _json(result: Stiffness) -> dict[str, Any]:
     """Everything for a machine; null where a stiffness is infinite."""
     import numpy as np
 
-    lost = found.lost_motion
+    lost = result.lost_motion
     return {
-        "design": found.design.name,
-        "unit": "N/m" if found.design.axis == "linear" else "N*m/rad",
-        "agrees": found.agrees,
+        "design": result.design.name,
+        "unit": "N/m" if result.design.axis == "linear" else "N*m/rad",
+        "agrees": result.agrees,
         "curves": [
             {
                 "state": curve.state,
@@ -75,7 +75,7 @@ def _json(found: Stiffness) -> dict[str, Any]:
                 "size": [_known(x) for x in np.abs(curve.stiffness_Nm_rad)],
                 "phase_deg": [_known(x) for x in np.angle(curve.stiffness_Nm_rad, deg=True)],
             }
-            for curve in found.curves
+            for curve in result.curves
         ],
         "lost_motion": None
         if lost is None
@@ -90,7 +90,7 @@ def _json(found: Stiffness) -> dict[str, Any]:
                 "frequency_hz": one.frequency_hz,
                 "size": _known(abs(one.seen_Nm_rad)),
             }
-            for one in found.at_rest
+            for one in result.at_rest
         ],
         "checks": [
             {
@@ -99,35 +99,35 @@ def _json(found: Stiffness) -> dict[str, Any]:
                 "simulated": abs(check.seen_Nm_rad),
                 "relative_difference": check.difference,
             }
-            for check in found.checks
+            for check in result.checks
         ],
     }
 
 
-def _lines(found: Stiffness) -> list[str]:
+def _lines(result: Stiffness) -> list[str]:
     """The same for people."""
     from reports.sections.stiffness import STATES
 
-    unit = "N/m" if found.design.axis == "linear" else "N m/rad"
-    angle = "m" if found.design.axis == "linear" else "rad"
-    lines = [f"{found.design.name}: stiffness at the output, {unit}"]
-    for curve in found.curves:
+    unit = "N/m" if result.design.axis == "linear" else "N m/rad"
+    angle = "m" if result.design.axis == "linear" else "rad"
+    lines = [f"{result.design.name}: stiffness at the output, {unit}"]
+    for curve in result.curves:
         least, at = curve.least
         static = _shown(curve.static_Nm_rad)
         lines.append(f"  {STATES[curve.state]:<28} static {static}, least {least:.6g} at {at:.4g} Hz")
-    lost = found.lost_motion
+    lost = result.lost_motion
     if lost is not None:
         seen = "" if lost.seen_rad is None else f", simulated {lost.seen_rad:.4g} {angle}"
         lines.append(f"  play {lost.play_rad:.4g} {angle}; lost motion {lost.foreseen_rad:.4g} {angle}{seen}")
-    load = "N" if found.design.axis == "linear" else "N m"
+    load = "N" if result.design.axis == "linear" else "N m"
     lines.extend(
         f"  at rest, {one.moment_Nm:.4g} {load} at {one.frequency_hz:.4g} Hz: {_shown(abs(one.seen_Nm_rad))}"
-        for one in found.at_rest
+        for one in result.at_rest
     )
     lines.extend(
         f"  at {check.frequency_hz:.4g} Hz: {abs(check.foreseen_Nm_rad):.6g}, simulated "
         f"{abs(check.seen_Nm_rad):.6g} (relative difference {check.difference:.1e})"
-        for check in found.checks
+        for check in result.checks
     )
     return lines
 

@@ -42,7 +42,7 @@ def tune(
     """
     from analyses.tuning import TuningSettings
     from analyses.tuning import tune as tuned
-    from analyses.tuning.wishes import read_requirement
+    from analyses.tuning.asked_requirement import read_requirement
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
 

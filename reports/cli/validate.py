@@ -52,17 +52,17 @@ def validate(
 
     drive = load_drive(design, changes)
     with progress(f"validating {drive.name}", quiet=quiet) as report, isolated() as missing:
-        found = run(drive, QUICK if quick else Settings(), report)
-    made = _document(found, missing)
+        result = run(drive, QUICK if quick else Settings(), report)
+    made = _document(result, missing)
     paths = _write(made, out, quiet) if out is not None else ()
     if as_json:
         _print_json(made)
     else:
-        _print_tables(found, made, paths)
-    leave_with(found.passed and made["verdict"]["passed"])
+        _print_tables(result, made, paths)
+    leave_with(result.passed and made["verdict"]["passed"])
 
 
-def _document(found: Validation, missing: Sequence[Missing]) -> dict[str, Any]:
+def _document(validation: Validation, missing: Sequence[Missing]) -> dict[str, Any]:
     """The validation as a document of its own."""
     from actuator_lti.design import design_hash
     from reports import document as doc
@@ -70,13 +70,13 @@ def _document(found: Validation, missing: Sequence[Missing]) -> dict[str, Any]:
     from reports.provenance import provenance
     from reports.sections.validation import section
 
-    design = found.design
+    design = validation.design
     return doc.document(
         title=f"{design.title or design.name}: validation",
         subtitle="Linear predictions against the nonlinear simulation",
         design=design_head(design),
         provenance=provenance(design_hash(design)),
-        sections=[*notices(missing, "validation"), *section(found)],
+        sections=[*notices(missing, "validation"), *section(validation)],
         kind="validation",
     )
 
@@ -103,24 +103,26 @@ def _print_json(made: dict[str, Any]) -> None:
     print_line(dumps(made).rstrip("\n"))
 
 
-def _print_tables(found: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
+def _print_tables(validation: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
     """Print the ledger, the conditional stability, and the verdict."""
     from reports.cli.output import print_line
     from reports.sections.validation import by_loop, loop_name
     from reports.terminal import print_blocks, print_verdict
 
-    tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(found.ledger).items()]
+    tables = [_ledger(rows, loop_name(name)) for name, rows in by_loop(validation.ledger).items()]
     sections = {part["id"]: part for part in made["sections"]}
     if "conditional" in sections:
         from reports import document as doc
 
         tables.append(doc.text(sections["conditional"]["result"]))
         tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
-    print_verdict(found.passed, str(found), failed="FAIL" if found.judged else "NOTHING JUDGED")
-    print_blocks(tables, found.notes)
+    print_verdict(
+        validation.passed, str(validation), failed="FAIL" if validation.judged else "NOTHING JUDGED"
+    )
+    print_blocks(tables, validation.notes)
     for path in paths:
         print_line(str(path))
-    print_line(f"{sum(found.seconds.values()):.1f} s")
+    print_line(f"{sum(validation.seconds.values()):.1f} s")
 
 
 def _ledger(rows: Any, caption: str) -> dict[str, Any]:

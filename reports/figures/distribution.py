@@ -39,7 +39,7 @@ def _marks(panel: Panel, data: dict[str, Any]) -> None:
     """Mark limits, the nominal design and the worst case, each with its own dash."""
     known = style.known((data["nominal"], data["worst"]))
     low, high = min([*data["edges"], *known], default=0.0), max([*data["edges"], *known], default=1.0)
-    reach = max(high - low, 1e-3 * max(abs(high), 1e-9))
+    width = max(high - low, 1e-3 * max(abs(high), 1e-9))
     lines = (
         ("nominal", style.INK, 0),
         ("worst", style.ORANGE, 1),
@@ -50,7 +50,7 @@ def _marks(panel: Panel, data: dict[str, Any]) -> None:
         value = data[name]
         if value is None:
             continue
-        if name in ("minimum", "maximum") and not low - 2 * reach <= value <= high + 2 * reach:
+        if name in ("minimum", "maximum") and not low - 2 * width <= value <= high + 2 * width:
             panel.note(f"{name} {value:g} {data['unit']}: off scale", corner="top left", colour=style.RED)
             continue
         panel.x.see([value])

@@ -1,6 +1,6 @@
 """Amplitude over frequency: which limit acts, what the output looks like, and the linear onset lines.
 
-Data: ``frequency_hz`` (cell centres), ``amplitude`` (cell centres, in ``unit``), ``causes`` and
+Data: ``frequency_hz`` (of the points), ``amplitude`` (of the points, in ``unit``), ``causes`` and
 ``waveforms`` (names), ``cause`` and ``waveform`` (rows of indices, one row an amplitude), ``onset`` of
 ``name``, ``label``, ``amplitude``; ``points`` of ``frequency_hz``, ``amplitude``, ``label``; ``unit``;
 ``marks`` of ``amplitude``, ``label``.
@@ -77,7 +77,7 @@ def draw(data: dict[str, Any]) -> Chart:
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
-    """Give the borders of cells on a logarithmic scale."""
+    """Give the borders between points on a logarithmic scale."""
     inner = np.sqrt(centres[1:] * centres[:-1])
     first, last = centres[0] ** 2 / inner[0], centres[-1] ** 2 / inner[-1]
     return np.concatenate([[first], inner, [last]])
@@ -91,7 +91,7 @@ def _runs(row: np.ndarray) -> Iterator[tuple[int, int, int]]:
 
 
 def _regions(panel: Panel, names: list[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
-    """Fill the cells of each cause."""
+    """Fill the points of each cause."""
     boxes: dict[str, list[Any]] = {}
     for k, row in enumerate(cause):
         for value, a, b in _runs(row):
@@ -135,7 +135,7 @@ def _names(panel: Panel, names: list[str], cause: np.ndarray, x: np.ndarray, y: 
 
 
 def _deepest(mask: np.ndarray) -> tuple[int, int]:
-    """Give the cell furthest inside a region, weighing rows as two columns."""
+    """Give the point furthest inside a region, weighing rows as two columns."""
     outside = np.argwhere(~np.pad(mask, 1)) - 1
     inside = np.argwhere(mask)
     gaps = inside[:, None, :] - outside[None, :, :]

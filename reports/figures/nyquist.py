@@ -1,7 +1,7 @@
 """Nyquist figure around the critical point, with the modulus circle and every crossing.
 
 Data: ``real``, ``imag`` (null where the curve leaves the frame); ``modulus`` (distance) and
-``modulus_point`` [re, im] or null; ``gain_points`` (real coordinates), ``phase_points`` [re, im]; ``reach``.
+``modulus_point`` [re, im] or null; ``gain_points`` (real coordinates), ``phase_points`` [re, im]; ``frame``.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def draw(data: dict[str, Any]) -> Chart:
         panel.points([x], [y], colour=style.GREEN, size=6.5, read=False)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
-    reach = data.get("reach", 1.6)
-    panel.x.limits(-1.0 - reach, reach - 0.35)
-    panel.y.limits(-reach, reach)
+    frame = data.get("frame", 1.6)
+    panel.x.limits(-1.0 - frame, frame - 0.35)
+    panel.y.limits(-frame, frame)
     panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     return chart
 

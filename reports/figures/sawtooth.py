@@ -19,15 +19,15 @@ def draw(data: dict[str, Any]) -> Chart:
     chart = Chart(
         width=style.WIDE, height=160.0 + 130.0 * rows, title="Sawtooth: a sine faster than the rate limit"
     )
-    reach = 1.15 * max(abs(v) for column in columns for v in column["reference"])
+    highest = 1.15 * max(abs(v) for column in columns for v in column["reference"])
     currents = [abs(v) for column in columns for v in style.known(column["current"] or ())]
-    ends = (reach, 1.5 * data["rate_limit"], 1.08 * max(currents, default=1.0))
+    ends = (highest, 1.5 * data["rate_limit"], 1.08 * max(currents, default=1.0))
     for k, column in enumerate(columns):
         panels = chart.column(1.5, *(1.0,) * (rows - 1), title=column["title"])
         _column(panels, column, data, named=k == 0)
         for panel, end in zip(panels, ends, strict=False):
             panel.y.limits(-end, end)
-        panels[0].y.limits(high=2.6 * reach)  # room for the words
+        panels[0].y.limits(high=2.6 * highest)  # room for the words
     return chart
 
 

@@ -10,7 +10,7 @@ from reports.figures.style import Chart, Panel
 
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
-REACH = 1.6
+FRAME = 1.6
 BORDERS = ("speed limit", "acceleration limit", "peak current", "voltage")
 
 
@@ -72,8 +72,8 @@ def _nyquist() -> Chart:
     _both(panel)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
-    panel.x.limits(-1.0 - REACH, REACH - 0.35)
-    panel.y.limits(-REACH, REACH)
+    panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
+    panel.y.limits(-FRAME, FRAME)
     panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     return chart
 

@@ -13,9 +13,9 @@ from typing import Any
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
-from nonlinear.export.page import reaches_row, row_statements
+from nonlinear.export.page import changes_row, row_statements
 
-REACH = 5.0  # a slider goes from a fifth of the value to five times it
+SLIDER_FACTOR = 5.0  # a slider goes from a fifth of the value to five times it
 UNUSED = "has no influence on the loops or the run that this page follows"
 WHOLE = "a whole number: change it in the design file"
 ZERO = "0 in this design: change it in the design file"
@@ -64,10 +64,10 @@ def _reason(design: Design, path: str) -> str:
     value = parameter_value(design, path)
     if value < 0.0 or (value == 0.0 and not _top(design, path)):
         return ZERO
-    reaches = reaches_row(design, path)
-    if reaches is None:
+    changes = changes_row(design, path)
+    if changes is None:
         return UNFOLLOWED
-    return "" if reaches else UNUSED
+    return "" if changes else UNUSED
 
 
 def _top(design: Design, path: str) -> float:
@@ -110,7 +110,11 @@ def _slider(design: Design, path: str) -> dict[str, Any]:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
     made, value = _named(design, path), parameter_value(design, path)
-    low, high = (0.0, _top(design, path)) if value == 0.0 else (value / REACH, min(value * REACH, field.high))
+    low, high = (
+        (0.0, _top(design, path))
+        if value == 0.0
+        else (value / SLIDER_FACTOR, min(value * SLIDER_FACTOR, field.high))
+    )
     known = design.parameters.get(path)
     return {
         **made,

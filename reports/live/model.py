@@ -28,14 +28,14 @@ def live_model(design: Design) -> dict[str, Any]:
         return {"refused": ELASTIC}
     if page.is_elastic(row):
         return {"refused": ELASTIC}
-    found = followed(design)
-    text, places = patches(design, found.free)
+    result = followed(design)
+    text, places = patches(design, result.free)
     return {
         "name": design.name,
         "axis": design.axis,
-        "keys": found.free,
-        "fixed": found.fixed,
-        "lines": found.lines,
+        "keys": result.free,
+        "fixed": result.fixed,
+        "lines": result.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
         "places": {
             **page.PLACES,

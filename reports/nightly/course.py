@@ -102,8 +102,8 @@ class _Writer:
 def _recent(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:
     """Find the changes of level of the last nights."""
     start = max(len(values) - LOOK_BACK, 0)
-    found = change_points(values[start:], tolerance)
-    return tuple(replace(point, index=start + point.index) for point in found) if start else found
+    result = change_points(values[start:], tolerance)
+    return tuple(replace(point, index=start + point.index) for point in result) if start else result
 
 
 def _moved(

@@ -37,12 +37,12 @@ def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
     for design in designs:
         if design.last_night.changes:
             groups.setdefault(cause_words(design.last_night.cause), []).append(design)
-    made = [_headline(cause, found) for cause, found in groups.items()]
+    made = [_headline(cause, result) for cause, result in groups.items()]
     return tuple(sorted(made, key=lambda one: not one.worse))
 
 
-def _headline(cause: str, found: Sequence[DesignView]) -> Headline:
-    ordered = sorted(found, key=lambda d: (not d.last_night.regressions, d.rank))
+def _headline(cause: str, result: Sequence[DesignView]) -> Headline:
+    ordered = sorted(result, key=lambda d: (not d.last_night.regressions, d.rank))
     first = ordered[0]
     effect, worse = gravest(first.last_night, first.verdicts)
     return Headline(cause=cause, effect=effect, worse=worse, designs=tuple(ordered))

@@ -116,9 +116,9 @@ class History:
         )  # fmt: skip
 
     def _snapshot(self, result: NewResult) -> int:
-        found = self.connection.execute("SELECT id FROM snapshots WHERE key = ?", (result.key,)).fetchone()
-        if found:
-            return int(found[0])
+        outcome = self.connection.execute("SELECT id FROM snapshots WHERE key = ?", (result.key,)).fetchone()
+        if outcome:
+            return int(outcome[0])
         ids = np.array([self._figure(f) for f in result.figures], dtype="<i4")
         layout = self._id(
             "layouts", "sha", {"sha": sha256(ids.tobytes()), "figures": zlib.compress(ids.tobytes())}
@@ -143,9 +143,9 @@ class History:
 
     def _id(self, table: str, unique: str, row: Mapping[str, Any]) -> int:
         query = f"SELECT id FROM {table} WHERE {unique} = ?"
-        found = self.connection.execute(query, (row[unique],)).fetchone()
-        if found:
-            return int(found[0])
+        result = self.connection.execute(query, (row[unique],)).fetchone()
+        if result:
+            return int(result[0])
         columns = ", ".join(row)
         marks = ", ".join(f":{name}" for name in row)
         cursor = self.connection.execute(f"INSERT INTO {table}({columns}) VALUES ({marks})", dict(row))
@@ -172,20 +172,20 @@ class History:
         InputError
             Where it is that of another study.
         """
-        found = self.connection.execute("SELECT value FROM meta WHERE key = 'study'").fetchone()
-        if found is None:
+        result = self.connection.execute("SELECT value FROM meta WHERE key = 'study'").fetchone()
+        if result is None:
             with self.connection as c:
                 c.execute("INSERT INTO meta VALUES ('study', ?)", (study,))
-        elif found[0] != study:
+        elif result[0] != study:
             raise InputError(
-                f"holds the nights of study {found[0][:80]!r}, not of {study[:80]!r}: use another --site"
+                f"holds the nights of study {result[0][:80]!r}, not of {study[:80]!r}: use another --site"
             )
 
     def memory(self) -> Memory:
         """How much there is, for the site to remember; a history gets its id when it is first asked."""
-        found = self.connection.execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
-        id = found[0] if found else secrets.token_hex(16)
-        if found is None:
+        result = self.connection.execute("SELECT value FROM meta WHERE key = 'id'").fetchone()
+        id = result[0] if result else secrets.token_hex(16)
+        if result is None:
             with self.connection as c:
                 c.execute("INSERT INTO meta VALUES ('id', ?)", (id,))
         nights = self.connection.execute("SELECT count(*) FROM runs WHERE state = 'done'").fetchone()[0]
@@ -328,8 +328,8 @@ class History:
         for snapshot, layout, numbers in self._numbers(wanted):
             if layout not in places:
                 ids = self._layout(layout)
-                found = [(i, column[n]) for i, n in enumerate(ids) if n in column]
-                pairs = np.array(found, dtype=int).reshape(-1, 2)
+                result = [(i, column[n]) for i, n in enumerate(ids) if n in column]
+                pairs = np.array(result, dtype=int).reshape(-1, 2)
                 places[layout] = (pairs[:, 0], pairs[:, 1])
             source, target = places[layout]
             row = np.full(len(figures), np.nan)

@@ -171,7 +171,7 @@ def _regression_case(design: DesignView) -> str:
 
 def _requirement_case(design: DesignView, verdict: Verdict) -> str:
     name = f"{verdict.id} {verdict.label}" if verdict.label != verdict.id else verdict.id
-    found = (
+    result = (
         f"found {_value(verdict.value)}, limit {verdict.limit}, "
         f"distance {_value(verdict.distance)} {verdict.unit}"
     )
@@ -182,7 +182,7 @@ def _requirement_case(design: DesignView, verdict: Verdict) -> str:
     return _case(
         design,
         name,
-        f'<failure type="requirement" message={_attribute(found)}>{_text(verdict.reason)}</failure>',
+        f'<failure type="requirement" message={_attribute(result)}>{_text(verdict.reason)}</failure>',
     )
 
 

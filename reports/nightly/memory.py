@@ -44,14 +44,14 @@ def remembered(site: Path) -> Memory | None:
     if not (site / "index.html").exists() and not (site / "summary.json").exists():
         return None
     try:
-        found = read_json(site / "summary.json", "summary.json").get("history")
+        result = read_json(site / "summary.json", "summary.json").get("history")
     except (InputError, AttributeError):
-        found = None
-    if not isinstance(found, Mapping):
+        result = None
+    if not isinstance(result, Mapping):
         return Memory("", 1, 0)  # published by an older version, or damaged: at least one night
-    numbers = [found.get(key) for key in ("nights", "approvals")]
+    numbers = [result.get(key) for key in ("nights", "approvals")]
     nights, approvals = (n if isinstance(n, int) and not isinstance(n, bool) else 0 for n in numbers)
-    return Memory(str(found.get("id", "")), max(nights, 1), max(approvals, 0))
+    return Memory(str(result.get("id", "")), max(nights, 1), max(approvals, 0))
 
 
 def check(site: Path, now: Memory, state: Path) -> None:

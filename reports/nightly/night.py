@@ -223,21 +223,21 @@ def _outcomes(
 ) -> list[Outcome]:
     """Take from the cache what is there, build the rest."""
     keys = {job.name: job.key(version.hash) for job in jobs}
-    found: dict[str, Outcome] = {}
+    result: dict[str, Outcome] = {}
     for job in jobs:
         outcome = _from_cache(cache, job, keys[job.name], tell)
         if outcome is not None:
-            found[job.name] = outcome
-    todo = {keys[job.name]: job for job in jobs if job.name not in found}
+            result[job.name] = outcome
+    todo = {keys[job.name]: job for job in jobs if job.name not in result}
     if progress is not None:
-        progress(len(found), len(jobs))
+        progress(len(result), len(jobs))
     pool = _pool(use, cache.folder)
     for done in pool.run([_task(key, job) for key, job in todo.items()]):
         job = todo[done.key]
-        found[job.name] = _built(cache, job, done)
+        result[job.name] = _built(cache, job, done)
         if progress is not None:
-            progress(len(found), len(jobs))
-    return [found[job.name] for job in jobs]
+            progress(len(result), len(jobs))
+    return [result[job.name] for job in jobs]
 
 
 def _task(key: str, job: Job) -> Task:

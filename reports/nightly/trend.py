@@ -74,8 +74,8 @@ def _segments(z: np.ndarray, penalty: float) -> list[int]:
 
     if len(z) == 2:
         return [1]
-    found = ruptures.KernelCPD(kernel="linear", min_size=1).fit_predict(z.reshape(-1, 1), pen=penalty)
-    return [int(i) for i in found[:-1]]
+    result = ruptures.KernelCPD(kernel="linear", min_size=1).fit_predict(z.reshape(-1, 1), pen=penalty)
+    return [int(i) for i in result[:-1]]
 
 
 def flaps(values: np.ndarray, tolerance: float) -> bool:

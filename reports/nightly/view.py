@@ -280,16 +280,16 @@ class _Reader:
         key = (old.id, new.id)
         if key not in self._commits:
             code_root = Path(__file__).resolve().parents[2]
-            found = [("code", line) for line in commits_between(code_root, old.code_commit, new.code_commit)]
+            result = [("code", line) for line in commits_between(code_root, old.code_commit, new.code_commit)]
             origin = self.study.origin
             if origin is not None and (old.study_commit, new.study_commit) != (
                 old.code_commit,
                 new.code_commit,
             ):
-                found += [
+                result += [
                     ("study", line) for line in commits_between(origin, old.study_commit, new.study_commit)
                 ]
-            self._commits[key] = tuple(found)
+            self._commits[key] = tuple(result)
         return self._commits[key]
 
 

@@ -30,23 +30,23 @@ def section(
     sections: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     """Make the first screen from the loops, the verdicts on the requirements and all other sections."""
-    found = gathered(sections)
+    result = gathered(sections)
     glance = {
         "kind": "glance",
         "loops": [_loop(name, one, items) for name, one in figures.items()],
         "weakest": weakest(items),
-        "findings": plain(found[:SHOWN]),
-        "more": max(len(found) - SHOWN, 0),
+        "findings": plain(result[:SHOWN]),
+        "more": max(len(result) - SHOWN, 0),
     }
     status = worst_status([one.margins.stable for one in figures.values()])
-    if any(item["passed"] is False for item in items) or any(item.severity == "fail" for item in found):
+    if any(item["passed"] is False for item in items) or any(item.severity == "fail" for item in result):
         status = "fail"
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
 
 
-def _loop(name: str, found: LoopFigures, items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Give the five figures of a loop, each with the requirement that is nearest to it."""
-    row = {**margin_row(found), **response_row(found)}
+    row = {**margin_row(figures), **response_row(figures)}
     cells = []
     for key, quantity, label, unit, form in FIGURES:
         own = [item for item in items if item.get("quantity") == quantity and item.get("loop") == name]
@@ -86,10 +86,10 @@ def _pictures(figures: Mapping[str, LoopFigures]) -> list[dict[str, Any]]:
     """Make one Bode and one step figure, of the outermost loop."""
     from analyses.responses import frequency_grid
 
-    name, found = list(figures.items())[-1]
-    blocks = [loop_section.open_bode(LOOPS[name], found, frequency_grid(found), name=name)]
-    if found.step is not None:
-        blocks.append(loop_section.step(LOOPS[name], found, None, name=name))
+    name, result = list(figures.items())[-1]
+    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name)]
+    if result.step is not None:
+        blocks.append(loop_section.step(LOOPS[name], result, None, name=name))
     for block in blocks:
         block["data"]["small"] = True
     return blocks

@@ -29,8 +29,8 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
     rows: list[dict[str, Any]] = []
     reasons: list[str] = []
     for name, point in points.items():
-        own = [found for found in stages.values() if found.loop.break_point == name]
-        rows += [_row(name, "outer ones open", found) for found in own]
+        own = [result for result in stages.values() if result.loop.break_point == name]
+        rows += [_row(name, "outer ones open", result) for result in own]
         rows.append(_row(name, "all closed", point.figures))
         reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
     note = "The outermost loop has no other loop outside it, so its two lines agree."
@@ -73,10 +73,10 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _row(name: str, others: str, found: LoopFigures | None) -> dict[str, Any]:
-    if found is None:
+def _row(name: str, others: str, figures: LoopFigures | None) -> dict[str, Any]:
+    if figures is None:
         return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
-    return {"point": POINTS.get(name, name), "others": others, **margin_row(found)}
+    return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
 
 
 def _exact_row(name: str, point: BreakPoint) -> dict[str, Any]:

@@ -47,14 +47,14 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> d
 
     series = []
     for one in drawn:
-        found = one.loops.get(name)
-        if found is None or (closed and not found.stable):
+        result = one.loops.get(name)
+        if result is None or (closed and not result.stable):
             continue
-        grid = frequency_grid(found, 140)
-        made = curve(found.response if closed else found.loop.open_loop, grid)
+        grid = frequency_grid(result, 140)
+        made = curve(result.response if closed else result.loop.open_loop, grid)
         series.append({
             "label": one.variant.name[:60], "frequency_hz": rounded(made.frequency_hz),
-            "magnitude_db": rounded(made.magnitude_db - (_dc_db(found) if closed else 0.0)),
+            "magnitude_db": rounded(made.magnitude_db - (_dc_db(result) if closed else 0.0)),
             "phase_deg": rounded(made.phase_deg),
         })  # fmt: skip
     if not series:
@@ -67,11 +67,11 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> d
     )  # fmt: skip
 
 
-def _dc_db(found: Any) -> float:
+def _dc_db(result: Any) -> float:
     """Gain at DC of the closed loop, so that loops in any unit start at 0 dB."""
-    if found.bandwidth is None or not found.bandwidth.dc_gain:
+    if result.bandwidth is None or not result.bandwidth.dc_gain:
         return 0.0
-    return float(20.0 * np.log10(abs(found.bandwidth.dc_gain)))
+    return float(20.0 * np.log10(abs(result.bandwidth.dc_gain)))
 
 
 def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[dict[str, Any]]:
@@ -127,7 +127,7 @@ def _strongest(comparison: Comparison, wanted: dict[str, float | None]) -> str:
 
 def _wanted(comparison: Comparison) -> dict[str, float | None]:
     """Figures behind the requirements with their limit; without requirements the margins of each loop."""
-    found: dict[str, float | None] = {}
+    result: dict[str, float | None] = {}
     for verdict in comparison.base.verdicts:
         r = verdict.requirement
         if r.quantity in ANALYSIS_QUANTITIES:
@@ -136,12 +136,12 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
         if key in comparison.sensitivities.base:
-            found[key] = r.minimum if r.minimum is not None else r.maximum
-    if not found:
+            result[key] = r.minimum if r.minimum is not None else r.maximum
+    if not result:
         margins = ("gain_margin", "phase_margin", "bandwidth")
-        found = {f"{loop}.{q}": None for loop in comparison.base.loops for q in margins}
-    order = sorted(found, key=lambda key: not key.startswith(("position", "drive")))
-    return {key: found[key] for key in order}
+        result = {f"{loop}.{q}": None for loop in comparison.base.loops for q in margins}
+    order = sorted(result, key=lambda key: not key.startswith(("position", "drive")))
+    return {key: result[key] for key in order}
 
 
 def _tornado(

@@ -60,7 +60,7 @@ def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -
             "what": _title(QUANTITIES.get(key[1], key[1])),
             "unit": "" if unit == "1" else unit,
         }
-        rows.append(row | {f"d{k}": _cell(found.get(key)) for k, found in enumerate(known)})
+        rows.append(row | {f"d{k}": _cell(result.get(key)) for k, result in enumerate(known)})
     return doc.table(f"{LOOPS.get(loop, loop)}: {condition}", columns, rows)
 
 

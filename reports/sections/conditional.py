@@ -11,48 +11,49 @@ from reports.findings import Finding
 from reports.sections.names import POINTS
 
 
-def section(found: Conditional, axis: str = "rotary") -> dict[str, Any]:
+def section(conditional: Conditional, axis: str = "rotary") -> dict[str, Any]:
     """Make the section: what the describing functions say, and what steps of growing size do."""
     scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
-    result, *more = _words(found, scale, unit)
-    blocks = [*map(doc.text, more), _facts(found, scale, unit)]
-    if found.predictions:
-        blocks.append(_table(found.predictions, scale, unit))
+    result, *more = _words(conditional, scale, unit)
+    blocks = [*map(doc.text, more), _facts(conditional, scale, unit)]
+    if conditional.predictions:
+        blocks.append(_table(conditional.predictions, scale, unit))
     intro = (
         "A limit reduces the effective gain. A loop with a lower gain margin can then become unstable at "
         "large "
         "commands, although every linear margin is sufficient."
     )
-    status = "fail" if found.found else "pass"
-    findings = [Finding(severity="fail", text=result, where="conditional")] if found.found else []
+    status = "fail" if conditional.diverges else "pass"
+    findings = [Finding(severity="fail", text=result, where="conditional")] if conditional.diverges else []
     return doc.section(
         "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
         status=status, findings=findings,
     )  # fmt: skip
 
 
-def sentence(found: Conditional, axis: str = "rotary") -> str:
+def sentence(conditional: Conditional, axis: str = "rotary") -> str:
     """Say in one sentence what large commands do."""
-    return _words(found, *((1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")))[0]
+    return _words(conditional, *((1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")))[0]
 
 
-def _words(found: Conditional, scale: float, unit: str) -> list[str]:
+def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     """Say in some sentences what was found, the result first."""
-    full = f"{found.full_deflection_rad * scale:.4g} {unit}"
-    if not found.found:
+    full = f"{conditional.full_deflection_rad * scale:.4g} {unit}"
+    if not conditional.diverges:
         return [f"Every step from rest up to full deflection ({full}) settles."]
-    threshold = found.threshold_rad or 0.0
+    threshold = conditional.threshold_rad or 0.0
     beyond = f"beyond {threshold * scale:.4g} {unit}" if threshold else "of any size"
     words = f"Steps {beyond} do not settle (full deflection {full})"
-    words += ", although every loop is stable by its linear margins" if found.hidden else ""
-    words += f": {_ending(found, scale, unit)}." if found.ending else "."
+    words += ", although every loop is stable by its linear margins" if conditional.hidden else ""
+    words += f": {_ending(conditional, scale, unit)}." if conditional.ending else "."
     made = [words]
-    if found.oscillation_hz is not None and found.oscillation_rad is not None:
-        size = f"{found.oscillation_rad * scale:.3g} {unit}"
+    if conditional.oscillation_hz is not None and conditional.oscillation_rad is not None:
+        size = f"{conditional.oscillation_rad * scale:.3g} {unit}"
         made.append(
-            f"At the threshold the output nears a limit cycle of {size} at {found.oscillation_hz:.3g} Hz."
+            f"At the threshold the output nears a limit cycle of {size} at "
+            f"{conditional.oscillation_hz:.3g} Hz."
         )
-        free = [one for one in found.predictions if not one.antiwindup]
+        free = [one for one in conditional.predictions if not one.antiwindup]
         if free:
             best = free[0]
             made.append(
@@ -62,26 +63,27 @@ def _words(found: Conditional, scale: float, unit: str) -> list[str]:
     return made
 
 
-def _ending(found: Conditional, scale: float, unit: str) -> str:
+def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     """Say what the smallest step that does not settle ends in, and which limit acts."""
+    swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
     sizes = {
         "diverges": "the output diverges",
-        "keeps oscillating": f"the output keeps oscillating with {(found.end_rad or 0.0) * scale:.3g} {unit}",
+        "keeps oscillating": f"the output keeps oscillating with {swing}",
         "is held by a limit": "the drive stops short of the command",
     }
-    words = sizes[found.ending]
-    if found.limiter:
-        words += f"; the {found.limiter} limit acts {found.limiter_share:.0%} of the time"
+    words = sizes[conditional.ending]
+    if conditional.limiter:
+        words += f"; the {conditional.limiter} limit acts {conditional.limiter_share:.0%} of the time"
     return words
 
 
-def _facts(found: Conditional, scale: float, unit: str) -> dict[str, Any]:
-    threshold = found.threshold_rad
+def _facts(conditional: Conditional, scale: float, unit: str) -> dict[str, Any]:
+    threshold = conditional.threshold_rad
     items = [
-        doc.fact("Largest step that settles", (threshold or found.full_deflection_rad) * scale, unit),
-        doc.fact("Full deflection", found.full_deflection_rad * scale, unit),
+        doc.fact("Largest step that settles", (threshold or conditional.full_deflection_rad) * scale, unit),
+        doc.fact("Full deflection", conditional.full_deflection_rad * scale, unit),
     ]
-    for point, margins in found.margins.items():
+    for point, margins in conditional.margins.items():
         if margins.stable and margins.gain_lower > 0.0:
             label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"
             items.append(doc.fact(label, 20.0 * math.log10(margins.gain_lower), "dB"))

@@ -47,14 +47,14 @@ def sections(validation: Validation) -> list[dict[str, Any]]:
         "of the linear ones."
     )
     status = "pass" if good == len(items) else "fail"
-    found = [
+    outcome = [
         Finding(severity="warn", text=words, where="confirmation")
         for words in _remarks(validation.amplitude_margins)
     ]
     return [
         doc.section(
             "confirmation", "Margins confirmed in the time domain", blocks, result=result, intro=intro,
-            status=status, findings=found,
+            status=status, findings=outcome,
         )
     ]  # fmt: skip
 
@@ -115,10 +115,10 @@ def _remark(item: AmplitudeMargin) -> str:
 
 def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
     """Borders over linear borders, by loop and kind."""
-    found: dict[str, dict[str, Any]] = {}
+    result: dict[str, dict[str, Any]] = {}
     for item in released:
         label = f"{item.loop}: {SHORT[item.kind]}"
-        one = found.setdefault(label, {"label": label, "sizes": [], "with_friction": [], "without": []})
+        one = result.setdefault(label, {"label": label, "sizes": [], "with_friction": [], "without": []})
         if item.size not in one["sizes"]:
             one["sizes"].append(item.size)
             one["with_friction"].append(None)
@@ -126,7 +126,7 @@ def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
         k = one["sizes"].index(item.size)
         key = "with_friction" if item.friction_on else "without"
         one[key][k] = None if item.border.value is None else item.border.value / item.linear
-    return list(found.values())
+    return list(result.values())
 
 
 def _table(items: Sequence[Confirmation]) -> dict[str, Any]:

@@ -58,12 +58,12 @@ def unmet(corner: Corner) -> str:
 
 def least(corner: Corner, attribute: str) -> tuple[float, str] | None:
     """The smallest margin over the loops, and its loop; None where there is none."""
-    found = [
+    result = [
         (abs(value), name)
         for name, one in corner.figures.items()
         if one.stable and (value := getattr(one.margins, attribute)) is not None
     ]
-    return min(found, default=None)
+    return min(result, default=None)
 
 
 def _summary_table(result: Corners) -> dict[str, Any]:

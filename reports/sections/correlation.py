@@ -70,7 +70,7 @@ def verdict(results: Sequence[CorrelationResult], error_limit: float | None) -> 
 def words(results: Sequence[CorrelationResult], error_limit: float | None = None) -> str:
     """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
     wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
-    parts = [f"{record}: {found.subject}: {found.text}." for record, found in wrong[:2]]
+    parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
     where = f" ({result.record})" if len(results) > 1 else ""
     parts.append(

@@ -30,18 +30,18 @@ COLUMNS = [
 def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> dict[str, Any]:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
-        _row(name, form, found[name], forms["ideal"].get(name))
+        _row(name, form, result[name], forms["ideal"].get(name))
         for name in forms["sampled"]
-        for form, found in forms.items()
-        if name in found
+        for form, result in forms.items()
+        if name in result
     ]
     note = (
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay, the model of the paper. No form uses a Padé approximation."
     )
-    certified = [f.margins.evidence == "certified" for found in forms.values() for f in found.values()]
+    certified = [f.margins.evidence == "certified" for result in forms.values() for f in result.values()]
     note += " All margins are certified." if all(certified) else ""
-    named = {f"{FORMS[form]}, {name}": f for form, found in forms.items() for name, f in found.items()}
+    named = {f"{FORMS[form]}, {name}": f for form, result in forms.items() for name, f in result.items()}
     reasons = evidence_notes(named)
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The forms differ by sampling, hold and computing delay."
@@ -64,14 +64,14 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _row(name: str, form: str, found: LoopFigures, ideal: LoopFigures | None) -> dict[str, Any]:
+def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> dict[str, Any]:
     """Give one line, with the phase margin lost against the ideal form."""
-    margins, response = margin_row(found), response_row(found)
+    margins, response = margin_row(figures), response_row(figures)
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
     row = {**margins, **response, "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
-    return row | ({"_status": "fail"} if found.margins.stable is False else {})
+    return row | ({"_status": "fail"} if figures.margins.stable is False else {})
 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
@@ -80,9 +80,9 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
         series = [
-            (FORMS[form], curve(found[name].loop.open_loop, grid))
-            for form, found in forms.items()
-            if name in found
+            (FORMS[form], curve(result[name].loop.open_loop, grid))
+            for form, result in forms.items()
+            if name in result
         ]
         panels.append({"title": LOOPS[name], **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."

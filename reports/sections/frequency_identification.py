@@ -33,7 +33,7 @@ def section(result: FrequencyResult) -> dict[str, Any]:
     """Make the section of a frequency response's identification."""
     blocks = [verdict_block(result.items), parameter_table(result), *response_figures(result)]
     blocks += [input_table(result.record, result.used)]
-    blocks += [finding_table(name, found) for name, found in result.findings.items()]
+    blocks += [finding_table(name, rows) for name, rows in result.findings.items()]
     fit = result.fit
     intro = (
         f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
@@ -85,12 +85,12 @@ def parameter_table(result: FrequencyResult) -> dict[str, Any]:
 def values_of(result: FrequencyResult) -> list[tuple[str, str, float, float]]:
     """Label, unit, value and standard error of everything that was found."""
     fit = result.fit
-    found = [(*LABELS[name], fit[name], fit.std(name)) for name in LABELS]
-    found.append(("Antiresonance", "rad/s", *fit.antiresonance_rad_s))
-    found.append(("Resonance", "rad/s", *fit.resonance_rad_s))
+    rows = [(*LABELS[name], fit[name], fit.std(name)) for name in LABELS]
+    rows.append(("Antiresonance", "rad/s", *fit.antiresonance_rad_s))
+    rows.append(("Resonance", "rad/s", *fit.resonance_rad_s))
     if result.play is not None:
-        found.append(("Play, total", "rad", 2.0 * result.play.half_rad, 2.0 * result.play.half_std_rad))
-    return found
+        rows.append(("Play, total", "rad", 2.0 * result.play.half_rad, 2.0 * result.play.half_std_rad))
+    return rows
 
 
 def response_figures(result: FrequencyResult) -> list[dict[str, Any]]:

@@ -45,11 +45,11 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
     cycles, swing = point.cycles, point.cycles.hunting
     foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
-        found = f"none after steps of {len(cycles.settlings)} sizes"
+        result = f"none after steps of {len(cycles.settlings)} sizes"
     else:
         kind = "limits sustain" if swing.limited else "friction sustains"
         size = fine * (swing.hunting_rad or 0.0)
-        found = f"{kind} a cycle of ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
+        result = f"{kind} a cycle of ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
     agree = "as predicted" if cycles.as_foreseen else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
@@ -62,7 +62,7 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         distance=None,
         passed=swing is None,
         comparison="<=",
-        reason=f"{foreseen}; simulated: {found}; {agree}",
+        reason=f"{foreseen}; simulated: {result}; {agree}",
     )
 
 
@@ -120,11 +120,11 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
 
 def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> dict[str, Any]:
     row: dict[str, Any] = {"load": point.load_Nm, "dry": torque_scale * point.dry_torque_Nm}
-    found, loop = point.threshold, point.hysteresis
-    if found is not None:
-        row["threshold"] = fine * found.static.forward_rad
-        row["simulated"] = None if found.simulated_rad is None else fine * found.simulated_rad
-        half = [w for w in found.waiting if abs(w.amplitude_rad / found.static.forward_rad - 0.5) < 0.01]
+    result, loop = point.threshold, point.hysteresis
+    if result is not None:
+        row["threshold"] = fine * result.static.forward_rad
+        row["simulated"] = None if result.simulated_rad is None else fine * result.simulated_rad
+        half = [w for w in result.waiting if abs(w.amplitude_rad / result.static.forward_rad - 0.5) < 0.01]
         if half:
             row["wait"] = 1e3 * half[0].predicted_s
             row["waited"] = None if half[0].simulated_s is None else 1e3 * half[0].simulated_s
@@ -175,19 +175,19 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict
     """Make the loops and the waiting times."""
     loops, waits = [], []
     for point in result.points:
-        label, loop, found = f"load {point.load_Nm:g} {load}", point.hysteresis, point.threshold
+        label, loop, threshold = f"load {point.load_Nm:g} {load}", point.hysteresis, point.threshold
         if loop is not None:
             error = fine * (loop.output_rad - loop.command_rad)
             command = rounded(fine * loop.command_rad)
             loops.append({"label": label, "command": command, "error": rounded(error)})
-        if found is not None and found.waiting:
+        if threshold is not None and threshold.waiting:
             waits.append(
                 {
                     "label": label,
-                    "amplitude": rounded([fine * w.amplitude_rad for w in found.waiting]),
-                    "predicted_ms": rounded([1e3 * w.predicted_s for w in found.waiting]),
+                    "amplitude": rounded([fine * w.amplitude_rad for w in threshold.waiting]),
+                    "predicted_ms": rounded([1e3 * w.predicted_s for w in threshold.waiting]),
                     "simulated_ms": [
-                        None if w.simulated_s is None else 1e3 * w.simulated_s for w in found.waiting
+                        None if w.simulated_s is None else 1e3 * w.simulated_s for w in threshold.waiting
                     ],
                 }
             )

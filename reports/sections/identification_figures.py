@@ -51,11 +51,11 @@ def surface_figure(fit: SurfaceFit) -> dict[str, Any]:
 
 def _levels(loads: np.ndarray) -> list[float]:
     """Loads that differ by more than 0.5 N m, up to ten."""
-    found: list[float] = []
+    result: list[float] = []
     for load in np.sort(loads):
-        if not found or load - found[-1] > 0.5:
-            found.append(float(load))
-    return found[:10]
+        if not result or load - result[-1] > 0.5:
+            result.append(float(load))
+    return result[:10]
 
 
 def residual_figure(fit: SurfaceFit) -> dict[str, Any]:

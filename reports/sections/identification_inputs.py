@@ -127,15 +127,15 @@ def finding_table(record: str, findings: Sequence[Finding]) -> dict[str, Any]:
     return doc.table(f"Does {record} agree with itself and the design?", columns, rows)
 
 
-def verdict_words(items: Sequence[Item], found: str) -> str:
+def verdict_words(items: Sequence[Item], result: str) -> str:
     """One sentence: what was found, or which checks fail and why."""
     wrong = [item for item in items if item.passed is False]
     if not wrong:
-        return found
+        return result
     first = wrong[0]
     why = f": {first.reason}" if first.reason else ""
     more = f" ({len(wrong) - 1} more of {len(items)} checks fail)" if len(wrong) > 1 else ""
-    return f"{first.label} fails{why}{more}. {found}"
+    return f"{first.label} fails{why}{more}. {result}"
 
 
 def verdict_block(items: Sequence[Item]) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def section(result: LargeSignals) -> dict[str, Any]:
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
     failed = any(item["passed"] is False for item in items)
     intro = (
-        "Each cell of the map is one sine command, simulated until steady. Below the lines the linear model "
+        "Each point of the map is one sine command, simulated until steady. Below the lines the linear model "
         "holds. "
         "Above them the limit that is reached first determines the output."
     )
@@ -48,16 +48,18 @@ def section(result: LargeSignals) -> dict[str, Any]:
     )
 
 
-def _result(found: AmplitudeBode, scale: float, unit: str) -> str:
+def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
     """Say how far the bandwidth falls with the amplitude."""
-    largest, fraction = max(zip(found.amplitude_rad, found.fractions, strict=True), default=(math.nan, 0.0))
-    value = found.minus3db_hz[int(np.argmin(np.abs(found.all_amplitude_rad - largest)))]
+    largest, fraction = max(
+        zip(amplitude_bode.amplitude_rad, amplitude_bode.fractions, strict=True), default=(math.nan, 0.0)
+    )
+    value = amplitude_bode.minus3db_hz[int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - largest)))]
     part = "full deflection" if fraction == 1.0 else f"{100.0 * fraction:.0f} % of full deflection"
-    size, linear = f"{part} ({scale * largest:.3g} {unit})", found.linear_minus3db_hz
+    size, linear = f"{part} ({scale * largest:.3g} {unit})", amplitude_bode.linear_minus3db_hz
     if linear is None or not math.isfinite(linear):
         return "The linear loop has no −3 dB bandwidth in the range of the map."
     if not math.isfinite(value):
-        start = found.frequency_hz[0]
+        start = amplitude_bode.frequency_hz[0]
         return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to below {start:.3g} Hz at {size}."
     return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
 
@@ -94,18 +96,17 @@ def _border_verdict(border: BorderCheck | None) -> dict[str, Any]:
     return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
 
 
-def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
+def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[dict[str, Any]]:
     """Judge the rate-limit formulas, or say why they do not apply."""
     from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
 
-    gain = max((abs(run.gain_error) for run in found.runs), default=None)
-    lag = max((abs(run.lag_error_deg) for run in found.runs), default=None)
-    reason = found.reason
-    if found.runs and not found.applicable:
+    gain = max((abs(run.gain_error) for run in sawtooth.runs), default=None)
+    lag = max((abs(run.lag_error_deg) for run in sawtooth.runs), default=None)
+    reason = sawtooth.reason
+    if sawtooth.runs and not sawtooth.applicable:
         reason = (
-            f"the formulas need Kv/w >= 50 (here {found.gain_over_frequency:.3g}) and a reversal within 1° "
-            "of the "
-            f"period (here {found.reversal_deg:.3g}°); shown, not judged"
+            f"the formulas need Kv/w >= 50 (here {sawtooth.gain_over_frequency:.3g}) and a reversal "
+            f"within 1° of the period (here {sawtooth.reversal_deg:.3g}°); shown, not judged"
         )
     rows = (
         ("gain", "Sawtooth: difference of the fundamental from 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
@@ -119,8 +120,8 @@ def _sawtooth_verdicts(found: Sawtooth) -> list[dict[str, Any]]:
             limit=scale * limit,
             unit=unit,
             comparison="<=",
-            distance=None if error is None or not found.applicable else scale * (limit - error),
-            passed=None if found.passed is None or error is None else error <= limit,
+            distance=None if error is None or not sawtooth.applicable else scale * (limit - error),
+            passed=None if sawtooth.passed is None or error is None else error <= limit,
             reason=reason,
         )
         for key, label, error, limit, scale, unit in rows
@@ -131,7 +132,7 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
     """Make the map with the linear onset lines and the simulated border."""
     from analyses.large_signal.classify import CAUSES, WAVEFORMS
 
-    found, design = result.map, result.design
+    shown, design = result.map, result.design
     points = [
         {
             "label": words,
@@ -146,17 +147,17 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
     ]
     onset = [
         {"name": name, "label": NAMES[name], "amplitude": rounded(scale * np.asarray(values), 4)}
-        for name, values in found.onset_rad.items()
+        for name, values in shown.onset_rad.items()
         if np.isfinite(values).any()
     ]
     full = design.validation.full_deflection_rad
     data = {
-        "frequency_hz": rounded(found.frequency_hz),
-        "amplitude": rounded(scale * found.amplitude_rad),
+        "frequency_hz": rounded(shown.frequency_hz),
+        "amplitude": rounded(scale * shown.amplitude_rad),
         "causes": list(CAUSES),
         "waveforms": list(WAVEFORMS),
-        "cause": found.cause.tolist(),
-        "waveform": found.waveform.tolist(),
+        "cause": shown.cause.tolist(),
+        "waveform": shown.waveform.tolist(),
         "onset": onset,
         "points": points,
         "marks": [{"amplitude": full * scale, "label": "full\ndeflection"}],
@@ -169,16 +170,16 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
-    return doc.figure("map", data, caption=caption, alt=_map_words(found))
+    return doc.figure("map", data, caption=caption, alt=_map_words(shown))
 
 
-def _map_words(found: AmplitudeMap) -> str:
+def _map_words(amplitude_map: AmplitudeMap) -> str:
     """Say in words what the map shows."""
     from analyses.large_signal.classify import CAUSES
 
-    shares = {name: found.share((name,)) for name in CAUSES}
+    shares = {name: amplitude_map.share((name,)) for name in CAUSES}
     parts = [f"{name} {share:.0%}" for name, share in shares.items() if share > 0.0]
-    return "Map of amplitude and frequency; share of the cells by what acts: " + ", ".join(parts)
+    return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 
 def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
@@ -212,26 +213,31 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, An
     return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
 
 
-def _bode_figure(found: AmplitudeBode, scale: float, unit: str, full: float) -> dict[str, Any]:
+def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> dict[str, Any]:
     """Make the amplitude Bode."""
     series = [
         {
             "label": f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})",
-            "gain_db": rounded(found.gain_db[k], 4),
-            "phase_deg": rounded(found.phase_deg[k], 4),
+            "gain_db": rounded(amplitude_bode.gain_db[k], 4),
+            "phase_deg": rounded(amplitude_bode.phase_deg[k], 4),
         }
-        for k, (fraction, amplitude) in enumerate(zip(found.fractions, found.amplitude_rad, strict=True))
+        for k, (fraction, amplitude) in enumerate(
+            zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
+        )
     ]
     data = {
-        "frequency_hz": rounded(found.frequency_hz),
+        "frequency_hz": rounded(amplitude_bode.frequency_hz),
         "series": series,
-        "linear": {"gain_db": rounded(found.linear_db, 4), "phase_deg": rounded(found.linear_deg, 4)},
+        "linear": {
+            "gain_db": rounded(amplitude_bode.linear_db, 4),
+            "phase_deg": rounded(amplitude_bode.linear_deg, 4),
+        },
         "against": {
-            "amplitude": rounded(scale * found.all_amplitude_rad),
-            "minus3db_hz": rounded(found.minus3db_hz),
-            "minus90deg_hz": rounded(found.minus90deg_hz),
-            "linear_minus3db_hz": found.linear_minus3db_hz,
-            "linear_minus90deg_hz": found.linear_minus90deg_hz,
+            "amplitude": rounded(scale * amplitude_bode.all_amplitude_rad),
+            "minus3db_hz": rounded(amplitude_bode.minus3db_hz),
+            "minus90deg_hz": rounded(amplitude_bode.minus90deg_hz),
+            "linear_minus3db_hz": amplitude_bode.linear_minus3db_hz,
+            "linear_minus90deg_hz": amplitude_bode.linear_minus90deg_hz,
             "unit": unit,
             "full": full * scale,
         },
@@ -244,7 +250,7 @@ def _bode_figure(found: AmplitudeBode, scale: float, unit: str, full: float) -> 
     return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
 
 
-def _bode_table(found: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]:
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]:
     """List both bandwidths at the design's amplitudes."""
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
@@ -254,52 +260,52 @@ def _bode_table(found: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]
         doc.column("note", "Note"),
     ]
     rows = []
-    for fraction, amplitude in zip(found.fractions, found.amplitude_rad, strict=True):
-        k = int(np.argmin(np.abs(found.all_amplitude_rad - amplitude)))
-        below = bool(found.below_from_start[k])
+    for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
+        k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
+        below = bool(amplitude_bode.below_from_start[k])
         rows.append(
             {
                 "fraction": 100.0 * fraction,
                 "amplitude": scale * amplitude,
-                "gain": found.minus3db_hz[k],
-                "phase": found.minus90deg_hz[k],
-                "note": f"below −3 dB at {found.frequency_hz[0]:.3g} Hz and above" if below else "",
+                "gain": amplitude_bode.minus3db_hz[k],
+                "phase": amplitude_bode.minus90deg_hz[k],
+                "note": f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above" if below else "",
             }
         )
     rows.append(
         {
             "fraction": None,
             "amplitude": None,
-            "gain": found.linear_minus3db_hz,
-            "phase": found.linear_minus90deg_hz,
+            "gain": amplitude_bode.linear_minus3db_hz,
+            "phase": amplitude_bode.linear_minus90deg_hz,
             "note": "linear loop, interpolated on the same grid",
         }
     )
     return doc.table("Bandwidth against amplitude", columns, rows)
 
 
-def _sawtooth_blocks(found: Sawtooth, design: Design, scale: float, unit: str) -> list[dict[str, Any]]:
+def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[dict[str, Any]]:
     """Make the sawtooth, or say why there is none."""
-    if not found.runs:
-        return [doc.text(f"Sawtooth: not applicable, {found.reason}.")]
-    limit = scale * found.rate_limit_rad_s
+    if not sawtooth.runs:
+        return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
+    limit = scale * sawtooth.rate_limit_rad_s
     data = {
-        "columns": [_sawtooth_column(run, found, scale, unit, load_unit(design)) for run in found.runs],
+        "columns": [_sawtooth_column(run, sawtooth, scale, unit, load_unit(design)) for run in sawtooth.runs],
         "rate_limit": limit,
         "unit": unit,
         "rate_unit": f"{unit}/s",
     }
     caption = (
-        f"A sine of {scale * found.amplitude_rad:.3g} {unit} at {found.frequency_hz:.3g} Hz, three times "
-        "faster "
-        f"than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated values; in "
-        "brackets "
-        "those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
+        f"A sine of {scale * sawtooth.amplitude_rad:.3g} {unit} at {sawtooth.frequency_hz:.3g} Hz, three "
+        f"times faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated "
+        "values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
     )
     return [doc.figure("sawtooth", data, caption=caption, alt=caption)]
 
 
-def _sawtooth_column(run: SawtoothRun, found: Sawtooth, scale: float, unit: str, load: str) -> dict[str, Any]:
+def _sawtooth_column(
+    run: SawtoothRun, sawtooth: Sawtooth, scale: float, unit: str, load: str
+) -> dict[str, Any]:
     """Give the traces at one load."""
     formula = run.formula
     peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"
@@ -315,6 +321,6 @@ def _sawtooth_column(run: SawtoothRun, found: Sawtooth, scale: float, unit: str,
         "output": rounded(scale * run.output_rad, 4),
         "rate": rounded(scale * run.output_rate_rad_s, 4),
         "command_rate": rounded(scale * run.speed_command_rad_s, 4),
-        "current": rounded(run.current_A, 4) if found.has_current else None,
+        "current": rounded(run.current_A, 4) if sawtooth.has_current else None,
         "note": note,
     }

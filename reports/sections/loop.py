@@ -25,34 +25,34 @@ from reports.sections.margins import (
 )
 from reports.sections.names import LOOPS, hertz
 
-REACH = 1.6
+FRAME = 1.6
 STEP_POINTS = 300
 
 
 def section(
-    name: str, design: Design, found: LoopFigures, locked: LoopFigures | None = None
+    name: str, design: Design, figures: LoopFigures, locked: LoopFigures | None = None
 ) -> dict[str, Any]:
     """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
-    grid = frequency_grid(found)
-    title, status = LOOPS[name], worst_status([found.margins.stable])
-    blocks = [_facts(found), open_bode(title, found, grid, name=name)]
-    if found.stable:
-        blocks.append(closed_bode(title, found, grid, locked, name=name))
-    blocks.append(nyquist(title, found, grid))
-    if found.peaks is not None:
-        blocks.append(sensitivity(title, design, name, found, grid))
-    if found.step is not None:
-        blocks.append(step(title, found, locked, name=name))
-    notes = [*evidence_notes({title: found}), *found.margins.notes, *found.notes]
+    grid = frequency_grid(figures)
+    title, status = LOOPS[name], worst_status([figures.margins.stable])
+    blocks = [_facts(figures), open_bode(title, figures, grid, name=name)]
+    if figures.stable:
+        blocks.append(closed_bode(title, figures, grid, locked, name=name))
+    blocks.append(nyquist(title, figures, grid))
+    if figures.peaks is not None:
+        blocks.append(sensitivity(title, design, name, figures, grid))
+    if figures.step is not None:
+        blocks.append(step(title, figures, locked, name=name))
+    notes = [*evidence_notes({title: figures}), *figures.margins.notes, *figures.notes]
     blocks += [doc.text(note) for note in notes]
     return doc.section(
-        f"loop-{name}", title, blocks, result=result(found), intro=_intro(name, found), status=status
+        f"loop-{name}", title, blocks, result=result(figures), intro=_intro(name, figures), status=status
     )
 
 
-def result(found: LoopFigures) -> str:
+def result(figures: LoopFigures) -> str:
     """Say in one sentence what the loop is like."""
-    row = {**margin_row(found), **response_row(found)}
+    row = {**margin_row(figures), **response_row(figures)}
     parts = [
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"]),
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"]),
@@ -64,21 +64,21 @@ def result(found: LoopFigures) -> str:
     ]
     if row["minus3db_hz"] is not None:
         words.append(f"bandwidth {hertz_words(row['minus3db_hz'])}")
-    verdict = f"{found.margins.verdict.capitalize()} ({found.margins.evidence})"
+    verdict = f"{figures.margins.verdict.capitalize()} ({figures.margins.evidence})"
     return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
 
-def _intro(name: str, found: LoopFigures) -> str:
-    period = found.loop.period_s
+def _intro(name: str, figures: LoopFigures) -> str:
+    period = figures.loop.period_s
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
-    words = f"Cut at its error ({found.loop.unit_in}){rate}, with {inner}."
-    return f"{words} The margins are {found.margins.evidence}: {MEANING[found.margins.evidence]}."
+    words = f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}."
+    return f"{words} The margins are {figures.margins.evidence}: {MEANING[figures.margins.evidence]}."
 
 
-def _facts(found: LoopFigures) -> dict[str, Any]:
+def _facts(figures: LoopFigures) -> dict[str, Any]:
     """Give the figures to remember of this loop."""
-    margins, response = margin_row(found), response_row(found)
+    margins, response = margin_row(figures), response_row(figures)
     chosen = [
         ("Gain margin", margins["gain_margin_db"], "dB", 1),
         ("Phase margin", margins["phase_margin_deg"], "deg", 1),
@@ -97,13 +97,13 @@ def _short(value: float | None, places: int | None) -> float | None:
     return round(value, places) if places is not None else float(f"{value:.3g}")
 
 
-def open_bode(title: str, found: LoopFigures, grid: np.ndarray, *, name: str = "") -> dict[str, Any]:
+def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "") -> dict[str, Any]:
     """Make the open-loop Bode figure with every margin on it."""
-    margins = found.margins
+    margins = figures.margins
     data = {
-        **bode_data([("open loop", curve(found.loop.open_loop, grid))]),
+        **bode_data([("open loop", curve(figures.loop.open_loop, grid))]),
         "loop": name,
-        "nyquist_hz": nyquist_hz(found),
+        "nyquist_hz": nyquist_hz(figures),
         "gain_margins": [
             {"frequency_hz": hertz(m.frequency_rad_s), "db": m.db}
             for m in margins.gain_margins
@@ -119,26 +119,26 @@ def open_bode(title: str, found: LoopFigures, grid: np.ndarray, *, name: str = "
         f"{title}, open loop: gain margins at the phase crossovers (■), "
         "phase margins at the gain crossovers (●)."
     )
-    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, found), layout="half")
+    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, figures), layout="half")
 
 
 def closed_bode(
-    title: str, found: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
+    title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> dict[str, Any]:
     """Make the closed-loop Bode figure with the bandwidths."""
-    series = [("rotor free" if locked else "closed loop", curve(found.response, grid))]
+    series = [("rotor free" if locked else "closed loop", curve(figures.response, grid))]
     if locked is not None and locked.stable:
         series.append(("rotor locked", curve(locked.response, grid)))
-    band = _bandwidths(found)
-    data = {**bode_data(series), "loop": name, "nyquist_hz": nyquist_hz(found), "bandwidth": band}
+    band = _bandwidths(figures)
+    data = {**bode_data(series), "loop": name, "nyquist_hz": nyquist_hz(figures), "bandwidth": band}
     corner, lag = _hz(band["minus3db_hz"]), _hz(band["minus90deg_hz"])
     words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
     return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
 
 
-def _bandwidths(found: LoopFigures) -> dict[str, float | None]:
+def _bandwidths(figures: LoopFigures) -> dict[str, float | None]:
     """Give what is marked on the closed-loop figure; null where it is not known."""
-    band = found.bandwidth
+    band = figures.bandwidth
     names = ("minus3db_hz", "minus90deg_hz", "resonance_hz", "resonance_db", "level_db", "dc_db")
     if band is None:
         return dict.fromkeys(names)
@@ -148,10 +148,10 @@ def _bandwidths(found: LoopFigures) -> dict[str, float | None]:
     return dict(zip(names, (*map(finite, values), level, dc_db), strict=True))
 
 
-def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
+def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
     """Make the Nyquist figure."""
-    margins, system = found.margins, found.loop.open_loop
-    omega, points = nyquist_curve(system, grid, REACH)
+    margins, system = figures.margins, figures.loop.open_loop
+    omega, points = nyquist_curve(system, grid, FRAME)
     closest = margins.modulus_frequency_rad_s
     at = None
     if closest is not None and math.isfinite(closest) and closest > 0:
@@ -167,7 +167,7 @@ def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
         "modulus_point": at,
         "gain_points": [-1.0 / m.ratio for m in margins.gain_margins if m.ratio > 0],
         "phase_points": [[float(v.real), float(v.imag)] for v in on_circle],
-        "reach": REACH,
+        "frame": FRAME,
     }
     modulus = "withheld" if margins.modulus_margin is None else f"{margins.modulus_margin:.3f}"
     caption = (
@@ -178,10 +178,10 @@ def nyquist(title: str, found: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
 
 
 def sensitivity(
-    title: str, design: Design, name: str, found: LoopFigures, grid: np.ndarray
+    title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray
 ) -> dict[str, Any]:
     """Make the figure of S and T."""
-    peaks = found.peaks
+    peaks = figures.peaks
     assert peaks is not None
     limits = [
         item.maximum
@@ -192,13 +192,13 @@ def sensitivity(
     ]
     data = {
         "frequency_hz": rounded(grid / (2 * np.pi)),
-        "s_db": rounded(_db(response_at(found.loop.sensitivity, grid)), 4),
-        "t_db": rounded(_db(response_at(found.loop.closed_loop, grid)), 4),
+        "s_db": rounded(_db(response_at(figures.loop.sensitivity, grid)), 4),
+        "t_db": rounded(_db(response_at(figures.loop.closed_loop, grid)), 4),
         "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
         "t_peak": _peak(peaks.complementary_db, peaks.complementary_rad_s),
         "limit_db": min(limits, default=None),
         "loop": name,
-        "nyquist_hz": nyquist_hz(found),
+        "nyquist_hz": nyquist_hz(figures),
     }
     caption = (
         f"{title}: sensitivity S = 1/(1 + L), peak {fixed(peaks.sensitivity_db, 2)} dB, "
@@ -207,14 +207,16 @@ def sensitivity(
     return doc.figure("sensitivity", data, caption=caption, alt=caption, layout="half")
 
 
-def step(title: str, found: LoopFigures, locked: LoopFigures | None, *, name: str = "") -> dict[str, Any]:
+def step(
+    title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = ""
+) -> dict[str, Any]:
     """Make the step figure."""
-    figures = found.step
+    figures = loop_figures.step
     assert figures is not None
     end = None
     if locked is not None and locked.step is not None:
         end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
-    series = [_step_series("rotor free" if locked else "closed loop", found, end)]
+    series = [_step_series("rotor free" if locked else "closed loop", loop_figures, end)]
     if locked is not None and locked.step is not None:
         series.append(_step_series("rotor locked", locked, end))
     data = {
@@ -225,7 +227,7 @@ def step(title: str, found: LoopFigures, locked: LoopFigures | None, *, name: st
         "rise": _rise(figures),
         "settling_s": finite(figures.settling_time_s),
         "overshoot_percent": finite(figures.overshoot_percent),
-        "held": found.loop.period_s is not None,
+        "held": loop_figures.loop.period_s is not None,
     }
     caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:
@@ -240,30 +242,30 @@ def bode_data(series: Sequence[tuple[str, Curve]]) -> dict[str, Any]:
         "series": [
             {
                 "label": label,
-                "magnitude_db": rounded(found.magnitude_db),
-                "phase_deg": rounded(found.phase_deg),
+                "magnitude_db": rounded(loop_figures.magnitude_db),
+                "phase_deg": rounded(loop_figures.phase_deg),
             }
-            for label, found in series
+            for label, loop_figures in series
         ],
     }
 
 
-def nyquist_hz(found: LoopFigures) -> float | None:
+def nyquist_hz(figures: LoopFigures) -> float | None:
     """Give the Nyquist frequency of a sampled loop."""
-    return None if found.loop.period_s is None else 0.5 / found.loop.period_s
+    return None if figures.loop.period_s is None else 0.5 / figures.loop.period_s
 
 
-def _step_series(label: str, found: LoopFigures, end_s: float | None = None) -> dict[str, Any]:
+def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> dict[str, Any]:
     """Give a step response, cut where nothing happens any more and thinned."""
-    figures = found.step
+    figures = loop_figures.step
     assert figures is not None
     time, response = np.asarray(figures.time_s), np.asarray(figures.response)
     settled = figures.settling_time_s
     if end_s is None and settled is not None and math.isfinite(settled) and settled > 0:
         end_s = 2.2 * settled
-    period = found.loop.period_s
+    period = loop_figures.loop.period_s
     if end_s is not None and period is not None and end_s / period < STEP_POINTS:
-        response = sampled_step(found.response, math.ceil(end_s / period) + 1)
+        response = sampled_step(loop_figures.response, math.ceil(end_s / period) + 1)
         time = period * np.arange(len(response))
     if end_s is not None:
         keep = max(int(np.searchsorted(time, end_s, side="right")), 8)
@@ -299,8 +301,8 @@ def _hz(value: float | None) -> str:
     return "no frequency in the band" if known is None else f"{known:.4g} Hz"
 
 
-def _margin_words(title: str, found: LoopFigures) -> str:
-    row = margin_row(found)
+def _margin_words(title: str, figures: LoopFigures) -> str:
+    row = margin_row(figures)
     gain = "none" if row["gain_margin_db"] is None else f"{row['gain_margin_db']:.1f} dB"
     phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"
     return f"Open-loop Bode diagram of the {title.lower()}: gain margin {gain}, phase margin {phase}."

@@ -61,7 +61,7 @@ CROSSING_COLUMNS = [
 
 def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> dict[str, Any]:
     """Make the section from the figures of the sampled, sliding loops."""
-    named = {LOOPS[name]: found for name, found in figures.items()}
+    named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
     if locked is not None:
         named["Current loop, rotor locked"] = locked
     blocks = [
@@ -74,7 +74,7 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
         "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
     ) + evidence_meaning(named)
-    status = worst_status([found.margins.stable for found in figures.values()])
+    status = worst_status([loop_figures.margins.stable for loop_figures in figures.values()])
     return doc.section(
         "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status
     )
@@ -82,10 +82,14 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
 
 def result(figures: Mapping[str, LoopFigures]) -> str:
     """Say whether all loops are stable, and which has the smallest margins."""
-    unstable = [LOOPS[name].lower() for name, found in figures.items() if found.margins.stable is not True]
+    unstable = [
+        LOOPS[name].lower()
+        for name, loop_figures in figures.items()
+        if loop_figures.margins.stable is not True
+    ]
     if unstable:
         return f"Not known to be stable: {', '.join(unstable)}."
-    rows = {LOOPS[name].lower(): margin_row(found) for name, found in figures.items()}
+    rows = {LOOPS[name].lower(): margin_row(loop_figures) for name, loop_figures in figures.items()}
     words = []
     for key, what, unit in (
         ("gain_margin_db", "gain margin", "dB"),
@@ -103,8 +107,8 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
 def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
     """Say how the margins of some loops are known: "certified", or which of them are not."""
     others: dict[str, list[str]] = {}
-    for name, found in figures.items():
-        others.setdefault(found.margins.evidence, []).append(LOOPS.get(name, name).lower())
+    for name, loop_figures in figures.items():
+        others.setdefault(loop_figures.margins.evidence, []).append(LOOPS.get(name, name).lower())
     if len(others) == 1:
         return next(iter(others))
     return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
@@ -112,16 +116,16 @@ def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
 
 def evidence_meaning(figures: Mapping[str, LoopFigures]) -> str:
     """Say what each kind of evidence that occurs means."""
-    kinds = {found.margins.evidence for found in figures.values()}
+    kinds = {loop_figures.margins.evidence for loop_figures in figures.values()}
     return " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
 
 
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     """Give the reason of every loop whose margins are not certified."""
     return [
-        f"{name}, {found.margins.evidence}: {found.margins.evidence_reason}."
-        for name, found in named.items()
-        if found.margins.evidence != "certified"
+        f"{name}, {loop_figures.margins.evidence}: {loop_figures.margins.evidence_reason}."
+        for name, loop_figures in named.items()
+        if loop_figures.margins.evidence != "certified"
     ]
 
 
@@ -132,7 +136,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
         "to 0°; all of them are listed below. A dash means that there is no such crossing. "
         "Disk margin: α, balanced (S + T)."
     )
-    rows = [{"loop": name, **margin_row(found)} for name, found in named.items()]
+    rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
 
@@ -143,19 +147,19 @@ def response_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
         "−90°. Current and velocity: the feedback loop. Position: the response from the command to the "
         "output shaft, feed-forward and filters of the command included."
     )
-    rows = [{"loop": name, **response_row(found)} for name, found in named.items()]
+    rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
 
 
 def crossing_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
     """Make the table of every crossing."""
-    rows = [row for name, found in named.items() for row in _crossings(name, found)]
+    rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
 
-def margin_row(found: LoopFigures) -> dict[str, Any]:
+def margin_row(figures: LoopFigures) -> dict[str, Any]:
     """Give the margins of one loop by column."""
-    m = found.margins
+    m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
     return {
         "stable": {"text": m.verdict, "status": STATUS[m.stable]},
@@ -173,9 +177,9 @@ def margin_row(found: LoopFigures) -> dict[str, Any]:
     }
 
 
-def response_row(found: LoopFigures) -> dict[str, Any]:
+def response_row(figures: LoopFigures) -> dict[str, Any]:
     """Give bandwidth, resonance and step of one loop by column."""
-    band, peaks, step = found.bandwidth, found.peaks, found.step
+    band, peaks, step = figures.bandwidth, figures.peaks, figures.step
     row: dict[str, Any] = dict.fromkeys((column["key"] for column in RESPONSE_COLUMNS[1:]), None)
     if band is not None:
         row |= {
@@ -196,9 +200,9 @@ def response_row(found: LoopFigures) -> dict[str, Any]:
     return row
 
 
-def _crossings(name: str, found: LoopFigures) -> list[dict[str, Any]]:
+def _crossings(name: str, figures: LoopFigures) -> list[dict[str, Any]]:
     """List every crossing of one loop."""
-    m = found.margins
+    m = figures.margins
     rows = [
         _crossing(name, "phase crossover", margin.db, "dB", margin.frequency_rad_s)
         | {"note": _gain_note(margin.ratio, margin.tangent)}

@@ -60,15 +60,15 @@ def _result(points: Sequence[OperatingPointFigures]) -> str:
     if unknown:
         count = f"{len(unknown)} of {len(points)} operating points"
         return f"Stability is not known at {count}: {'; '.join(unknown)}."
-    found = [
+    result = [
         (row["phase_margin_deg"], name, point.label)
         for point in points
         for name, figures in point.figures.items()
         if (row := margin_row(figures))["phase_margin_deg"] is not None
     ]
-    if not found:
+    if not result:
         return f"Stable at all {len(points)} operating points."
-    deg, name, label = min(found)
+    deg, name, label = min(result)
     return (
         f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
         f"({name} loop, {label})."
@@ -78,11 +78,11 @@ def _result(points: Sequence[OperatingPointFigures]) -> str:
 def _row(point: OperatingPointFigures, scale: float) -> dict[str, Any]:
     row: dict[str, Any] = {"point": point.label, "slope": point.slope_Nms_rad * scale}
     row["load"] = "any" if point.load_Nm is None else point.load_Nm
-    for name, found in point.figures.items():
-        margins, response = margin_row(found), response_row(found)
-        row[f"{name}_phase"] = margins["phase_margin_deg"] if found.stable else found.margins.verdict
+    for name, result in point.figures.items():
+        margins, response = margin_row(result), response_row(result)
+        row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
         row[f"{name}_band"] = response["minus3db_hz"]
-    if any(found.margins.stable is False for found in point.figures.values()):
+    if any(result.margins.stable is False for result in point.figures.values()):
         row["_status"] = "fail"
     return row

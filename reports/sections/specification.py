@@ -174,11 +174,11 @@ def _fastest(result: Specification, moves: list[Any]) -> float:
     """Speed that the frame must show: the bounds in reach, and the paths."""
     paths = [float(np.max(np.abs(move.speed_rad_s))) for move in moves]
     upright = [float(c.speed_rad_s[0]) for c in result.plane.bounds if c.name == "speed limit"]
-    reach = max(paths, default=1.0)
+    highest = max(paths, default=1.0)
     crossing = [
         float(c.speed_rad_s[-1]) for c in result.plane.bounds if c.name == "voltage limit" and not upright
     ]
-    return 1.12 * max([reach, *upright, *[c for c in crossing if c < 4.0 * reach]])
+    return 1.12 * max([highest, *upright, *[c for c in crossing if c < 4.0 * highest]])
 
 
 def _manoeuvre_table(result: Specification) -> dict[str, Any]:

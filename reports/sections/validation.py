@@ -57,8 +57,8 @@ def _others(validation: Validation) -> list[dict[str, Any]]:
     made: list[dict[str, Any]] = []
     for name, result in parts.items():
         if result is not None and find_spec(f"reports.sections.{name}") is not None:
-            found = import_module(f"reports.sections.{name}").section(result)
-            made += found if isinstance(found, list) else [found]
+            sections = import_module(f"reports.sections.{name}").section(result)
+            made += sections if isinstance(sections, list) else [sections]
     return made
 
 
@@ -101,7 +101,7 @@ def result(validation: Validation) -> str:
 
 def findings(validation: Validation) -> list[Finding]:
     """Name what has to be watched, the gravest first."""
-    found = [
+    findings = [
         Finding(
             severity="fail",
             text=f"{loop_name(row.loop)}: {quantity_name(row)} is not confirmed by simulation.",
@@ -109,13 +109,13 @@ def findings(validation: Validation) -> list[Finding]:
         )
         for row in validation.failed
     ]
-    return found + _large(validation) + _unknown(validation) + _left_out(validation)
+    return findings + _large(validation) + _unknown(validation) + _left_out(validation)
 
 
 def _large(validation: Validation) -> list[Finding]:
     """A step within full deflection that does not settle."""
     conditional = validation.conditional
-    if conditional is None or not conditional.found:
+    if conditional is None or not conditional.diverges:
         return []
     text = sentence(conditional, validation.design.axis)
     return [Finding(severity="fail", text=text, where="conditional")]
@@ -123,22 +123,24 @@ def _large(validation: Validation) -> list[Finding]:
 
 def _unknown(validation: Validation) -> list[Finding]:
     """What could not be judged for lack of time or of measured points."""
-    found = [
+    findings = [
         Finding(severity="warn", text=f"{loop_name(name)} was not judged: {loop.reason}.", where="validation")
         for name, loop in validation.loops.items()
         if loop.figures.stable and loop.measured is None
     ]
     cut = [note for note in validation.notes if ": cut " in note and not note.endswith("used up")]
-    return found + [Finding(severity="warn", text=f"Not judged: {note}.", where="validation") for note in cut]
+    return findings + [
+        Finding(severity="warn", text=f"Not judged: {note}.", where="validation") for note in cut
+    ]
 
 
 def _left_out(validation: Validation) -> list[Finding]:
     """What the model of this drive leaves out."""
-    found = []
+    findings = []
     if validation.design.coupling is None:
         text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
-        found.append(Finding(severity="info", text=text, where="validation"))
-    return found
+        findings.append(Finding(severity="info", text=text, where="validation"))
+    return findings
 
 
 def verdict_items(validation: Validation) -> list[dict[str, Any]]:
@@ -169,7 +171,7 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
     conditional = validation.conditional
     if conditional is not None:
         full = _size(conditional.full_deflection_rad, validation.design.axis)
-        reached = conditional.threshold_rad if conditional.found else conditional.full_deflection_rad
+        reached = conditional.threshold_rad if conditional.diverges else conditional.full_deflection_rad
         reason = (
             "larger steps diverge, although every linear margin says stable" if conditional.hidden else ""
         )
@@ -181,7 +183,7 @@ def verdict_items(validation: Validation) -> list[dict[str, Any]]:
                 full,
                 ">=",
                 "mm" if validation.design.axis == "linear" else "deg",
-                not conditional.found,
+                not conditional.diverges,
                 reason,
             )
         )
@@ -236,10 +238,10 @@ def _verdict(
 
 def by_loop(rows: Sequence[Entry]) -> dict[str, list[Entry]]:
     """Group entries by loop or break point, in order."""
-    found: dict[str, list[Entry]] = {}
+    by_loop: dict[str, list[Entry]] = {}
     for row in rows:
-        found.setdefault(row.loop, []).append(row)
-    return found
+        by_loop.setdefault(row.loop, []).append(row)
+    return by_loop
 
 
 def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
 def _requirements(draw: st.DrawFn, torque: str) -> list[dict[str, Any]]:
     limits = {"gain_margin": "6.5 dB", "bandwidth": "90 rpm", "delay_margin": "3 ms", "overshoot": "12 %",
               "modulus_margin": 0.4, "motor_current": "400 mA"}  # fmt: skip
-    found = []
+    result = []
     for i, quantity in enumerate(draw(st.lists(st.sampled_from(sorted(limits)), max_size=4))):
         item: dict[str, Any] = {"id": f"r{i}", "quantity": quantity, "source": draw(_texts)}
         item[draw(st.sampled_from(["minimum", "maximum"]))] = limits[quantity]
@@ -174,5 +174,5 @@ def _requirements(draw: st.DrawFn, torque: str) -> list[dict[str, Any]]:
             item["load"] = f"{draw(_factors)!r} {torque}"
         else:
             item["loop"] = "every"
-        found.append(item)
-    return found
+        result.append(item)
+    return result

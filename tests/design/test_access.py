@@ -147,10 +147,10 @@ def test_tolerances_are_listed_in_the_order_of_the_file() -> None:
 
 
 def test_every_value_has_a_pedigree_also_the_defaults() -> None:
-    found = {item.path: item for item in pedigrees(AMBER)}
-    assert set(AMBER.parameters) < set(found)
-    assert found["friction.breakaway_ratio"].source == "default"
-    assert found["motor.resistance"].symbol == "R"
+    result = {item.path: item for item in pedigrees(AMBER)}
+    assert set(AMBER.parameters) < set(result)
+    assert result["friction.breakaway_ratio"].source == "default"
+    assert result["motor.resistance"].symbol == "R"
 
 
 def test_a_written_design_keeps_text_source_grade_and_tolerance() -> None:
@@ -171,8 +171,8 @@ def test_a_written_design_keeps_text_source_grade_and_tolerance() -> None:
     ],
 )
 def test_what_is_only_suspicious_is_warned_of(values: dict[str, float], says: str) -> None:
-    found = warnings_of(with_values(AMBER, values))
-    assert any(line.startswith(says) for line in found)
+    result = warnings_of(with_values(AMBER, values))
+    assert any(line.startswith(says) for line in result)
     assert not any(line.startswith(says) for line in warnings_of(AMBER))
 
 

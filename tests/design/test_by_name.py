@@ -18,8 +18,8 @@ def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path: Pat
     wanted = assemble_loops(DESIGN).position.open_loop
     run = simulate(DESIGN, commands.step(0.01), 0.02)
     for given in ("ilr33-amber", str(file), file):
-        found = assemble_loops(given).position.open_loop
-        assert all(np.array_equal(getattr(found, part), getattr(wanted, part)) for part in "ABCD")
+        result = assemble_loops(given).position.open_loop
+        assert all(np.array_equal(getattr(result, part), getattr(wanted, part)) for part in "ABCD")
         assert np.array_equal(
             simulate(given, commands.step(0.01), 0.02).output_angle_rad, run.output_angle_rad
         )

@@ -138,10 +138,10 @@ def test_a_file_that_is_no_design_is_told_what_it_looks_like(
 def test_the_command_line_names_its_options(
     words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, found = shown(words, capsys)
+    status, result = shown(words, capsys)
     assert status == 2
-    assert found.count("\n") == 1
-    assert said in found
+    assert result.count("\n") == 1
+    assert said in result
 
 
 def test_python_names_its_arguments() -> None:
@@ -152,11 +152,11 @@ def test_python_names_its_arguments() -> None:
 
 
 def test_a_load_with_its_unit_is_the_load(capsys: pytest.CaptureFixture[str]) -> None:
-    found = []
+    result = []
     for words in ("4 N*m", "4", "4000 mN*m"):
         assert main(["margins", "--load", words, "--json"]) == 0
-        found.append(json.loads(capsys.readouterr().out)["load_Nm"])
-    assert found == pytest.approx([4.0] * 3, rel=1e-12)
+        result.append(json.loads(capsys.readouterr().out)["load_Nm"])
+    assert result == pytest.approx([4.0] * 3, rel=1e-12)
 
 
 @pytest.mark.parametrize("command", [["identify"], ["correlate", "emps"], ["simulate", "--record"]])

@@ -198,8 +198,8 @@ DEVICE = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def test_a_device_configuration_with_more_in_it_is_read() -> None:
-    found = {item.label: (item.value, item.name) for item in read_settings_xml(DEVICE, "x").values}
-    assert found == {
+    result = {item.label: (item.value, item.name) for item in read_settings_xml(DEVICE, "x").values}
+    assert result == {
         "0x2348.00": (1, "Number of entries"),
         "0x2348.01": (50, "Kv"),
         "0x6083.00": (250, "Profile acceleration"),
@@ -211,8 +211,8 @@ def test_a_device_configuration_is_updated_in_place() -> None:
         DEVICE, "x"
     )
     text, left = update_settings_xml(DEVICE, objects({"0x2348.01": 60, "0x6083.00": 300, "0x2342.01": 20}))
-    found = {item.label: item.value for item in read_settings_xml(text, "x").values}
-    assert found == {"0x2348.00": 1, "0x2348.01": 60, "0x6083.00": 300}
+    result = {item.label: item.value for item in read_settings_xml(text, "x").values}
+    assert result == {"0x2348.00": 1, "0x2348.01": 60, "0x6083.00": 300}
     assert left == ("0x2342.01",)
     assert 'actualValue="0x3C"' in text
     assert "<ProfileName>x</ProfileName>" in text

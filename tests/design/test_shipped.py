@@ -143,9 +143,9 @@ def test_the_variants_of_the_baseline_differ_from_it_only_in_what_they_are_for()
     base = dict(load_design("ilr33-amber").parameters)
 
     def changed(name: str) -> set[str]:
-        found = load_design(name).parameters
-        paths = base.keys() | found.keys()
-        return {p for p in paths if p not in base or p not in found or base[p].value != found[p].value}
+        result = load_design(name).parameters
+        paths = base.keys() | result.keys()
+        return {p for p in paths if p not in base or p not in result or base[p].value != result[p].value}
 
     assert changed("ilr33-amber-tanh") == {"friction.smoothing_speed"}
     assert load_design("ilr33-amber-tanh").friction.law == "tanh"

@@ -58,29 +58,29 @@ def targets(node: Node, module: str) -> set[str]:
 
 
 def graph(with_functions: bool) -> dict[str, set[str]]:
-    found = {}
+    result = {}
     for module, path in MODULES.items():
         tree = ast.parse(path.read_text())
         nodes = list(imports(tree.body))
         if with_functions and module not in CONVENIENCES and path.stem != "__init__":
             nodes += later(tree)
-        found[module] = {name for node in nodes for name in targets(node, module)} - {module}
-    return found
+        result[module] = {name for node in nodes for name in targets(node, module)} - {module}
+    return result
 
 
 @pytest.mark.parametrize("with_functions", [False, True], ids=["at start-up", "in functions, too"])
 def test_no_import_cycle(with_functions: bool) -> None:
-    found = graph(with_functions)
-    assert len(found) > 300
-    assert "actuator_lti.margins.engine" in found["actuator_lti.margins"] or with_functions
+    result = graph(with_functions)
+    assert len(result) > 300
+    assert "actuator_lti.margins.engine" in result["actuator_lti.margins"] or with_functions
     try:
-        TopologicalSorter(found).prepare()
+        TopologicalSorter(result).prepare()
     except CycleError as error:
         pytest.fail(" <- ".join(error.args[1]))
 
 
 def test_a_cycle_would_be_seen() -> None:
-    found = graph(False)
-    found["actuator_lti.errors"].add("actuator_lti.margins.engine")
+    result = graph(False)
+    result["actuator_lti.errors"].add("actuator_lti.margins.engine")
     with pytest.raises(CycleError):
-        TopologicalSorter(found).prepare()
+        TopologicalSorter(result).prepare()

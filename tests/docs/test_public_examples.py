@@ -28,9 +28,9 @@ PACKAGES = (
 
 def code_of_pages() -> tuple[str, str]:
     """All Python, and all commands, that the build of the documentation runs."""
-    found = [match for page in PAGES for match in RUN.findall(page.read_text(encoding="utf-8"))]
-    python = "\n".join(code for kind, code in found if kind != "shell-run")
-    return python, "\n".join(code for kind, code in found if kind == "shell-run")
+    result = [match for page in PAGES for match in RUN.findall(page.read_text(encoding="utf-8"))]
+    python = "\n".join(code for kind, code in result if kind != "shell-run")
+    return python, "\n".join(code for kind, code in result if kind == "shell-run")
 
 
 PYTHON, SHELL = code_of_pages()

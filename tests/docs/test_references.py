@@ -16,14 +16,14 @@ def sources() -> list[Path]:
 
 
 def test_every_section_that_a_source_cites_exists() -> None:
-    missing, found = [], 0
+    missing, result = [], 0
     for path in sources():
         text = path.read_text(encoding="utf-8")
         for match in CITED.finditer(text):
-            found += 1
+            result += 1
             numbers = set(re.findall(r"[0-9]+", match[1]))
             missing += [f"{path.relative_to(ROOT)}: section {n}" for n in sorted(numbers - SECTIONS)]
-    assert found > 20
+    assert result > 20
     assert not missing
 
 

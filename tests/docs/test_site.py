@@ -52,14 +52,14 @@ def test_every_page_is_in_the_contents() -> None:
 def test_every_file_that_the_architecture_names_exists() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Five changes")[1]
     section = ""
-    found = 0
+    result = 0
     for first in re.findall(r"(?m)^\| (`[^|]+) \|", text):
         for name in re.findall(r"`([\w/.]+\.(?:py|md))`", first):
             section = section if "/" not in name else str(Path(name).parent)
             path = ROOT / name if "/" in name else ROOT / section / name
             assert path.exists() or path.stem == "NAME", name  # a file still to be written
-            found += 1
-    assert found > 20
+            result += 1
+    assert result > 20
 
 
 def test_the_list_of_keys_holds_every_key(made: ModuleType) -> None:

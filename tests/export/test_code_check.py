@@ -31,10 +31,10 @@ def functions_of(text: str) -> dict[str, str]:
     plain = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     # of two constants of one name the second carries its module's, whichever comes second
     plain = re.sub(r"\b(?:ELASTIC_)?LAYOUT_", "", plain)
-    found = re.findall(
+    result = re.findall(
         r"^(?:static )?\w+ \*?(drive_\w+)\(([^)]*)\)\n\{\n(.*?)^\}", plain, re.DOTALL | re.MULTILINE
     )
-    return {name: f"{arguments}\n{body}" for name, arguments, body in found}
+    return {name: f"{arguments}\n{body}" for name, arguments, body in result}
 
 
 def test_what_is_measured_is_what_is_exported() -> None:
@@ -54,14 +54,14 @@ def test_what_is_measured_is_what_is_exported() -> None:
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber", "ctms-motor-position"])
 def test_the_compiled_code_has_the_margins_of_the_loops(name: str) -> None:
-    found = check_code(load_design(name))
-    assert not found.reason
-    assert not found.failed
-    gain = found.largest("gain_margin_up", "gain_margin_down")
+    result = check_code(load_design(name))
+    assert not result.reason
+    assert not result.failed
+    gain = result.largest("gain_margin_up", "gain_margin_down")
     assert gain is not None
     assert 0.0 < abs(gain.difference or 0.0) < 1e-3
     assert {"gain_margin_up", "phase_margin", "delay_margin", "bandwidth"} <= {
-        e.quantity for e in found.entries
+        e.quantity for e in result.entries
     }
 
 
@@ -72,18 +72,18 @@ def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     wrong = text.replace("p[CURRENT_GAIN]", "(1.02 * p[CURRENT_GAIN])")
     assert wrong != text
     monkeypatch.setattr(run_library, "run_sources", lambda: {"run.c": wrong})
-    found = check_code(load_design("ilr33-amber"))
-    assert {entry.loop for entry in found.failed} >= {"current", "u"}
-    assert "NOT MET" in check_text(found)
+    result = check_code(load_design("ilr33-amber"))
+    assert {entry.loop for entry in result.failed} >= {"current", "u"}
+    assert "NOT MET" in check_text(result)
 
 
 def test_without_a_compiler_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(build_module, "system_compiler", lambda: None)
-    found = check_code(load_design("ilr33-amber"))
-    assert found.reason.startswith("no C compiler")
-    assert not found.entries
-    assert "Not measured: no C compiler" in check_text(found)
-    assert "not measured" in summary(found)
+    result = check_code(load_design("ilr33-amber"))
+    assert result.reason.startswith("no C compiler")
+    assert not result.entries
+    assert "Not measured: no C compiler" in check_text(result)
+    assert "not measured" in summary(result)
 
 
 @needs_compiler

@@ -20,9 +20,9 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     from examples.autopilot_loop import GAIN_S, fly, margins
 
     design = load_design("ilr33-amber")
-    found = margins(design)
-    assert found.stable
-    limit = GAIN_S * found.gain_margins[0].ratio
+    result = margins(design)
+    assert result.stable
+    limit = GAIN_S * result.gain_margins[0].ratio
     path = tmp_path / "drive.fmu"
     path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth

@@ -36,11 +36,11 @@ def _own_folder(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-un
 
 
 def both(monkeypatch: pytest.MonkeyPatch, work):  # type: ignore[no-untyped-def]
-    found = []
+    result = []
     for choice in ("c", "numba"):
         monkeypatch.setenv(native.SWITCH, choice)
-        found.append(work())
-    return found
+        result.append(work())
+    return result
 
 
 @needs_compiler

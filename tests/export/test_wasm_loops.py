@@ -57,8 +57,8 @@ def in_node(designs: list[Design], folder: Path) -> list[dict[str, Any]]:
     call = ["node", str(host), str(MODULE), str(folder / "given.json")]
     done = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout)
     assert done["imports"] == []
-    found: list[dict[str, Any]] = done["all"]
-    return found
+    result: list[dict[str, Any]] = done["all"]
+    return result
 
 
 def numbers(values: list[Any]) -> np.ndarray:
@@ -160,10 +160,10 @@ def test_random_drives(tmp_path: Path) -> None:
     """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
     made = (random_drive(np.random.default_rng(seed)) for seed in range(40))
     designs = [replace(design, instruments=Instruments()) for design in made if rigid(design)]
-    found = in_node(designs, tmp_path)
-    assert sum(figures_agree(design, ours) for design, ours in zip(designs, found, strict=True)) > 60
+    result = in_node(designs, tmp_path)
+    assert sum(figures_agree(design, ours) for design, ours in zip(designs, result, strict=True)) > 60
     compared = 0
-    for design, ours in zip(designs, found, strict=True):
+    for design, ours in zip(designs, result, strict=True):
         responses_agree(design, ours)
         compared += limiters_agree(design, ours)
     assert compared > 40

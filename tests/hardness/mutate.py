@@ -67,10 +67,10 @@ def _line_fault(data: bytes, draw: random.Random) -> bytes:
 
 def _number_fault(data: bytes, draw: random.Random) -> bytes:
     """One number scaled, negated or replaced."""
-    found = list(NUMBER.finditer(data)) + list(QUANTITY.finditer(data))
-    if not found:
+    result = list(NUMBER.finditer(data)) + list(QUANTITY.finditer(data))
+    if not result:
         return data
-    spot = draw.choice(found)
+    spot = draw.choice(result)
     group = 1 if spot.re is QUANTITY else 0
     return data[: spot.start(group)] + _number(spot[group], draw) + data[spot.end(group) :]
 

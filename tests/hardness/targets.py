@@ -151,12 +151,12 @@ def history(path: Path) -> None:
     with open_history(path) as opened:
         opened.runs()
         opened.memory()
-        found = opened.results()
-        for one in found:
+        result = opened.results()
+        for one in result:
             opened.figures(one.snapshot)
             if one.snapshot is not None:
                 opened.inputs(one.snapshot)
-        opened.matrix(found, list(opened.figure_table()))
+        opened.matrix(result, list(opened.figure_table()))
 
 
 def entry(path: Path) -> None:

@@ -29,8 +29,8 @@ def listening() -> list[tuple[str, int]]:
     import psutil
 
     family = [psutil.Process(), *psutil.Process().children(recursive=True)]
-    found = [c for process in family for c in process.net_connections() if c.status == psutil.CONN_LISTEN]
-    return [(c.laddr.ip, c.laddr.port) for c in found]
+    result = [c for process in family for c in process.net_connections() if c.status == psutil.CONN_LISTEN]
+    return [(c.laddr.ip, c.laddr.port) for c in result]
 
 
 def pages(port: int) -> list[str]:
@@ -229,12 +229,12 @@ def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_pat
             killed.append(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
-    found = compare(plan, engine=remote, folder=tmp_path / "designs", progress=kill_one)
+    result = compare(plan, engine=remote, folder=tmp_path / "designs", progress=kill_one)
     assert killed
-    assert not found.refused
-    assert len(found.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6
+    assert not result.refused
+    assert len(result.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6
     here = compare(plan)
-    assert [one.figures for one in found.all] == [one.figures for one in here.all]
+    assert [one.figures for one in result.all] == [one.figures for one in here.all]
 
 
 def test_an_entry_that_comes_damaged_is_not_kept(tmp_path) -> None:

@@ -39,9 +39,9 @@ def broken(*_arguments: object, **_named: object) -> None:
 
 
 def traceback_file(line: str) -> Path:
-    found = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
-    assert found, line
-    return Path(found[1])
+    result = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
+    assert result, line
+    return Path(result[1])
 
 
 @pytest.fixture

@@ -99,8 +99,8 @@ def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(sit
     summary = site / "summary.json"
     for text in ("{}", "[]", "{", '{"history": {"nights": "many", "approvals": true}}', ""):
         summary.write_text(text)
-        found = remembered(site)
-        assert found == Memory("", 1, 0), text
+        result = remembered(site)
+        assert result == Memory("", 1, 0), text
     summary.unlink()
     assert remembered(site) == Memory("", 1, 0)
     forget_history(site)
@@ -151,12 +151,12 @@ def everything(history) -> None:
     history.runs()
     history.baselines()
     history.memory()
-    found = history.results()
-    for one in found:
+    result = history.results()
+    for one in result:
         history.figures(one.snapshot)
         if one.snapshot is not None:
             history.inputs(one.snapshot)
-    history.matrix(found, list(history.figure_table()))
+    history.matrix(result, list(history.figure_table()))
 
 
 def rewritten(site: Path, statement: str, *values: object) -> None:

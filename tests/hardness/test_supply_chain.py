@@ -79,9 +79,9 @@ def test_every_promise_of_the_security_note_names_a_test_that_is_there() -> None
     for row in rows[1:]:
         folder, file = Path(), Path()
         named = re.findall(r"`((?:tests/)?[\w/]*test_\w+\.py)?(?:::(\w+))?`", row)
-        found = [(path, function) for path, function in named if path or function]
-        assert found, row
-        for path, function in found:
+        result = [(path, function) for path, function in named if path or function]
+        assert result, row
+        for path, function in result:
             if path:
                 file = ROOT / path if "/" in path else folder / path
                 folder = file.parent

@@ -40,8 +40,8 @@ def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> N
     assert join.rate_std is not None
     assert abs(join.rate - rate) < max(5.0 * join.rate_std, 1e-4)
     middle = 9.0
-    found = join.offset_s + join.rate * middle
-    assert found == pytest.approx(offset + rate * middle, abs=2e-3)
+    result = join.offset_s + join.rate * middle
+    assert result == pytest.approx(offset + rate * middle, abs=2e-3)
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
 
 

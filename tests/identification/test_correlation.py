@@ -58,11 +58,11 @@ def test_a_record_of_another_axis_is_refused(emps_file: Path) -> None:
 def test_figures_of_likeness_by_construction() -> None:
     time = np.linspace(0.0, 1.0, 1001)
     measured = 2.0 + np.sin(20.0 * time)
-    found = compare_signals("speed", "rad/s", time, measured, measured + 0.1)
-    assert found.relative_error == pytest.approx(0.1 * np.sqrt(1001) / np.linalg.norm(measured), rel=1e-12)
+    result = compare_signals("speed", "rad/s", time, measured, measured + 0.1)
+    assert result.relative_error == pytest.approx(0.1 * np.sqrt(1001) / np.linalg.norm(measured), rel=1e-12)
     about_mean = np.linalg.norm(measured - measured.mean())
-    assert found.fit_percent == pytest.approx(100.0 * (1.0 - 0.1 * np.sqrt(1001) / about_mean), rel=1e-9)
-    assert found.max_error == pytest.approx(0.1)
+    assert result.fit_percent == pytest.approx(100.0 * (1.0 - 0.1 * np.sqrt(1001) / about_mean), rel=1e-9)
+    assert result.max_error == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("delay", [-0.0213, 0.0004, 0.017])
@@ -72,8 +72,8 @@ def test_the_delay_is_found_to_a_fraction_of_a_sample(delay: float) -> None:
     def signal(t: np.ndarray) -> np.ndarray:
         return np.sin(7.0 * t) * np.exp(-((t - 2.0) ** 2))
 
-    found = compare_signals("speed", "rad/s", time, signal(time - delay), signal(time))
-    assert found.delay_s == pytest.approx(delay, abs=2e-6)
+    result = compare_signals("speed", "rad/s", time, signal(time - delay), signal(time))
+    assert result.delay_s == pytest.approx(delay, abs=2e-6)
 
 
 def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
@@ -143,12 +143,12 @@ def test_the_odrive_step_settles_at_its_published_speed(odrive_files: dict[str, 
 def test_a_motor_fitted_on_the_step_predicts_the_chirp(odrive_files: dict[str, Path]) -> None:
     """How well: 1.9 % of the speed from 1 to 48 Hz, no band worse than 3 %."""
     motor = fit_step([read_odrive(odrive_files["step1"])])
-    found = predict_chirp(motor, read_odrive(odrive_files["chirp1"]))
-    assert found.law.amplitude == pytest.approx(0.25, rel=2e-3)
-    assert found.law.start_hz == pytest.approx(1.0, rel=5e-3)
-    assert found.law.frequency_hz(found.law.end_s) > 45.0
-    assert found.whole.relative_error < 0.025
-    assert max(band.relative_error for _, _, band in found.bands) < 0.035
+    result = predict_chirp(motor, read_odrive(odrive_files["chirp1"]))
+    assert result.law.amplitude == pytest.approx(0.25, rel=2e-3)
+    assert result.law.start_hz == pytest.approx(1.0, rel=5e-3)
+    assert result.law.frequency_hz(result.law.end_s) > 45.0
+    assert result.whole.relative_error < 0.025
+    assert max(band.relative_error for _, _, band in result.bands) < 0.035
 
 
 def test_a_chirp_is_found_again_and_noise_is_not() -> None:

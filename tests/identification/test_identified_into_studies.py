@@ -28,12 +28,12 @@ def test_what_was_identified_is_what_the_studies_draw(
     """Covariance of the fit = that of the samples (4096 draws, 5 %); tuning knows them; a study runs."""
     record = write(tmp_path / "a.csv", columns_of(motion(1)))
     status = main(["identify", str(record), "--design", "ilr33-amber", "--out", str(tmp_path), "--json"])
-    found = json.loads(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)
     assert not status
     design = load_design(tmp_path / "ilr33-amber-identified.toml")
-    fitted = list(found["parameters"])
+    fitted = list(result["parameters"])
     assert fitted == ["inertia", "viscous", "dry", "offset"]
-    wanted = np.array(found["covariance"])[1:, 1:]
+    wanted = np.array(result["covariance"])[1:, 1:]
     sampler = sampler_of(design)
     paths = [NAMES[name] for name in fitted[1:]]
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]

@@ -34,15 +34,15 @@ def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str,
 
 def test_a_campaign_as_json(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = _run(capsys, "identify", str(campaign), "--json", "--suggest", "2")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
-    assert found["runs_listed"] == found["runs_used"] + len(found["set_aside"]) == 9
-    assert found["set_aside"][0]["id"] == "05"
-    assert found["rows_in"] >= found["rows_out"] > 0
-    low, high = found["coefficients"]["CM"]["interval_95"]
+    assert result["runs_listed"] == result["runs_used"] + len(result["set_aside"]) == 9
+    assert result["set_aside"][0]["id"] == "05"
+    assert result["rows_in"] >= result["rows_out"] > 0
+    low, high = result["coefficients"]["CM"]["interval_95"]
     assert low < 1.34e-3 < high
-    assert [term["name"] for term in found["contributions"]["terms"]] == ["C0", "Cv", "CM"]
-    assert len(found["suggestion"]["runs"]) == 2
+    assert [term["name"] for term in result["contributions"]["terms"]] == ["C0", "Cv", "CM"]
+    assert len(result["suggestion"]["runs"]) == 2
 
 
 def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,11 +76,11 @@ def test_emps_on_the_command_line(
     emps_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, _ = _run(capsys, "identify", "--dynamic", str(emps_file), "--json", "--refine")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
-    assert round(found["parameters"]["inertia"]["value"], 4) == 95.1089
-    assert found["rows_in"] == 24841
-    assert found["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
+    assert round(result["parameters"]["inertia"]["value"], 4) == 95.1089
+    assert result["rows_in"] == 24841
+    assert result["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
     signals = json.loads(out)["records"][0]["signals"]
     assert status == 0

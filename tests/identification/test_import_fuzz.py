@@ -115,12 +115,12 @@ def test_a_compressed_and_a_plain_file_read_alike() -> None:
     from analyses.records.mat5 import read_mat5
 
     values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
-    found = []
+    result = []
     for packed in (False, True):
         stream = io.BytesIO()
         savemat(stream, values, do_compression=packed)
-        found.append(read_mat5(stream.getvalue()))
-    for content in found:
+        result.append(read_mat5(stream.getvalue()))
+    for content in result:
         assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
         assert content.arrays["k"].item() == 3.5

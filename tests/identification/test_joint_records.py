@@ -44,12 +44,12 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     status, out, _ = _run(
         capsys, *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
     )
-    found = json.loads(out)
-    checks = {check["id"]: check for check in found["checks"]}
+    result = json.loads(out)
+    checks = {check["id"]: check for check in result["checks"]}
     assert status == 0
     assert checks["held-out-unseen.csv"]["passed"]
-    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(1.5 * found["relative_residual"] + 0.02)
-    assert {one["record"] for one in found["written_design_against"]} == {
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(1.5 * result["relative_residual"] + 0.02)
+    assert {one["record"] for one in result["written_design_against"]} == {
         "a.csv",
         "b.csv",
         "loaded.csv",
@@ -59,11 +59,11 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
-    for path, value in found["refined"].items():
+    for path, value in result["refined"].items():
         tolerance = written.parameters[path].tolerance
         assert written.parameters[path].value == pytest.approx(value, rel=1e-6)
         assert tolerance is not None
-        assert tolerance.std == pytest.approx(found["refined_standard_errors"][path], rel=1e-5)
+        assert tolerance.std == pytest.approx(result["refined_standard_errors"][path], rel=1e-5)
 
 
 def test_a_held_out_record_of_another_drive_fails(
@@ -85,10 +85,10 @@ def test_a_held_out_record_of_another_drive_fails(
 def test_a_value_can_be_held(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     common = ("identify", files["loaded"], "--design", "ilr33-amber", "--json")
     status, out, _ = _run(capsys, *common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
-    assert found["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}}
-    assert found["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
+    assert result["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}}
+    assert result["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
     for wrong, reason in (
         ("friction.load_coefficient", "KEY=VALUE is wanted"),
         ("friction.banana=1", "unknown parameter"),
@@ -103,12 +103,12 @@ def test_one_direction_says_what_it_cannot_tell_apart(
     files: dict[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, _ = _run(capsys, "identify", files["one way"], "--design", "ilr33-amber", "--json")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
     told = "cannot be told from dry: the design's value kept; an error of it moves dry by -1 times it"
-    assert found["fixed"]["offset"]["reason"] == told
+    assert result["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        value, std = (found["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        value, std = (result["parameters"][name][key] for key in ("value", "standard_error_correlated"))
         assert value == pytest.approx(truth, rel=0.03)
         assert abs(value - truth) < 3.0 * std
 
@@ -118,9 +118,9 @@ def test_one_speed_has_errors_that_hold_the_truth(
 ) -> None:
     """Dry and viscous friction are told by the run-up alone: poorly, and their errors say so."""
     _, out, _ = _run(capsys, "identify", files["one speed"], "--design", "ilr33-amber", "--json")
-    found = json.loads(out)["parameters"]
+    result = json.loads(out)["parameters"]
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        assert abs(found[name]["value"] - truth) < 3.0 * found[name]["standard_error_correlated"]
+        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error_correlated"]
 
 
 def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
@@ -131,10 +131,10 @@ def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
     fits, stated, white = [], [], []
     for _ in range(200):
         noise = lfilter([1.0], [1.0, -0.95], rng.standard_normal(len(time)))
-        found = solve(w, w @ np.array([1.0, 2.0]) + noise)
-        fits.append(found.values)
-        stated.append(np.sqrt(np.diag(found.correlated)))
-        white.append(np.sqrt(np.diag(found.white)))
+        result = solve(w, w @ np.array([1.0, 2.0]) + noise)
+        fits.append(result.values)
+        stated.append(np.sqrt(np.diag(result.correlated)))
+        white.append(np.sqrt(np.diag(result.white)))
     spread = np.std(fits, axis=0)
     assert np.mean(stated, axis=0) == pytest.approx(spread, rel=0.25)
     assert np.all(np.mean(white, axis=0) < 0.3 * spread)
@@ -152,11 +152,11 @@ def test_scatter_between_records_is_found_again() -> None:
     """Values 2, own error 0.1, scatter 0.5: the estimate's mean square over many draws is the truth's."""
     rng = np.random.default_rng(5)
     own = np.full(6, 0.1)
-    found = [
+    result = [
         between_records(2.0 + 0.5 * rng.standard_normal(6) + own * rng.standard_normal(6), own)
         for _ in range(400)
     ]
-    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.5, rel=0.05)
+    assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 
 def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -191,19 +191,21 @@ def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[s
 def test_correlation_over_several_records(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     paths = (files["a"], files["b"], files["loaded"])
     status, out, _ = _run(capsys, "correlate", "ilr33-amber", *paths, "--json")
-    found = json.loads(out)
-    own = [record["signals"]["current"] for record in found["records"]]
-    summary = found["summary"]["current"]
+    result = json.loads(out)
+    own = [record["signals"]["current"] for record in result["records"]]
+    summary = result["summary"]["current"]
     assert status == 0
     assert summary["max_error"] == max(one["max_error"] for one in own)
     assert summary["rms_error"] ** 2 == pytest.approx(np.mean([one["rms_error"] ** 2 for one in own]))
     assert summary["mean_error"] == pytest.approx(np.mean([one["mean_error"] for one in own]))
     assert own[0]["rms_error"] == pytest.approx(0.02, rel=0.05)  # the noise that was added
     assert own[0]["mean_error"] == pytest.approx(0.02 * np.sqrt(2.0 / np.pi), rel=0.05)
-    worst = max(found["records"], key=lambda one: one["signals"]["angle"]["relative_error"])
-    assert found["worst"] == worst["record"]
+    worst = max(result["records"], key=lambda one: one["signals"]["angle"]["relative_error"])
+    assert result["worst"] == worst["record"]
     _, text, _ = _run(capsys, "correlate", "ilr33-amber", *paths)
-    assert f"3 records against ilr33-amber; the motion of {Path(found['worst']).name} is furthest off" in text
+    assert (
+        f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off" in text
+    )
 
 
 def test_a_record_that_contradicts_itself_fails_the_correlation(

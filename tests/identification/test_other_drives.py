@@ -124,10 +124,10 @@ def test_a_drive_is_found_from_its_record(
     (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
     status = main(["identify", record, "--design", str(tmp_path / "wrong.toml"), "--out", out, "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert not status, [check for check in found["checks"] if check["passed"] is False]
+    result = json.loads(capsys.readouterr().out)
+    assert not status, [check for check in result["checks"] if check["passed"] is False]
     for name, near in case.near.items():
-        assert found["parameters"][name]["value"] == pytest.approx(_truth(design, name), rel=near), name
+        assert result["parameters"][name]["value"] == pytest.approx(_truth(design, name), rel=near), name
     errors = {}
     for label, path in (("found", next((tmp_path / "o").glob("*.toml"))), ("wrong", tmp_path / "wrong.toml")):
         assert not main(["correlate", str(path), record, "--json"])
@@ -214,10 +214,10 @@ def test_signals_at_several_rates(tmp_path: Path, capsys: pytest.CaptureFixture[
     used = {}
     for name in ("r.csv", "r.toml"):
         main(["identify", str(tmp_path / name), "--design", str(tmp_path / "d.toml"), "--json"])
-        found = json.loads(capsys.readouterr().out)
-        used[name] = found["records"][0]["rows_in"]
+        result = json.loads(capsys.readouterr().out)
+        used[name] = result["records"][0]["rows_in"]
         near = 0.01 if name == "r.toml" else 0.05
-        assert found["parameters"]["inertia"]["value"] == pytest.approx(design.inertia_kgm2, rel=near)
+        assert result["parameters"]["inertia"]["value"] == pytest.approx(design.inertia_kgm2, rel=near)
     assert used == {"r.csv": 800, "r.toml": 4000}
     main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml")])
     assert 'missing = "interpolate"' in " ".join(capsys.readouterr().out.split())

@@ -61,12 +61,12 @@ def fit() -> SurfaceFit:
 
 def test_random_errors_alone_have_the_least_squares_covariance() -> None:
     points = _points(1)
-    found = fit_surface(points, Instruments(), 5.9e-3)
+    result = fit_surface(points, Instruments(), 5.9e-3)
     x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
-    own = np.array([4e-12 + found.values[1] ** 2 * 1e-6 + found.values[2] ** 2 * 1e-10] * len(points))
-    own = own + found.run_scatter_Nm**2
+    own = np.array([4e-12 + result.values[1] ** 2 * 1e-6 + result.values[2] ** 2 * 1e-10] * len(points))
+    own = own + result.run_scatter_Nm**2
     expected = np.linalg.inv(x.T @ (x / own[:, None]))
-    assert found.covariance == pytest.approx(expected, rel=1e-6)
+    assert result.covariance == pytest.approx(expected, rel=1e-6)
 
 
 def test_too_few_runs_or_no_variety_are_refused() -> None:
@@ -81,14 +81,14 @@ def test_too_few_runs_or_no_variety_are_refused() -> None:
 
 def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceFit) -> None:
     design = load_design("ilr33-amber")
-    found = suggest_runs(design, fit, BOUNDS, count=3)
-    left = [run.remaining for run in found.runs]
+    result = suggest_runs(design, fit, BOUNDS, count=3)
+    left = [run.remaining for run in result.runs]
     assert left == sorted(left, reverse=True)
     assert left[0] < 1.0
-    slopes = np.array([m.slopes / m.std for m in found.margins])
+    slopes = np.array([m.slopes / m.std for m in result.margins])
     weight = slopes.T @ slopes
-    worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in found.runs]
-    good = predicted_covariance(fit, found.runs, BOUNDS, 5.9e-3)
+    worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in result.runs]
+    good = predicted_covariance(fit, result.runs, BOUNDS, 5.9e-3)
     bad = predicted_covariance(fit, worse, BOUNDS, 5.9e-3)
     before = float(np.sum(weight * fit.covariance))
     assert float(np.sum(weight * good)) < float(np.sum(weight * bad)) < before
@@ -99,8 +99,8 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
     from actuator_lti import assemble_loops, stability_margins
 
     design = load_design("ilr33-amber")
-    found = suggest_runs(design, fit, BOUNDS, count=1)
-    spread = next(m for m in found.margins if m.label == "position phase margin, 0 N m")
+    result = suggest_runs(design, fit, BOUNDS, count=1)
+    spread = next(m for m in result.margins if m.label == "position phase margin, 0 N m")
     base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
     base["friction.load_coefficient"] = float(fit.values[2])
 
@@ -119,17 +119,17 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
 
 
 def test_the_determinant_is_served_by_extreme_points(fit: SurfaceFit) -> None:
-    found = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=4, criterion="D")
-    assert {run.load_Nm for run in found.runs} <= {0.0, 8.9}
-    assert {round(run.speed_rad_s) for run in found.runs} <= {105, 942}
+    result = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=4, criterion="D")
+    assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
+    assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
     with pytest.raises(InputError, match="criterion"):
         suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, criterion="E")
 
 
 def test_what_no_run_reduces_is_named(fit: SurfaceFit) -> None:
-    found = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=1)
-    assert 0.5 < found.shared_part <= 1.0
-    assert found.largest_shared in fit.shared_shifts
+    result = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=1)
+    assert 0.5 < result.shared_part <= 1.0
+    assert result.largest_shared in fit.shared_shifts
 
 
 def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
@@ -145,21 +145,21 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
     start = with_values(
         design, {"motor.rotor_inertia": 99.0, "friction.viscous": 190.0, "friction.dry_torque": 22.0}
     )
-    found = refine_by_output_error(start, paths, force, force(design))
+    result = refine_by_output_error(start, paths, force, force(design))
     for path in paths:
-        assert found.values[path] == pytest.approx(parameter_value(design, path), rel=2e-3)
-    assert found.error_after < 0.05 * found.error_before
+        assert result.values[path] == pytest.approx(parameter_value(design, path), rel=2e-3)
+    assert result.error_after < 0.05 * result.error_before
 
 
 def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
-    found = identify_bench(design, [record], settings=BenchSettings(refine=True))
-    assert found.refined is not None
-    assert found.refined.error_after < found.refined.error_before < 0.05848
-    for path, value in found.refined.values.items():
-        assert parameter_value(read_design_text(found.text), path) == pytest.approx(value, rel=1e-6)
-    assert found.refined.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
-    assert found.resimulated[0].relative_error == pytest.approx(found.refined.error_after, rel=1e-4)
+    result = identify_bench(design, [record], settings=BenchSettings(refine=True))
+    assert result.refined is not None
+    assert result.refined.error_after < result.refined.error_before < 0.05848
+    for path, value in result.refined.values.items():
+        assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)
+    assert result.refined.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
+    assert result.resimulated[0].relative_error == pytest.approx(result.refined.error_after, rel=1e-4)
 
 
 def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:

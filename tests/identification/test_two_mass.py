@@ -205,10 +205,10 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         str(tmp_path / "d.toml"),
     ]
     status = main([*arguments, "--json", "--out", str(tmp_path / "o")])
-    found = json.loads(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)
     assert status in (0, None)
-    assert found["values"]["Resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
-    checks = {check["id"]: check for check in found["checks"]}
+    assert result["values"]["Resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
+    checks = {check["id"]: check for check in result["checks"]}
     assert checks["written-sweep.csv"]["value"] < 0.05
     written = load_design(next((tmp_path / "o").glob("*.toml")))
     assert written.coupling is not None
@@ -237,9 +237,9 @@ def test_a_two_mass_model_of_something_else_is_refused(
     path = _csv(tmp_path / "r.csv", replace(record, signals={**signals, "angle": angle}))
     status = main(["identify", path, "--frequency-response", "--design", str(tmp_path / "d.toml"), "--json",
                    "--out", str(tmp_path / "o")])  # fmt: skip
-    found = json.loads(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)
     assert status == 1
-    assert found["misfit"] > 3.0
+    assert result["misfit"] > 3.0
     assert not list((tmp_path / "o").glob("*.toml"))
 
 

@@ -81,13 +81,13 @@ def held(result: FrequencyResult) -> dict[str, bool]:
     """Whether each 95 % interval holds the truth; a value fixed at zero has none, and is left out."""
     fit, play = result.fit, result.play
     assert play is not None
-    found = {name: (fit[name], fit.std(name), truth) for name, truth in TRUTH.items() if name in fit.names}
-    found |= {
+    outcome = {name: (fit[name], fit.std(name), truth) for name, truth in TRUTH.items() if name in fit.names}
+    outcome |= {
         "resonance": (*fit.resonance_rad_s, RESONANCE),
         "antiresonance": (*fit.antiresonance_rad_s, ANTIRESONANCE),
         "play": (play.half_rad, play.half_std_rad, HALF_PLAY),
     }
-    return {name: abs(value - truth) <= 1.96 * std for name, (value, std, truth) in found.items()}
+    return {name: abs(value - truth) <= 1.96 * std for name, (value, std, truth) in outcome.items()}
 
 
 def test_the_simulated_drive_is_identified_within_its_intervals() -> None:

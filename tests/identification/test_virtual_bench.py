@@ -109,8 +109,8 @@ def test_clocks_are_found_from_the_files(from_files: CampaignResult, runs: tuple
 def test_the_contributions_are_those_of_the_paper(from_files: CampaignResult) -> None:
     exact = [round(100.0 * term.share, 1) for term in contributions(TABLE_1)]
     assert exact == [12.6, 27.6, 59.8]
-    found = contributions(from_files.fit.values, from_files.fit.covariance)
-    for term, share in zip(found, exact, strict=True):
+    result = contributions(from_files.fit.values, from_files.fit.covariance)
+    for term, share in zip(result, exact, strict=True):
         assert 100.0 * term.share == pytest.approx(share, abs=3.0 * 100.0 * term.share_std + 0.05)
 
 
@@ -179,8 +179,8 @@ def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult,
         assert tolerance is not None
         assert tolerance.std == pytest.approx(from_files.fit.standard_errors[k], rel=1e-5)
         assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
-    found = {(c.first, c.second): c.coefficient for c in back.correlations}
-    assert found[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
+    result = {(c.first, c.second): c.coefficient for c in back.correlations}
+    assert result[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
 
 
 def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path: Path) -> None:

@@ -69,11 +69,11 @@ def test_a_wrong_record_gives_no_design(
     if status == 2:
         assert reason in err
         return
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 1
-    assert not found["passed"]
-    assert found["design"] is None
-    assert reason in " ".join(check["reason"] for check in found["checks"])
+    assert not result["passed"]
+    assert result["design"] is None
+    assert reason in " ".join(check["reason"] for check in result["checks"])
 
 
 def test_the_right_record_gives_the_drive_that_made_it(
@@ -82,11 +82,11 @@ def test_the_right_record_gives_the_drive_that_made_it(
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     record, out = str(write(tmp_path / "r.csv", right)), tmp_path / "o"
     status, text, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
-    truth, found = load_design("ilr33-amber"), load_design(out / "ilr33-amber-identified.toml")
+    truth, result = load_design("ilr33-amber"), load_design(out / "ilr33-amber-identified.toml")
     assert status == 0
-    assert found.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
-    assert found.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
-    assert found.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
+    assert result.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
+    assert result.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
+    assert result.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
     again = json.loads(text)["written_design_against"][0]
     assert again["relative_error"] < 0.03
     status, text, _ = _run(capsys, "correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
@@ -264,11 +264,11 @@ def test_unloaded_runs_say_what_they_do_not_tell(
     text = head + "".join(f"[[run]]{run}" for run in (*runs[:3], runs[1].replace('id = "02"', 'id = "99"')))
     (folder / "unloaded.toml").write_text(text)
     status, out, _ = _run(capsys, "identify", str(folder / "unloaded.toml"), "--json")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
-    assert found["held"] == {"CM": "no run is loaded: the design's value kept"}
-    assert found["coefficients"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
-    assert found["coefficients"]["CM"]["value"] == 1.34e-3
+    assert result["held"] == {"CM": "no run is loaded: the design's value kept"}
+    assert result["coefficients"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
+    assert result["coefficients"]["CM"]["value"] == 1.34e-3
 
 
 def test_a_coefficient_of_a_campaign_can_be_fixed(
@@ -276,9 +276,9 @@ def test_a_coefficient_of_a_campaign_can_be_fixed(
 ) -> None:
     arguments = ("identify", str(campaign / "campaign.toml"), "--json", "--out", str(tmp_path))
     status, out, _ = _run(capsys, *arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
-    found = json.loads(out)
+    result = json.loads(out)
     assert status == 0
-    assert found["held"] == {"Cv": "fixed as asked"}
+    assert result["held"] == {"Cv": "fixed as asked"}
     assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
     status, _, _ = _run(capsys, *arguments[:3], "--fix", "friction.load_coefficient=0")
     assert status == 1

@@ -32,11 +32,11 @@ def benchmark_loops(ctrlsys: Any) -> Iterator[tuple[str, control.StateSpace]]:
         for group in (1, 2, 3, 4):
             for number in range(1, 13):
                 try:
-                    found = make("D", np.array([group, number], dtype=np.int32), np.zeros(7),
+                    result = make("D", np.array([group, number], dtype=np.int32), np.zeros(7),
                                  np.zeros(1, dtype=np.int32))  # fmt: skip
                 except (ValueError, RuntimeError):
                     continue
-                vec, n, _, _, _, a, b, c, d, _, info = found[:11]
+                vec, n, _, _, _, a, b, c, d, _, info = result[:11]
                 if info or vec[3] or not 0 < n <= _LARGEST:
                     continue
                 D = d[:1, :1] if vec[7] else np.zeros((1, 1))

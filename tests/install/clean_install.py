@@ -105,11 +105,11 @@ def main() -> None:
     parser.add_argument("--sources", action="store_true", help="from the sdist")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="install-") as name:
-        found = install(given.python, given.pinned, given.sources, Path(name))
-        if found is None:
+        result = install(given.python, given.pinned, given.sources, Path(name))
+        if result is None:
             sys.stdout.write("clean install: skipped, no package registry is reached\n")
             return
-        use(found, Path(name))
+        use(result, Path(name))
 
 
 if __name__ == "__main__":

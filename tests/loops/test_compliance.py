@@ -22,11 +22,11 @@ from tests.loops.two_mass import drive_e
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
 def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -> None:
     """Two derivations: M ticks followed one after the other, and one system of M n states."""
-    loops, found = assemble_loops(load_design(name)), compliance(load_design(name))
-    z = np.exp(2j * np.pi * np.geomspace(0.1, 1000.0, 30) * found.period_s)
+    loops, result = assemble_loops(load_design(name)), compliance(load_design(name))
+    z = np.exp(2j * np.pi * np.geomspace(0.1, 1000.0, 30) * result.period_s)
     lifted = loops.moment_to_output
-    assert np.abs(found(z) / lifted(z) - 1.0).max() < 1e-9
-    assert found.slowest == pytest.approx(np.abs(lifted.poles()).max(), rel=1e-9)
+    assert np.abs(result(z) / lifted(z) - 1.0).max() < 1e-9
+    assert result.slowest == pytest.approx(np.abs(lifted.poles()).max(), rel=1e-9)
 
 
 def test_stacked_designs_have_the_figures_of_each_alone() -> None:
@@ -50,10 +50,10 @@ def test_designs_of_other_structure_are_taken_group_by_group() -> None:
         "control.computing_delay": np.array([0.0, 1e-4, 2e-4, 5e-4]),
         "coupling.damping": np.array([0.0, 0.05, 0.05, 0.0]),
     }
-    found = many(Population(design, values, 4), "least_stiffness")
+    result = many(Population(design, values, 4), "least_stiffness")
     for k in range(4):
         alone = Population(design, {path: array[k : k + 1] for path, array in values.items()}, 1)
-        assert found[k] == pytest.approx(many(alone, "least_stiffness")[0], rel=1e-9)
+        assert result[k] == pytest.approx(many(alone, "least_stiffness")[0], rel=1e-9)
 
 
 def test_static_stiffness_by_hand() -> None:
@@ -72,6 +72,6 @@ def test_requirements_on_stiffness_and_lost_motion() -> None:
     verdicts = evaluate_requirements(replace(drive_e(), requirements=tuple(stiff)))
     assert [one.passed for one in verdicts] == [True, False]
     lost = Requirement(id="lost", quantity="lost_motion", unit="deg", maximum=0.1, load_Nm=8.0)
-    (found,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
-    assert found.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.05 / 800.0), rel=1e-12)
-    assert found.passed
+    (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
+    assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.05 / 800.0), rel=1e-12)
+    assert result.passed

@@ -55,9 +55,9 @@ def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: 
     from nonlinear import commands, simulate
 
     design = force_source()
-    found = drive_figures(design, load)
+    result = drive_figures(design, load)
     expected = (40.0 - 5.0 - abs(load)) / 2.0 if starts else 0.0
-    assert found.acceleration_rad_s2 == pytest.approx(expected)
+    assert result.acceleration_rad_s2 == pytest.approx(expected)
     run = simulate(design, commands.step(1.0), duration_s=0.02, load_Nm=load)
     travelled = run.output_angle_rad[-1]
     assert travelled == pytest.approx(0.5 * expected * run.time_s[-1] ** 2, rel=1e-6, abs=1e-12)
@@ -68,12 +68,12 @@ def test_a_map_of_friction_bounds_the_speed() -> None:
     rows = ((0.0, 0.05), (100.0, 0.02), (900.0, 0.1))
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in rows)
     design = replace(drive_e(), friction=Friction(points=points), coupling=None, load=Load())
-    found = capability(design)
-    w = found.output_rate_rad_s * design.total_ratio
+    capacity = capability(design)
+    w = capacity.output_rate_rad_s * design.total_ratio
     i = (0.02 + 1e-4 * (w - 100)) / 0.05
     assert 0.5 * i + 0.05 * w == pytest.approx(48.0, rel=1e-12)
-    assert found.motor_current_A == pytest.approx(i, rel=1e-12)
-    assert RATE_LIMITS[int(found.rate_limit)] == "voltage"
+    assert capacity.motor_current_A == pytest.approx(i, rel=1e-12)
+    assert RATE_LIMITS[int(capacity.rate_limit)] == "voltage"
 
 
 def test_friction_behind_the_coupling_counts() -> None:

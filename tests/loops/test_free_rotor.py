@@ -62,8 +62,8 @@ def test_a_servo_without_viscous_friction_is_stable_in_every_form(form: Any, con
         warnings.simplefilter("error")
         for loop in (loops.current, loops.velocity, loops.position):
             if loop is not None:
-                found = stability_margins(loop.open_loop, certify=True)
-                assert (found.stable, found.evidence) == (True, "certified")
+                result = stability_margins(loop.open_loop, certify=True)
+                assert (result.stable, result.evidence) == (True, "certified")
 
 
 def test_a_gain_of_one_at_rest_has_its_distances() -> None:
@@ -71,13 +71,13 @@ def test_a_gain_of_one_at_rest_has_its_distances() -> None:
     text = SERVO + WITHOUT.replace("0.02 V*s/rad", "6 mV*s/rad")
     loop = assemble_loops(read_design_text(text, "rc"), form="continuous").velocity
     assert loop is not None
-    found = stability_margins(loop.open_loop, certify=False)
-    assert found.stable is True
+    result = stability_margins(loop.open_loop, certify=False)
+    assert result.stable is True
     grid = 1j * np.geomspace(1.0, 1e5, 20_001)
     L = np.array([loop.open_loop(s) for s in grid]).ravel()
-    assert found.modulus_margin == pytest.approx(np.abs(1.0 + L).min(), rel=1e-5)
-    assert found.disk_margin is not None
-    assert found.disk_margin.alpha == pytest.approx((2.0 * np.abs((1.0 + L) / (1.0 - L))).min(), rel=1e-5)
+    assert result.modulus_margin == pytest.approx(np.abs(1.0 + L).min(), rel=1e-5)
+    assert result.disk_margin is not None
+    assert result.disk_margin.alpha == pytest.approx((2.0 * np.abs((1.0 + L) / (1.0 - L))).min(), rel=1e-5)
 
 
 @pytest.mark.parametrize("slope", [-0.1, 0.1, 5.0, 50.0])

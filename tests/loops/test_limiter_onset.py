@@ -18,14 +18,14 @@ def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[st
     """Steady peaks of u, i_ref and w_ref for a sinusoid at the output shaft, run tick by tick."""
     t = np.arange(2 * window)
     command = amplitude * np.sin(2 * np.pi * cycles / window * t)
-    found = {}
+    result = {}
     for name, every in (("u", 1), ("i_ref", 2), ("w_ref", 10)):
         nothing = {name: np.zeros(len(t))}
         values = run(design, command, inject=nothing)["before"]
-        found[name] = float(np.max(np.abs(values[-window // every :])))
+        result[name] = float(np.max(np.abs(values[-window // every :])))
         if name == "w_ref":
-            found["change"] = float(np.max(np.abs(np.diff(values)[-window // every :]))) / 1e-3
-    return found
+            result["change"] = float(np.max(np.abs(np.diff(values)[-window // every :]))) / 1e-3
+    return result
 
 
 @pytest.mark.parametrize("cycles", [61, 401])

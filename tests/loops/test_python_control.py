@@ -65,9 +65,9 @@ def test_the_margins_of_python_control_fulfil_their_definitions(form: str, name:
 @pytest.mark.parametrize(("gain", "delay"), [(1.0, 0.1), (300.0, 1e-3), (2e-3, 40.0)])
 def test_an_integrator_behind_a_delay(gain: float, delay: float) -> None:
     loop = DelaySystem.from_system(gain * INTEGRATOR) * DelaySystem.delay(delay)
-    found = control.margin(loop)
+    result = control.margin(loop)
     wanted = (pi / (2 * gain * delay), 90.0 - np.degrees(gain * delay), pi / (2 * delay), gain)
-    np.testing.assert_allclose(found, wanted, rtol=1e-5)
+    np.testing.assert_allclose(result, wanted, rtol=1e-5)
 
     times = np.linspace(0.0, 6.3 * delay, 190)
     terms = [-((-gain) ** k) * np.maximum(times - k * delay, 0.0) ** k / factorial(k) for k in range(1, 8)]
@@ -82,8 +82,8 @@ def test_two_delays_without_a_common_measure() -> None:
     system = lag * (DelaySystem.delay(first) + DelaySystem.delay(second))
     times = np.linspace(0.0, 9.0, 91)
     wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (first, second))
-    found = control.step_response(system, times).y[0, 0]
-    np.testing.assert_allclose(found, wanted, atol=0.02)  # a jump on no node is spread over one step
+    result = control.step_response(system, times).y[0, 0]
+    np.testing.assert_allclose(result, wanted, atol=0.02)  # a jump on no node is spread over one step
     nodes = lag * (DelaySystem.delay(1.25) + DelaySystem.delay(2.0))
     wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (1.25, 2.0))
     np.testing.assert_allclose(control.step_response(nodes, times).y[0, 0], wanted, atol=1e-12)

@@ -134,5 +134,5 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
     pairs = {"bandwidth": width.minus3db_hz, "resonance_peak": width.resonance_peak_db,
              "overshoot": step.overshoot_percent, "rise_time": step.rise_time_s}  # fmt: skip
     for quantity, expected in pairs.items():
-        found = figures.quantity(quantity, "position")[0]
-        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity
+        result = figures.quantity(quantity, "position")[0]
+        assert result == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity

@@ -31,9 +31,9 @@ def table(margins: list) -> list[tuple[float, float]]:  # type: ignore[type-arg]
     return sorted((m.deg, m.frequency_rad_s) for m in margins)
 
 
-def same(found: list[tuple[float, float]], expected: list[tuple[float, float]], digits: float) -> None:
-    assert len(found) == len(expected)
-    for have, want in zip(found, sorted(expected), strict=True):
+def same(result: list[tuple[float, float]], expected: list[tuple[float, float]], digits: float) -> None:
+    assert len(result) == len(expected)
+    for have, want in zip(result, sorted(expected), strict=True):
         assert have == pytest.approx(want, rel=digits)
 
 
@@ -186,5 +186,5 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
         torque = np.where(speed < 10, 0.02 - 1e-3 * speed, 0.01 + 5e-4 * (speed - 10))
         whole += float(np.sum(weights * torque * np.sin(x)) * (high - low) / 2)
     expected = 4 / np.pi * whole / W
-    found = friction_slope(design, "describing-function", speed_amplitude_rad_s=W)
-    assert found == pytest.approx(expected, rel=1e-12)
+    result = friction_slope(design, "describing-function", speed_amplitude_rad_s=W)
+    assert result == pytest.approx(expected, rel=1e-12)

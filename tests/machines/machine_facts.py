@@ -122,14 +122,14 @@ class Facts:
         factors = rng.uniform(0.2, 5.0, POPULATION)
         resistance = parameter_value(design, "motor.resistance") * rng.uniform(0.7, 1.3, POPULATION)
         values = {path: parameter_value(design, path) * factors, "motor.resistance": resistance}
-        found = linear_figures(Population(design, values, POPULATION))
-        for loop in found.loops:
-            gain, phase = found.gain_crossovers(loop), found.phase_crossovers(loop)
+        result = linear_figures(Population(design, values, POPULATION))
+        for loop in result.loops:
+            gain, phase = result.gain_crossovers(loop), result.phase_crossovers(loop)
             self.discrete[f"many {name} {loop}"] = [
-                found.stable(loop).tolist(), gain.found.tolist(), phase.found.tolist()
+                result.stable(loop).tolist(), gain.crossings.tolist(), phase.crossings.tolist()
             ]  # fmt: skip
             table = [
-                found.quantity(q, loop)
+                result.quantity(q, loop)
                 for q in ("gain_margin", "phase_margin", "modulus_margin", "bandwidth")
             ]
             self.figures[f"many {name} {loop}"] = np.nan_to_num(np.concatenate(table), posinf=1e300).tolist()

@@ -32,8 +32,8 @@ def facts(kind: str | None) -> dict[str, Any]:
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert not done.stderr
-    found: dict[str, Any] = json.loads(done.stdout)
-    return found
+    result: dict[str, Any] = json.loads(done.stdout)
+    return result
 
 
 @pytest.mark.parametrize("kind", sorted(kinds()))

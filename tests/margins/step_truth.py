@@ -103,12 +103,12 @@ def stable_poles(rng: np.random.Generator, most: int, sampled: bool) -> list[com
 
 def zeros(rng: np.random.Generator, most: int, sampled: bool) -> list[complex]:
     """Zeros over decades, some near z = 1 (a tiny gain at zero frequency), some outside."""
-    n, found = int(rng.integers(0, most + 1)), []
-    while len(found) < n:
-        if rng.random() < 0.3 and len(found) + 2 <= n:
+    n, result = int(rng.integers(0, most + 1)), []
+    while len(result) < n:
+        if rng.random() < 0.3 and len(result) + 2 <= n:
             w, zeta = 10.0 ** rng.uniform(-2, 0.45), 10.0 ** rng.uniform(-2, 0) * 0.999
             s = w * complex(-zeta, math.sqrt(1.0 - zeta**2))
-            found += [s, s.conjugate()]
+            result += [s, s.conjugate()]
         else:
-            found.append(complex(-(10.0 ** rng.uniform(-4, 0.3)) * rng.choice([1.0, 1.0, 1.0, -1.0])))
-    return [np.exp(s) for s in found] if sampled else found
+            result.append(complex(-(10.0 ** rng.uniform(-4, 0.3)) * rng.choice([1.0, 1.0, 1.0, -1.0])))
+    return [np.exp(s) for s in result] if sampled else result

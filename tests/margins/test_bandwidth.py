@@ -83,24 +83,24 @@ def test_closed_loop_of_an_integrator_with_delay() -> None:
 
 def test_peaks_of_S_and_T() -> None:
     loop = control.tf([25], [1, 10, 10, 10])
-    found = peaks(loop)
+    result = peaks(loop)
     omega = np.geomspace(0.1, 30, 400_001)
     L = loop(1j * omega)
     S, T = np.abs(1 / (1 + L)), np.abs(L / (1 + L))
-    assert found.sensitivity_db == pytest.approx(20 * math.log10(S.max()), abs=1e-6)
-    assert found.complementary_db == pytest.approx(20 * math.log10(T.max()), abs=1e-6)
-    assert found.sensitivity_rad_s == pytest.approx(omega[S.argmax()], rel=1e-4)
-    assert found.complementary_rad_s == pytest.approx(omega[T.argmax()], rel=1e-4)
-    assert found.sensitivity_db == pytest.approx(stability_margins(loop).sensitivity_peak_db)
+    assert result.sensitivity_db == pytest.approx(20 * math.log10(S.max()), abs=1e-6)
+    assert result.complementary_db == pytest.approx(20 * math.log10(T.max()), abs=1e-6)
+    assert result.sensitivity_rad_s == pytest.approx(omega[S.argmax()], rel=1e-4)
+    assert result.complementary_rad_s == pytest.approx(omega[T.argmax()], rel=1e-4)
+    assert result.sensitivity_db == pytest.approx(stability_margins(loop).sensitivity_peak_db)
 
 
 def test_peaks_with_delay_and_without_any() -> None:
     omega = np.linspace(1, 1000, 400_001)
     L = 100 / (1j * omega) * np.exp(-0.005j * omega)
-    found = peaks(100 / s, delay_s=0.005)
-    assert found.sensitivity_db == pytest.approx(20 * math.log10(np.abs(1 / (1 + L)).max()), abs=1e-6)
-    assert found.complementary_db == pytest.approx(0.0, abs=1e-6)
-    assert found.complementary_rad_s == 0.0
+    result = peaks(100 / s, delay_s=0.005)
+    assert result.sensitivity_db == pytest.approx(20 * math.log10(np.abs(1 / (1 + L)).max()), abs=1e-6)
+    assert result.complementary_db == pytest.approx(0.0, abs=1e-6)
+    assert result.complementary_rad_s == 0.0
 
 
 @pytest.mark.parametrize(

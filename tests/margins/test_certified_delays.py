@@ -62,9 +62,9 @@ def test_verdict_crossovers_and_crossings_under_a_delay(seed: int) -> None:
             0, abs=1e-6
         )
     crossed = crossings_on_a_grid(loop, delay_s, m.band_rad_s[1])
-    found = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins if g.frequency_rad_s > 0]
-    assert len(found) == len(crossed)
-    assert found == [(pytest.approx(w, rel=1e-3), pytest.approx(k, rel=0.02)) for w, k in crossed]
+    result = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins if g.frequency_rad_s > 0]
+    assert len(result) == len(crossed)
+    assert result == [(pytest.approx(w, rel=1e-3), pytest.approx(k, rel=0.02)) for w, k in crossed]
     assert m.modulus_margin is not None
     nearest = nearest_on_a_grid(loop, delay_s)
     assert m.modulus_margin <= nearest * (1 + 1e-6) or (m.modulus_margin == 1.0 and nearest > 0.9999)

@@ -12,7 +12,7 @@ from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.collocation import closed_loop_matrix
-from actuator_lti.margins.delay_form import border_values, cells, delay_form, from_rational
+from actuator_lti.margins.delay_form import border_values, delay_form, evaluate_intervals, from_rational
 from actuator_lti.margins.loop import rational_loop
 
 s = control.tf("s")
@@ -80,15 +80,15 @@ def test_bound_holds_inside_every_interval() -> None:
     form = delay_form(inner * DelaySystem.delay(0.001) * DelaySystem.from_system(30 / s))
     low = np.exp(rng.uniform(np.log(1.0), np.log(3000.0), 300))
     high = low * (1 + 10 ** rng.uniform(-3, -0.7, 300))
-    found = cells(form, low, high)
-    bounded = np.isfinite(found.spread)
+    intervals = evaluate_intervals(form, low, high)
+    bounded = np.isfinite(intervals.spread)
     assert bounded.mean() > 0.5
     for part in np.linspace(0, 1, 17):
         L = border_values(form, low + part * (high - low))
-        assert (np.abs(L - found.L)[bounded] <= found.spread[bounded] * (1 + 1e-9)).all()
-    step = 1e-6 * found.x
-    slope = (border_values(form, found.x + step) - border_values(form, found.x - step)) / (2 * step)
-    assert np.abs(slope / found.slope - 1).max() < 1e-5
+        assert (np.abs(L - intervals.L)[bounded] <= intervals.spread[bounded] * (1 + 1e-9)).all()
+    step = 1e-6 * intervals.x
+    slope = (border_values(form, intervals.x + step) - border_values(form, intervals.x - step)) / (2 * step)
+    assert np.abs(slope / intervals.slope - 1).max() < 1e-5
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -99,14 +99,16 @@ def test_bound_from_the_factors_holds_and_is_close(sampled: bool) -> None:
     low = np.exp(rng.uniform(np.log(0.01), np.log(2.5 if sampled else 100.0), 400))
     high = low * (1 + 10 ** rng.uniform(-5, -1, 400))
     bare = form.without_series()
-    found = cells(bare, low, high)
-    bounded = np.isfinite(found.spread)
+    intervals = evaluate_intervals(bare, low, high)
+    bounded = np.isfinite(intervals.spread)
     seen = np.zeros(low.size)
     for part in np.linspace(0, 1, 33):
-        seen = np.maximum(seen, np.abs(border_values(bare, low + part * (high - low)) - found.L))
+        seen = np.maximum(seen, np.abs(border_values(bare, low + part * (high - low)) - intervals.L))
     assert bounded.mean() > 0.9
-    assert (seen[bounded] <= found.spread[bounded] * (1 + 1e-6) + 1e-12 * np.abs(found.L[bounded])).all()
-    assert np.median(found.spread[bounded] / seen[bounded]) < 4.0
+    assert (
+        seen[bounded] <= intervals.spread[bounded] * (1 + 1e-6) + 1e-12 * np.abs(intervals.L[bounded])
+    ).all()
+    assert np.median(intervals.spread[bounded] / seen[bounded]) < 4.0
 
 
 def test_a_double_integrator_close_to_the_negative_axis_takes_no_endless_splitting() -> None:

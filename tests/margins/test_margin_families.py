@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from margin_families import FAMILIES, Loop
-from margin_truth import determined, difference, truth_of
+from margin_families import FAMILIES, Loop, near_the_border
+from margin_truth import determined, difference, towards_the_border, truth_of
 
 from actuator_lti.margins import StabilityMargins, stability_margins
 
@@ -23,8 +23,8 @@ Family = Callable[[np.random.Generator], Loop]
 
 def problem(loop: Loop, m: StabilityMargins, rng: np.random.Generator) -> str | None:
     answer = truth_of(loop)
-    found = difference(m, answer, float(loop.dt) if loop.dt else 1.0, 1e-6)
-    return found if found is not None and determined(loop, answer, rng) else None
+    result = difference(m, answer, float(loop.dt) if loop.dt else 1.0, 1e-6)
+    return result if result is not None and determined(loop, answer, rng) else None
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
@@ -36,8 +36,8 @@ def test_the_answer_is_the_truth_where_the_data_determine_it(
         rng = np.random.default_rng([k, 1])
         loop = family(rng)
         m = stability_margins(loop)
-        if found := problem(loop, m, rng):
-            wrong.append((k, m.evidence, found))
+        if result := problem(loop, m, rng):
+            wrong.append((k, m.evidence, result))
     assert not wrong
     assert capfd.readouterr() == ("", "")
 
@@ -55,11 +55,26 @@ def test_what_double_precision_has_checked_is_what_exact_arithmetic_certifies(
         if m.evidence != "checked":
             continue
         exact = stability_margins(loop, certify=True)
-        if exact.evidence == "certified" and (found := unlike(m, exact)):
-            wrong.append((k, found))
+        if exact.evidence == "certified" and (result := unlike(m, exact)):
+            wrong.append((k, result))
     assert not wrong
     assert kinds & {"checked", "certified"}
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    "k", [1001512, 1002322, 1002408, 1004031, 1004353, 1005110, 1005257, 1005639, 1005950]
+)
+def test_a_pole_that_8_ulp_carry_over_the_border_is_not_said_to_be_on_it(k: int) -> None:
+    loop = near_the_border(np.random.default_rng([k, 2]))
+    unstable = truth_of(loop).unstable
+    assert truth_of(towards_the_border(loop)).unstable != unstable  # so the data do not determine it
+    for m in (stability_margins(loop), stability_margins(loop, certify=True)):
+        assert m.evidence == "withheld" or m.agreement.unstable_poles == unstable
+        assert not m.agreement.border_poles
+        if m.evidence == "withheld":
+            assert "over the border" in m.evidence_reason
+            assert m.agreement.unstable_poles is None
 
 
 def unlike(m: StabilityMargins, exact: StabilityMargins) -> str | None:

@@ -72,8 +72,8 @@ def J4(form: str) -> control.LTI:
     num, den = [0.02, -0.019], [1, -2, 1]
     if form == "transfer function":
         return control.tf(num, den, PERIOD_S)
-    found = control.tf2ss(num, den)
-    return control.ss(found.A, found.B, found.C, found.D, PERIOD_S)
+    result = control.tf2ss(num, den)
+    return control.ss(result.A, result.B, result.C, result.D, PERIOD_S)
 
 
 @pytest.mark.parametrize("certify", CERTIFY)
@@ -116,12 +116,17 @@ def difference_over(samples: int, form: str) -> control.LTI:
     loop = control.tf(num, den, PERIOD_S)
     if form == "transfer function":
         return loop
-    found = control.tf2ss(num, den)
-    scale = np.random.default_rng(samples).uniform(0.5, 2.0, found.nstates)  # rounds each entry
+    result = control.tf2ss(num, den)
+    scale = np.random.default_rng(samples).uniform(0.5, 2.0, result.nstates)  # rounds each entry
     T, inverse = np.diag(scale), np.diag(1.0 / scale)
     T[0, -1], inverse[0, -1] = 0.3, -0.3 / (scale[0] * scale[-1])
     return control.StateSpace(
-        T @ found.A @ inverse, T @ found.B, found.C @ inverse, found.D, PERIOD_S, remove_useless_states=False
+        T @ result.A @ inverse,
+        T @ result.B,
+        result.C @ inverse,
+        result.D,
+        PERIOD_S,
+        remove_useless_states=False,
     )
 
 
@@ -141,10 +146,10 @@ def test_J7_a_zero_of_the_loop_is_no_gain_margin(samples: int, form: str, certif
 
 @pytest.mark.parametrize("samples", [2, 3, 4, 6, 8])
 def test_zero_is_told_from_small(samples: int) -> None:
-    found = difference_over(samples, "state space")
+    result = difference_over(samples, "state space")
     zeros = np.exp(2j * np.pi * np.arange(1, samples // 2 + 1) / samples)
     elsewhere = np.exp(1j * np.array([0.1, 0.37, 1.0, 2.9]))
-    parts = found.A, found.B[:, 0], found.C[0], found.D[0, 0]
+    parts = result.A, result.B[:, 0], result.C[0], result.D[0, 0]
     assert (told_from_zero(*parts, zeros) < 8e5).all()
     assert (told_from_zero(*parts, elsewhere) > 1e10).all()
     assert 8e5 < ZERO < 1e10
@@ -213,6 +218,6 @@ def test_slow_sampled_loops_keep_thirteen_digits(seed: int) -> None:
     loop = sampled_slowly_moving(np.random.default_rng([seed, 5]))  # poles down to 1e-6 a sample
     m, expected = stability_margins(loop), truth_of(loop)
     assert m.evidence != "withheld"
-    found = [p.frequency_rad_s * loop.dt for p in m.phase_margins]
-    assert found == pytest.approx(expected.gain_crossovers, rel=2e-14)
+    result = [p.frequency_rad_s * loop.dt for p in m.phase_margins]
+    assert result == pytest.approx(expected.gain_crossovers, rel=2e-14)
     assert [p.deg for p in m.phase_margins] == pytest.approx(expected.phase_margins_deg, abs=2e-12)

@@ -221,8 +221,8 @@ def test_circles_of_repeats_hold_the_truth_as_often_as_they_say(n: int) -> None:
     rng = np.random.default_rng(n)
     omega = np.arange(1.0, 4001.0)
     values = 2.0 + 0.1 * circular(rng, (n, omega.size))
-    found = MeasuredResponse.from_repeats([control.frd(each, omega) for each in values], confidence=0.95)
-    share = np.mean(np.abs(found.frdata - 2.0) <= found.radius)
+    result = MeasuredResponse.from_repeats([control.frd(each, omega) for each in values], confidence=0.95)
+    share = np.mean(np.abs(result.frdata - 2.0) <= result.radius)
     assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / omega.size)
 
 

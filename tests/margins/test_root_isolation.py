@@ -31,14 +31,14 @@ def made(rng: np.random.Generator, reals: int, pairs: int, decades: float) -> tu
 def test_every_root_is_in_a_square_of_its_own(seed: int) -> None:
     rng = np.random.default_rng([seed, 77])
     p, roots = made(rng, 10 + 3 * seed, 32, 1.0 + seed)
-    found = [root for root, times in all_roots(p) for _ in range(times)]
+    result = [root for root, times in all_roots(p) for _ in range(times)]
     assert p.degree() > 60
-    assert len(found) == p.degree()
-    assert sum(root.imag.is_zero() for root in found) == 10 + 3 * seed
+    assert len(result) == p.degree()
+    assert sum(root.imag.is_zero() for root in result) == 10 + 3 * seed
     with ctx.workprec(200):
         for root in roots:
             exact = acb(fmpq(*root.real.as_integer_ratio()), fmpq(*root.imag.as_integer_ratio()))
-            holding = [x for x in found if abs((x - exact).mid()) < 1e-14 * abs(root)]
+            holding = [x for x in result if abs((x - exact).mid()) < 1e-14 * abs(root)]
             assert len(holding) == 1
 
 
@@ -47,17 +47,17 @@ def test_a_wilkinson_polynomial_of_degree_80() -> None:
     p = fmpz_poly([1])
     for k in range(1, 81):
         p *= X - k
-    found = sorted(isolated_roots(p), key=lambda root: float(root.real.mid()))
-    assert all(root.imag.is_zero() for root in found)
-    assert [bool(root.real.contains(k)) for k, root in enumerate(found, 1)] == [True] * 80
+    result = sorted(isolated_roots(p), key=lambda root: float(root.real.mid()))
+    assert all(root.imag.is_zero() for root in result)
+    assert [bool(root.real.contains(k)) for k, root in enumerate(result, 1)] == [True] * 80
 
 
 def test_roots_closer_than_double_precision_parts_them() -> None:
     """A Mignotte polynomial: two real roots at 0.1, a part in 1e30 apart."""
     p = X**61 - (10 * X - 1) ** 2
-    found = [root for root, _ in all_roots(p)]
-    small = [root for root in found if abs(complex(root) - 0.1) < 1e-6]
-    assert len(found) == 61
+    result = [root for root, _ in all_roots(p)]
+    small = [root for root in result if abs(complex(root) - 0.1) < 1e-6]
+    assert len(result) == 61
     assert len(small) == 2
     assert all(root.imag.is_zero() for root in small)
     assert not small[0].overlaps(small[1])
@@ -67,8 +67,8 @@ def test_multiple_roots_keep_their_multiplicity() -> None:
     p = fmpz_poly([1])
     for k in range(1, 64):
         p *= X - k * k
-    found = all_roots(p * (X - 5) ** 3 * (X + 2) ** 2)
-    assert sorted(times for _, times in found) == [1] * 63 + [2, 3]
+    result = all_roots(p * (X - 5) ** 3 * (X + 2) ** 2)
+    assert sorted(times for _, times in result) == [1] * 63 + [2, 3]
 
 
 def test_what_is_not_square_free_is_refused_not_guessed() -> None:

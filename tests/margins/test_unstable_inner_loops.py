@@ -51,9 +51,9 @@ def test_the_figures_are_the_truth_or_withheld(seed: int, capfd: pytest.CaptureF
             truth = truth_of(system)
         except AssertionError:  # roots that 40 digits do not part
             continue
-        found = difference(m, truth, float(system.dt), 1e-6)
-        if found is not None:
-            assert not determined(system, truth, np.random.default_rng(seed)), (name, found)
+        result = difference(m, truth, float(system.dt), 1e-6)
+        if result is not None:
+            assert not determined(system, truth, np.random.default_rng(seed)), (name, result)
             assert many.withheld(name)[0]
             continue
         assert not many.stable(name)[0] or truth.unstable == 0
@@ -87,7 +87,7 @@ def test_entries_of_5e14_are_withheld_among_others_that_are_not() -> None:
     figures = linear_figures(Population(base, {"control.current.gain": gains}, 3))
     assert figures.withheld("position").tolist() == [False, True, False]
     assert figures.stable("position").tolist() == [True, False, True]
-    assert figures.gain_crossovers("position").found[1] == 0
+    assert figures.gain_crossovers("position").crossings[1] == 0
     for k in (0, 2):
         alone = linear_figures(Population(base, {"control.current.gain": gains[[k]]}, 1))
         assert (alone.raw[0] == figures.raw[k])[~np.isnan(alone.raw[0])].all()

@@ -82,12 +82,12 @@ def nights(tmp_path_factory):
 
 def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
     night, _ = nights
-    found = headlines(night.designs)
-    assert [len(h.designs) for h in found] == [2, 1]
-    assert found[0].worse
-    assert found[0].cause == "control.position.gain 12 → 10 1/s"
-    assert found[0].effect == "gain margin 12.00 → 10.00 dB"
-    assert not found[1].worse
+    result = headlines(night.designs)
+    assert [len(h.designs) for h in result] == [2, 1]
+    assert result[0].worse
+    assert result[0].cause == "control.position.gain 12 → 10 1/s"
+    assert result[0].effect == "gain margin 12.00 → 10.00 dB"
+    assert not result[1].worse
 
 
 def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:

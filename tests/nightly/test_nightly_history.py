@@ -41,8 +41,8 @@ def test_every_figure_comes_back_to_the_last_bit(tmp_path_factory, values) -> No
         run = start(history)
         history.finish_run(run, "2026-01-01T01:00:00Z", [result(values=values)])
         (row,) = history.results(run=run)
-        found = history.figures(row.snapshot)
-        assert {n: f.value for n, f in found.items()} == values
+        outcome = history.figures(row.snapshot)
+        assert {n: f.value for n, f in outcome.items()} == values
 
 
 def test_an_unchanged_result_is_stored_once(tmp_path) -> None:

@@ -82,15 +82,15 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
 
 
 def _children(parent: int) -> list[int]:
-    found = []
+    result = []
     for entry in Path("/proc").iterdir():
         try:
             fields = (entry / "stat").read_text().rpartition(")")[2].split()
         except (OSError, ValueError):
             continue
         if entry.name.isdigit() and int(fields[1]) == parent:
-            found.append(int(entry.name))
-    return found
+            result.append(int(entry.name))
+    return result
 
 
 def _wait_for(condition, seconds: float = 60.0) -> None:

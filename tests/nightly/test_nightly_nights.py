@@ -164,10 +164,10 @@ def test_missing_results_are_no_changes(nights) -> None:
 def test_flapping_is_told_apart_from_a_change(nights) -> None:
     for k in range(6):
         night = nights(job("flaps", 10.0 + k % 2), job("moves", 10.0 if k < 5 else 12.0))
-    found = {d.name: d.last_night.changes for d in night.designs}
-    assert all(c.flapping for c in found["flaps"])
-    assert not any(c.flapping for c in found["moves"])
-    assert len(found["moves"]) > 0
+    result = {d.name: d.last_night.changes for d in night.designs}
+    assert all(c.flapping for c in result["flaps"])
+    assert not any(c.flapping for c in result["moves"])
+    assert len(result["moves"]) > 0
 
 
 def test_nights_without_a_run_are_shown_as_such(nights) -> None:
@@ -236,8 +236,8 @@ def test_change_points_of_known_steps_are_found_to_the_night() -> None:
 
 def test_noise_and_small_steps_have_no_change_point() -> None:
     rng = np.random.default_rng(4)
-    found = [change_points(rng.standard_normal(200), 0.05) for _ in range(20)]
-    assert sum(map(len, found)) <= 4
+    result = [change_points(rng.standard_normal(200), 0.05) for _ in range(20)]
+    assert sum(map(len, result)) <= 4
     assert change_points(np.array([1.0, 1.0, 1.04, 1.04]), 0.05) == ()
     assert change_points(np.array([np.nan, 1.0]), 0.05) == ()
 
@@ -254,8 +254,8 @@ def test_several_runs_a_day_are_no_missing_nights() -> None:
 
 def test_figures_that_appear_or_vanish_are_changes_without_a_side() -> None:
     columns = Columns([Figure(name=name, value=None, better=1) for name in "xy"], Tolerances())
-    found = columns.compare(np.array([1.0, np.nan]), np.array([np.nan, 1.0]))
-    assert [(c.figure, c.worse) for c in found] == [
+    result = columns.compare(np.array([1.0, np.nan]), np.array([np.nan, 1.0]))
+    assert [(c.figure, c.worse) for c in result] == [
         ("x", None),
         ("y", None),
     ]

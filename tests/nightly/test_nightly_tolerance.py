@@ -26,7 +26,7 @@ def test_quantities_of_loops_have_a_column_and_one_tolerance_a_unit() -> None:
     by_unit: dict[str, set[float]] = {}
     for quantity in LOOP_QUANTITIES.values():
         by_unit.setdefault(quantity.unit, set()).add(quantity.tolerance)
-    assert all(len(found) == 1 for found in by_unit.values()), by_unit
+    assert all(len(result) == 1 for result in by_unit.values()), by_unit
 
 
 @pytest.mark.parametrize(

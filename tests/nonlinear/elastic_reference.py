@@ -103,26 +103,26 @@ class Reference:
         return f
 
     def events(self, mode: Mode) -> list[Event]:
-        found: list[Event] = []
+        result: list[Event] = []
         if not self.rigid:
-            found += self.contact_events(mode)
+            result += self.contact_events(mode)
         if mode.motor:
-            found.append(("land", lambda _, x: x[1], -mode.motor))
+            result.append(("land", lambda _, x: x[1], -mode.motor))
         else:
             for side in (1, -1):
                 leave = lambda _, x, k=side: (  # noqa: E731
                     k * self.drive(x, self.torque(x, mode)) - self.level(x, mode, k) - TINY
                 )
-                found.append((f"motor{side}", leave, 1.0))
+                result.append((f"motor{side}", leave, 1.0))
         if mode.load and self.C0l:
-            found.append(("load lands", lambda _, x: x[2], -mode.load))
+            result.append(("load lands", lambda _, x: x[2], -mode.load))
         elif not mode.load:
             for side in (1, -1):
                 leave = lambda _, x, k=side: (  # noqa: E731
                     k * self.load_drive(x, mode) - self.ratio_l * self.C0l - TINY
                 )
-                found.append((f"load{side}", leave, 1.0))
-        return found
+                result.append((f"load{side}", leave, 1.0))
+        return result
 
     def contact_events(self, mode: Mode) -> list[Event]:
         if self.b == 0.0:  # the kink of |T_s| is left to the integrator's step control

@@ -18,8 +18,8 @@ TS = 1e-4
 
 def run(words: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
     status = main(f"simulate {words}".split())
-    found = capsys.readouterr()
-    return status, found.out + found.err
+    result = capsys.readouterr()
+    return status, result.out + result.err
 
 
 def rows(path: Path) -> np.ndarray:
@@ -98,19 +98,19 @@ def test_a_simulated_record_correlates(tmp_path: Path, capsys: pytest.CaptureFix
     words = "--command multisine --amplitude 0.5 --frequency 2 --to 6 --count 3 --duration 0.5 --load 1"
     assert run(f"ilr33-amber {words} --load-file {load} --load-slope -5 --csv {path}", capsys)[0] == 0
     assert main(["correlate", "ilr33-amber", str(path), "--json"]) == 0
-    found = relative_errors(json.loads(capsys.readouterr().out))
-    assert len(found) >= 3
-    assert max(found) < 1e-6
+    result = relative_errors(json.loads(capsys.readouterr().out))
+    assert len(result) >= 3
+    assert max(result) < 1e-6
 
 
-def relative_errors(found: Any) -> list[float]:
+def relative_errors(result: Any) -> list[float]:
     """Every relative error in a document."""
-    if isinstance(found, list):
-        return [error for item in found for error in relative_errors(item)]
-    if not isinstance(found, dict):
+    if isinstance(result, list):
+        return [error for item in result for error in relative_errors(item)]
+    if not isinstance(result, dict):
         return []
-    own = [found["relative_error"]] if isinstance(found.get("relative_error"), float) else []
-    return own + [error for item in found.values() for error in relative_errors(item)]
+    own = [result["relative_error"]] if isinstance(result.get("relative_error"), float) else []
+    return own + [error for item in result.values() for error in relative_errors(item)]
 
 
 def test_a_multisine_is_periodic_and_begins_at_zero() -> None:
@@ -133,9 +133,9 @@ def test_cycles_are_those_played(tmp_path: Path, capsys: pytest.CaptureFixture[s
     path = tmp_path / "run.csv"
     words = f"--command stepped-sine --amplitude 0.05 --frequency 5 --to 10 --count 2 --cycles 3 --csv {path}"
     assert run(words, capsys)[0] == 0
-    found = rows(path)
-    assert found["time_s"][-1] == pytest.approx(3 / 5 + 3 / 10, abs=2 * TS)
-    rising = np.flatnonzero((found["reference_rad"][:-1] < 0.0) & (found["reference_rad"][1:] >= 0.0))
+    result = rows(path)
+    assert result["time_s"][-1] == pytest.approx(3 / 5 + 3 / 10, abs=2 * TS)
+    rising = np.flatnonzero((result["reference_rad"][:-1] < 0.0) & (result["reference_rad"][1:] >= 0.0))
     assert rising.size == 5  # six periods, the first of which begins at zero
 
 
@@ -146,8 +146,8 @@ def test_content_above_nyquist_is_refused(tmp_path: Path, capsys: pytest.Capture
     for hertz, status in ((700.0, 2), (100.0, 0)):
         angle = 0.1 * np.sin(2.0 * np.pi * hertz * t)
         path.write_text("t,angle\n" + "".join(f"{a},{b}\n" for a, b in zip(t, angle, strict=True)))
-        found, words = run(f"ilr33-amber-multirate --record {path}", capsys)
-        assert found == status
+        result, words = run(f"ilr33-amber-multirate --record {path}", capsys)
+        assert result == status
         assert ("above the Nyquist frequency" in words) == (status == 2)
     step = np.where(t < 0.05, 0.0, 0.1)  # a step has lines everywhere, none of them large
     path.write_text("t,angle\n" + "".join(f"{a},{b}\n" for a, b in zip(t, step, strict=True)))

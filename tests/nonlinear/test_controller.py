@@ -160,10 +160,10 @@ def test_random_controllers(part: int) -> None:
         design = some_drive(rng)
         drive, plain = Drive(design), Controller(design)
         rows = some_measurements(rng, design)
-        found = np.array([drive.control(*row) for row in rows])
+        result = np.array([drive.control(*row) for row in rows])
         expected = np.array([plain.tick(*row) for row in rows])
         scale = np.abs(expected).max()
-        assert np.abs(found - expected).max() <= 1e-9 * scale, (case, design)
+        assert np.abs(result - expected).max() <= 1e-9 * scale, (case, design)
         assert drive.value("speed_command") == pytest.approx(plain.w_ref, rel=1e-9, abs=1e-9)
-        limited += bool((np.abs(found) == 20.0).any()) and not (np.abs(found) == 20.0).all()
+        limited += bool((np.abs(result) == 20.0).any()) and not (np.abs(result) == 20.0).all()
     assert limited > CASES / 16  # the limits and what follows them were seen

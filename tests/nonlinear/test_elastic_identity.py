@@ -74,7 +74,7 @@ def cruise(design: Design, point: Point) -> tuple[State, dict[str, float]]:
     return state, linear | {"hold_w_ref": SPEED, "hold_i_ref": i, "u1": u, "u2": u}
 
 
-def ride(design: Design, point: Point) -> tuple[Trajectory, dict[str, np.ndarray]]:
+def run_on_bias(design: Design, point: Point) -> tuple[Trajectory, dict[str, np.ndarray]]:
     """The same motion twice: simulated, and by control.forced_response of the assembled loops."""
     initial, known = cruise(design, point)
     run = simulate(
@@ -93,7 +93,7 @@ def ride(design: Design, point: Point) -> tuple[Trajectory, dict[str, np.ndarray
 
 
 def assert_identical(point: Point, delay: float, rates: tuple[int, int]) -> None:
-    run, linear = ride(variant(point, delay, rates), point)
+    run, linear = run_on_bias(variant(point, delay, rates), point)
     assert run.output_speed_rad_s is not None
     assert run.coupling_torque_Nm is not None
     assert run.events == 0

@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design
 from nonlinear import State, Trajectory, commands, simulate
 
 TICKS = 20_000
-SPEED = 300.0  # rad/s, motor: the cruise on which everything rides
+SPEED = 300.0  # rad/s, motor: the bias motion of every run
 RATES = [(1, 1), (2, 10)]
 DELAYS = [0.0, 0.5, 1.0, 1.5]
 
@@ -34,7 +34,7 @@ def variant(delay: float, rates: tuple[int, int], feedforward: float = 0.0, **en
     )
 
 
-def ride(
+def run_on_bias(
     design: Design, *, friction_on: bool, load_Nm: float = 0.0, limits_on: bool = True
 ) -> tuple[Trajectory, dict[str, np.ndarray]]:
     """The same motion twice: simulated, and by control.forced_response of the assembled loops."""
@@ -87,19 +87,19 @@ def assert_identical(run: Trajectory, linear: dict[str, np.ndarray]) -> None:
 @pytest.mark.parametrize("rates", RATES)
 @pytest.mark.parametrize("delay", DELAYS)
 def test_without_dry_friction(delay: float, rates: tuple[int, int]) -> None:
-    assert_identical(*ride(variant(delay, rates), friction_on=False))
+    assert_identical(*run_on_bias(variant(delay, rates), friction_on=False))
 
 
 @pytest.mark.parametrize(("delay", "rates"), [(1.0, (1, 1)), (0.5, (2, 10))])
 def test_with_constant_friction_torque(delay: float, rates: tuple[int, int]) -> None:
-    assert_identical(*ride(variant(delay, rates), friction_on=True, load_Nm=4.0))
+    assert_identical(*run_on_bias(variant(delay, rates), friction_on=True, load_Nm=4.0))
 
 
 @pytest.mark.parametrize(("delay", "rates", "samples"), [(1.0, (1, 1), 1), (1.5, (2, 10), 3)])
 def test_with_speed_by_difference(delay: float, rates: tuple[int, int], samples: int) -> None:
     design = variant(delay, rates, speed="difference", difference_samples=samples, filter_time_s=2e-4)
-    assert_identical(*ride(design, friction_on=True, limits_on=False))
+    assert_identical(*run_on_bias(design, friction_on=True, limits_on=False))
 
 
 def test_with_feedforward() -> None:
-    assert_identical(*ride(variant(1.0, (2, 10), feedforward=0.2), friction_on=False, limits_on=False))
+    assert_identical(*run_on_bias(variant(1.0, (2, 10), feedforward=0.2), friction_on=False, limits_on=False))

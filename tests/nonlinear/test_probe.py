@@ -25,19 +25,19 @@ def test_open_loop_at_every_break_point(name: str, point: str, frequency_hz: flo
         frequency_hz = frequency_hz / 4
     frequency, ticks, cycles = whole_periods(frequency_hz, control.period_s, least_ticks=2000)
     ticks, cycles = 10 * ticks, 10 * cycles  # whole position periods
-    riding = point != "output"  # a ramp has no steady phasor at the output: there, at rest without friction
+    moving = point != "output"  # a ramp has no steady phasor at the output: there, at rest without friction
     run = Run(
         design=design,
         command=commands.hold(),
-        bias=commands.ramp(CRUISE / design.total_ratio) if riding else None,
+        bias=commands.ramp(CRUISE / design.total_ratio) if moving else None,
         initial=State(
             motor_angle_rad=-CRUISE / control.position.gain,
             motor_speed_rad_s=CRUISE,
             speed_command_rad_s=CRUISE,
         )
-        if riding
+        if moving
         else None,
-        friction_on=riding,
+        friction_on=moving,
         probes=(Probe(point=point, injection=commands.sine(INJECTION[point], frequency)),),
         duration_s=(2 * ticks + 10_000) * control.period_s,
         reducers=Reducers(window_ticks=ticks, cycles=cycles),

@@ -56,10 +56,10 @@ def test_random_linear_drives(part: int) -> None:
         with np.errstate(over="ignore", invalid="ignore"):
             linear = system.respond(scale * command, 0.0, None, 3.0)
         for name, ours in SIGNALS.items():
-            found = getattr(run, ours)
+            result = getattr(run, ours)
             # a loop may grow: as long as both are far from the end of the numbers
             some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
-            error = np.abs(found - linear[name])[some].max() / np.abs(linear[name][some]).max()
+            error = np.abs(result - linear[name])[some].max() / np.abs(linear[name][some]).max()
             assert error < 1e-9, (case, name, error, design.controller)
 
 

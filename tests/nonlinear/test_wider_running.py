@@ -55,9 +55,9 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
         design, commands.hold(), ticks * Ts, given, probes=[probe], initial=State(motor_speed_rad_s=50.0)
     )
     m, N, J = design.motor, design.total_ratio, design.inertia_kgm2
-    x, found = np.array([0.0, 50.0, 0.0]), np.empty((ticks, 3))
+    x, result = np.array([0.0, 50.0, 0.0]), np.empty((ticks, 3))
     for k in range(ticks):
-        found[k] = x
+        result[k] = x
         y = x[2] / N
         M = 5.0 - 200.0 * y + series[k] + 3.0 * 0.4 * 9.80665 * np.sin(y + 0.7)
 
@@ -67,7 +67,7 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
 
         x = solve_ivp(rate, (0.0, Ts), x, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     for k, values in enumerate((run.current_A, run.motor_speed_rad_s, run.motor_angle_rad)):
-        assert np.abs(values - found[:, k]).max() < 1e-9 * np.abs(found[:, k]).max()
+        assert np.abs(values - result[:, k]).max() < 1e-9 * np.abs(result[:, k]).max()
 
 
 def test_j9_the_slope_of_the_design_acts_without_being_told() -> None:

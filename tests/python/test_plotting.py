@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import InputError, assemble_loops, load_design, onset, stability_margins
-from actuator_lti.plotting import COLOURS, plot_bode, plot_cells, plot_onset, plot_step
+from actuator_lti.plotting import COLOURS, plot_bode, plot_map, plot_onset, plot_step
 from analyses.large_signal.classify import CAUSES
 from analyses.large_signal.map import amplitude_map
 from analyses.loop_survey import LoopSurvey
@@ -33,10 +33,10 @@ def test_a_bode_figure_shows_the_loop_and_its_margins(form: str) -> None:
         np.testing.assert_allclose(y, 20 * np.log10(np.abs(seen)), atol=1e-9)
         turned = np.exp(1j * np.radians(phase.lines[0].get_ydata()))
         np.testing.assert_allclose(turned, seen / np.abs(seen), atol=1e-6)
-        found = stability_margins(loop.open_loop)
+        result = stability_margins(loop.open_loop)
         words = {text.get_text() for text in (*magnitude.texts, *phase.texts)}
-        assert {f"{m.db:+.1f} dB" for m in found.gain_margins} <= words
-        assert {f"{m.deg:+.1f}°" for m in found.phase_margins} <= words
+        assert {f"{m.db:+.1f} dB" for m in result.gain_margins} <= words
+        assert {f"{m.deg:+.1f}°" for m in result.phase_margins} <= words
         if loop.period_s:
             assert x.max() <= 0.5 / loop.period_s
 
@@ -84,11 +84,11 @@ def test_the_border_and_the_map() -> None:
     }
     survey = LoopSurvey(design, loops, {"sampled": {}}, None, {}, (), {}, border)
     assert len(survey.plot_map().lines) == len(panel.lines)
-    found = amplitude_map(design, loops, counts=(4, 5))
-    drawn = found.plot_map()
-    present = {CAUSES[k] for k in np.unique(found.cause)}
+    map_ = amplitude_map(design, loops, counts=(4, 5))
+    drawn = map_.plot_map()
+    present = {CAUSES[k] for k in np.unique(map_.cause)}
     assert {text.get_text() for text in drawn.get_legend().get_texts()} == present
-    frame = found.to_pandas()
+    frame = map_.to_pandas()
     assert set(frame["cause"]) == present
     assert len(frame) == 20
     with pytest.raises(InputError, match="nothing limits"):
@@ -97,7 +97,7 @@ def test_the_border_and_the_map() -> None:
 
 def test_cells_keep_their_colours_when_some_are_missing() -> None:
     kind = np.array([[0, 2], [2, 3]])
-    panel = plot_cells(np.array([1.0, 10.0]), np.array([1.0, 2.0]), kind, ("none", "a", "b", "c"))
+    panel = plot_map(np.array([1.0, 10.0]), np.array([1.0, 2.0]), kind, ("none", "a", "b", "c"))
     drawn = panel.collections[0]
     assert drawn.get_array().ravel().tolist() == [0, 1, 1, 2]
     assert [tuple(np.round(drawn.cmap(k)[:3], 2)) for k in (1, 2)] == [

@@ -109,6 +109,6 @@ def test_a_figure_that_there_is_not_says_why() -> None:
 def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path: Path) -> None:
     asked = requirement("duty_current", maximum=1.0)
     design = replace(load_design("fin"), requirements=(*load_design("fin").requirements, asked))
-    found = monte_carlo(design, tmp_path, MonteCarloSettings(samples=16, worst_cases=False))
-    assert "duty_current" not in {odds.id for odds in found.odds}
-    assert any("duty_current" in note for note in found.notes)
+    result = monte_carlo(design, tmp_path, MonteCarloSettings(samples=16, worst_cases=False))
+    assert "duty_current" not in {odds.id for odds in result.odds}
+    assert any("duty_current" in note for note in result.notes)

@@ -23,7 +23,7 @@ def survey():
 
 
 def test_every_margin_of_a_report_is_certified(survey):
-    figures = [f for found in survey.forms.values() for f in found.values()]
+    figures = [f for result in survey.forms.values() for f in result.values()]
     figures += [f for point in survey.operating_points for f in point.figures.values()]
     figures += [point.figures for point in survey.break_points.values()]
     figures.append(survey.locked)
@@ -45,9 +45,9 @@ def test_a_withheld_margin_gives_its_reason(survey):
     """Four poles 1e-4 from z = 1: rounding of the coefficients scatters them over the border."""
     undetermined = control.tf([1e-14], np.poly([1.0 - 1e-4] * 4), 1e-4)
     loop = survey.figures["velocity"].loop
-    found = LoopFigures(loop, None, stability_margins(undetermined, certify=True), None, None, None)
-    assert found.margins.evidence == "withheld"
-    figures = {**survey.figures, "velocity": found}
+    result = LoopFigures(loop, None, stability_margins(undetermined, certify=True), None, None, None)
+    assert result.margins.evidence == "withheld"
+    figures = {**survey.figures, "velocity": result}
     made = margins.section(figures)
     assert made["status"] == "warn"
     texts = [block["text"] for block in made["blocks"] if block["kind"] == "text"]
@@ -55,8 +55,8 @@ def test_a_withheld_margin_gives_its_reason(survey):
     assert (
         margins.evidence_words(figures) == "current loop and position loop certified, velocity loop withheld"
     )
-    assert loop_json(found)["evidence"] == "withheld"
-    assert loop_json(found)["evidence_reason"]
+    assert loop_json(result)["evidence"] == "withheld"
+    assert loop_json(result)["evidence_reason"]
 
 
 def test_without_being_asked_a_loop_takes_the_quick_way():
@@ -69,7 +69,7 @@ def test_without_being_asked_a_loop_takes_the_quick_way():
 def test_the_terminal_prints_the_evidence(capsys):
     assert main(["margins", "ilr33-amber", "--json"]) == 0
     loops = json.loads(capsys.readouterr().out)["loops"]
-    assert {found["evidence"] for found in loops.values()} == {"certified"}
+    assert {result["evidence"] for result in loops.values()} == {"certified"}
     assert main(["margins", "ilr33-amber"]) == 0
     line = next(line for line in capsys.readouterr().out.splitlines() if "Margins are" in line)
     assert line.split() == ["Margins", "are", "certified", "certified", "certified"]

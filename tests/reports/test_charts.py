@@ -114,9 +114,9 @@ def test_equal_axes_have_equal_units() -> None:
     svg = page_svg(chart, "f", "")
     units = []
     for key in "xy":
-        found = re.search(rf'data-{key}="lin ([^"]*)"', svg)
-        assert found is not None
-        low, high, a, b = map(float, found.group(1).split())
+        result = re.search(rf'data-{key}="lin ([^"]*)"', svg)
+        assert result is not None
+        low, high, a, b = map(float, result.group(1).split())
         assert low <= -1.0
         assert high >= 1.0
         units.append(abs(b - a) / (high - low))

@@ -61,11 +61,11 @@ def test_starting_up_imports_nothing_heavy() -> None:
 def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["margins", "--json"]) == 0
     captured = capsys.readouterr()
-    found = json.loads(captured.out)
+    result = json.loads(captured.out)
     assert captured.err == ""
-    assert found["passed"] is True
-    assert found["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
-    assert len(found["verdicts"]) == 12
+    assert result["passed"] is True
+    assert result["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
+    assert len(result["verdicts"]) == 12
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])

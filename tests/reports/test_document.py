@@ -45,9 +45,9 @@ def test_verdicts_are_counted_wherever_they_stand() -> None:
 def test_checks_and_requirements_are_told_apart() -> None:
     check = doc.verdict("d", "D", value=1.0, limit=2.0, unit="", distance=1.0, passed=True)
     parts = [*made()["sections"], doc.section("two", "Two", [doc.verdicts([check], what="checks")])]
-    found = summary(block for part in parts for block in doc.walk(part))
-    assert (found["failed"], found["total"]) == (1, 4)
-    assert verdict_words(found) == [
+    result = summary(block for part in parts for block in doc.walk(part))
+    assert (result["failed"], result["total"]) == (1, 4)
+    assert verdict_words(result) == [
         "1 of 3 requirements not met, 1 not judged",
         "1 of 1 checks by simulation passed",
     ]

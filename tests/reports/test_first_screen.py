@@ -31,18 +31,18 @@ def verdict(distance: float | None, limit: float | None, passed: bool | None = T
 
 
 def test_every_loop_shows_five_figures_and_the_distance_to_its_own_requirement(built: Built) -> None:
-    found = glance(built.document)
-    assert [row["loop"] for row in found["loops"]] == ["Current loop", "Velocity loop", "Position loop"]
+    result = glance(built.document)
+    assert [row["loop"] for row in result["loops"]] == ["Current loop", "Velocity loop", "Position loop"]
     items = {
         item["id"]: item for part in built.document["sections"][1:2] for item in part["blocks"][0]["items"]
     }
-    for name, row in zip(("current", "velocity", "position"), found["loops"], strict=True):
+    for name, row in zip(("current", "velocity", "position"), result["loops"], strict=True):
         cells = {cell["label"]: cell for cell in row["figures"]}
         assert len(cells) == 5
         wanted = items[f"phase-margin/{name}"]
         assert cells["Phase margin"]["value"] == wanted["value"]
         assert cells["Phase margin"]["distance"] == wanted["distance"]
-    bandwidths = [row["figures"][-1]["distance"] for row in found["loops"]]
+    bandwidths = [row["figures"][-1]["distance"] for row in result["loops"]]
     assert bandwidths[:2] == [None, None]  # required of the position loop only
     assert bandwidths[2] == pytest.approx(items["position-bandwidth"]["value"] - 15.0)
 
@@ -59,9 +59,9 @@ def test_the_weakest_point_is_nearest_to_its_limit_as_part_of_it(
     pairs: list[tuple[float | None, float]], wanted: str
 ) -> None:
     items = [verdict(distance, limit) for distance, limit in pairs]
-    found = weakest(items)
-    assert found is not None
-    assert found["label"] == wanted
+    result = weakest(items)
+    assert result is not None
+    assert result["label"] == wanted
 
 
 def test_without_a_judged_requirement_there_is_no_weakest_point() -> None:
@@ -100,8 +100,8 @@ def test_what_to_watch_leads_to_a_section(built: Built) -> None:
 
 
 def test_a_report_without_simulation_says_so() -> None:
-    found = glance(design_report(load_design("emps")))["findings"]
-    assert any("No simulation stands behind this report" in item["text"] for item in found)
+    result = glance(design_report(load_design("emps")))["findings"]
+    assert any("No simulation stands behind this report" in item["text"] for item in result)
 
 
 def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> None:
@@ -112,10 +112,10 @@ def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> Non
     ]
     document = design_report(replace(design, requirements=tuple(strict)))
     assert document["sections"][0]["status"] == "fail"
-    found = glance(document)["weakest"]
-    assert found["passed"] is False
-    assert found["label"] == "Velocity loop: phase margin"  # 73.7 of 90: 18 % beyond
-    assert "18 % beyond its limit" in found["words"]
+    result = glance(document)["weakest"]
+    assert result["passed"] is False
+    assert result["label"] == "Velocity loop: phase margin"  # 73.7 of 90: 18 % beyond
+    assert "18 % beyond its limit" in result["words"]
 
 
 def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built) -> None:

@@ -104,35 +104,35 @@ def spot(figure: Locator, across: float, up: float, panel: int = 0) -> tuple[flo
 
 def read(figure: Locator) -> dict[str, float]:
     """Read the read-out as numbers by name."""
-    found = {}
+    result = {}
     for row in figure.locator(".readout tr").all():
         _, name, value = (cell.inner_text() for cell in row.locator("td").all())
         number = re.match(r"[−\d.]+", value)
         if number:
-            found[name] = float(number.group().replace("−", "-"))
-    return found
+            result[name] = float(number.group().replace("−", "-"))
+    return result
 
 
 @pytest.mark.parametrize("across", [0.2, 0.5, 0.83])
 def test_the_read_out_is_the_curve(page: Page, across: float) -> None:
     figure = chart(page, 0)
     page.mouse.move(*spot(figure, across, 0.5))
-    found = read(figure)
+    result = read(figure)
     hz = 0.1 * 10.0 ** (4.0 * across)
-    assert found["frequency"] == pytest.approx(hz, rel=5e-3)
-    w = 2.0 * math.pi * found["frequency"]
-    assert found["magnitude"] == pytest.approx(20.0 * math.log10(GAIN / w), abs=0.02)
-    assert found["phase"] == pytest.approx(-90.0 - math.degrees(w * DELAY_S), abs=max(0.05, 1e-3 * w))
+    assert result["frequency"] == pytest.approx(hz, rel=5e-3)
+    w = 2.0 * math.pi * result["frequency"]
+    assert result["magnitude"] == pytest.approx(20.0 * math.log10(GAIN / w), abs=0.02)
+    assert result["phase"] == pytest.approx(-90.0 - math.degrees(w * DELAY_S), abs=max(0.05, 1e-3 * w))
 
 
 def test_the_nyquist_figure_names_the_frequency_of_its_nearest_point(page: Page) -> None:
     figure = chart(page, 1)
     page.mouse.move(*spot(figure, 0.63, 0.3))
-    found = read(figure)
-    w = 2.0 * math.pi * found["frequency"]
+    result = read(figure)
+    w = 2.0 * math.pi * result["frequency"]
     value = GAIN / (1j * w) * complex(math.cos(w * DELAY_S), -math.sin(w * DELAY_S))
-    assert found["real part of L"] == pytest.approx(value.real, abs=5e-3)
-    assert found["imaginary part of L"] == pytest.approx(value.imag, abs=5e-3)
+    assert result["real part of L"] == pytest.approx(value.real, abs=5e-3)
+    assert result["imaginary part of L"] == pytest.approx(value.imag, abs=5e-3)
 
 
 def test_zoom_keeps_the_point_under_the_pointer_and_the_read_out_true(page: Page) -> None:
@@ -264,8 +264,8 @@ def test_a_curve_can_be_given_new_values(page: Page) -> None:
         "(root, detail) => root.dispatchEvent(new CustomEvent('chart:redraw', { detail }))", values
     )
     page.mouse.move(*spot(figure, 0.3, 0.5))
-    found = read(figure)
-    assert found["parabola: angle"] == pytest.approx(1.0 + 0.5 * found["time"], abs=2e-3)
+    result = read(figure)
+    assert result["parabola: angle"] == pytest.approx(1.0 + 0.5 * result["time"], abs=2e-3)
 
 
 def test_nothing_of_a_design_becomes_markup_and_no_other_script_runs(page: Page) -> None:

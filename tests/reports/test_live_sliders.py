@@ -70,9 +70,9 @@ def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "",
 @pytest.fixture
 def page(browser: Browser, made: Path) -> Iterator[Page]:
     trouble: list[str] = []
-    found = opened(browser, made, trouble)
-    yield found
-    found.context.close()
+    result = opened(browser, made, trouble)
+    yield result
+    result.context.close()
     assert trouble == []
 
 
@@ -97,10 +97,10 @@ def read(page: Page) -> dict[str, dict[str, float]]:
         ".now td[data-figure]",
         "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
     )
-    found: dict[str, dict[str, float]] = {}
+    result: dict[str, dict[str, float]] = {}
     for loop, name, value in cells:
-        found.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
-    return found
+        result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
+    return result
 
 
 def command_line(path: Path) -> dict[str, Any]:
@@ -111,10 +111,10 @@ def command_line(path: Path) -> dict[str, Any]:
 
 
 def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
-    for loop, found in loops.items():
+    for loop, result in loops.items():
         for name, key in FIGURES.items():
-            if found[key] is not None and math.isfinite(found[key]):
-                assert ours[loop][name] == pytest.approx(found[key], rel=1e-9, abs=1e-9), (loop, name)
+            if result[key] is not None and math.isfinite(result[key]):
+                assert ours[loop][name] == pytest.approx(result[key], rel=1e-9, abs=1e-9), (loop, name)
 
 
 def saved(page: Page, path: Path) -> Path:
@@ -265,11 +265,11 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path: Path) -> 
 def test_nothing_of_a_design_becomes_markup(browser: Browser, tmp_path: Path) -> None:
     design = replace(load_design(DESIGN), name=HOSTILE, title=HOSTILE, description=HOSTILE)
     trouble: list[str] = []
-    found = opened(browser, written(design, tmp_path), trouble)
-    type_value(found, "control.position.gain", 130.0)
-    found.click('[data-do="file"]')
-    assert HOSTILE.split("\u202e")[0].split('"')[0] in found.input_value(".sheet textarea")
-    found.context.close()
+    result = opened(browser, written(design, tmp_path), trouble)
+    type_value(result, "control.position.gain", 130.0)
+    result.click('[data-do="file"]')
+    assert HOSTILE.split("\u202e")[0].split('"')[0] in result.input_value(".sheet textarea")
+    result.context.close()
     assert trouble == []
 
 

@@ -42,15 +42,15 @@ def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:  
     A, B, C = (np.array(matrices[key]) for key in "ABC")
     n, ticks = A.shape[0], round(table["sampling_period"] / design.controller.period_s)
     step = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * table["sampling_period"])
-    x, angle, found = np.full(n, 1e-5), 0.0, []
+    x, angle, result = np.full(n, 1e-5), 0.0, []
     for _ in range(round(seconds / table["sampling_period"])):
-        found.append(float(abs(C @ x)[0]))
+        result.append(float(abs(C @ x)[0]))
         command, before = -factor * float((C @ x)[0]), angle
         for _ in range(ticks):
             angle = drive.step(command)
         x = step[:n, :n] @ x + step[:n, n] * before
-    third = len(found) // 3
-    return max(found[2 * third :]) / max(found[third : 2 * third])
+    third = len(result) // 3
+    return max(result[2 * third :]) / max(result[third : 2 * third])
 
 
 @needs_compiler
@@ -61,9 +61,9 @@ def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
     tmp_path: Path,
 ) -> None:
     loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
-    found = stability_margins(loop.open_loop)
-    assert found.stable
-    limit = min(margin.ratio for margin in found.gain_margins if margin.ratio > 1.0)
+    result = stability_margins(loop.open_loop)
+    assert result.stable
+    limit = min(margin.ratio for margin in result.gain_margins if margin.ratio > 1.0)
     assert loop.period_s == table["sampling_period"]
     assert (
         growth(table, 0.97 * limit, tmp_path, seconds) < 1.0 < growth(table, 1.03 * limit, tmp_path, seconds)

@@ -172,10 +172,10 @@ def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
 
 
 def test_ids_are_unique(built: Built) -> None:
-    found = read(built.page.read_text(encoding="utf-8"))
-    ids = [attributes["id"] for _, attributes in found.tags if attributes.get("id")]
+    result = read(built.page.read_text(encoding="utf-8"))
+    ids = [attributes["id"] for _, attributes in result.tags if attributes.get("id")]
     assert len(ids) == len(set(ids))
-    targets = {str(attributes["href"])[1:] for tag, attributes in found.tags if tag == "a"}
+    targets = {str(attributes["href"])[1:] for tag, attributes in result.tags if tag == "a"}
     assert targets <= set(ids)
 
 
@@ -296,5 +296,5 @@ def test_limits_are_those_of_the_linear_onset(built: Built) -> None:
     design = load_design("ilr33-amber")
     loops = assemble_loops(design)
     for row in rows_of(built.document, "limits", "How far"):
-        found = onset(loops, [2 * math.pi * row["hz"]])
-        assert math.degrees(found.amplitude_rad[0]) == pytest.approx(row["amplitude"], rel=5e-3)
+        result = onset(loops, [2 * math.pi * row["hz"]])
+        assert math.degrees(result.amplitude_rad[0]) == pytest.approx(row["amplitude"], rel=5e-3)

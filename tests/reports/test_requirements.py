@@ -32,9 +32,9 @@ def test_every_shipped_requirement_is_met_with_its_distance(amber: Design) -> No
     by_id = {verdict.id: verdict for verdict in verdicts}
     assert len(by_id) == len(verdicts) == 12
     margins = stability_margins(assemble_loops(amber).velocity.open_loop)
-    found = by_id["phase-margin/velocity"]
-    assert found.value == pytest.approx(margins.phase_margin_deg, rel=1e-12)
-    assert found.distance == pytest.approx(margins.phase_margin_deg - 45.0, rel=1e-12)
+    result = by_id["phase-margin/velocity"]
+    assert result.value == pytest.approx(margins.phase_margin_deg, rel=1e-12)
+    assert result.distance == pytest.approx(margins.phase_margin_deg - 45.0, rel=1e-12)
 
 
 def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
@@ -103,25 +103,25 @@ def test_what_is_not_known_is_refused_by_name(amber: Design, keys: dict[str, Any
 
 
 def test_rate_and_current_at_8_Nm_follow_from_the_friction_of_table_1(amber: Design) -> None:
-    found = drive_figures(amber, 8.0)
+    result = drive_figures(amber, 8.0)
     torque = 2.25e-3 + 1.34e-3 * 8.0 + 5.25e-6 * 942.5
-    assert found.motor_current_A == pytest.approx(torque / 5.9e-3, rel=1e-12)
-    assert math.degrees(found.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)  # paper: 22.7 deg/s
-    assert found.rate_limit == "speed limit"
+    assert result.motor_current_A == pytest.approx(torque / 5.9e-3, rel=1e-12)
+    assert math.degrees(result.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)  # paper: 22.7 deg/s
+    assert result.rate_limit == "speed limit"
 
 
 def test_a_low_supply_limits_the_speed(amber: Design) -> None:
     low = replace(amber, limits=replace(amber.limits, voltage_V=4.0))
-    found = drive_figures(low, 0.0)
-    speed = found.output_rate_rad_s * 2376.0
+    result = drive_figures(low, 0.0)
+    speed = result.output_rate_rad_s * 2376.0
     current = (2.25e-3 + 5.25e-6 * speed) / 5.9e-3
-    assert found.rate_limit == "voltage"
+    assert result.rate_limit == "voltage"
     assert 0.055 * current + 5.9e-3 * speed == pytest.approx(4.0, rel=1e-12)
 
 
 def test_a_drive_that_friction_holds_does_not_move(amber: Design) -> None:
-    found = drive_figures(amber, 1e3)
-    assert (found.output_rate_rad_s, found.acceleration_rad_s2, found.rate_limit) == (0.0, 0.0, "force")
+    result = drive_figures(amber, 1e3)
+    assert (result.output_rate_rad_s, result.acceleration_rad_s2, result.rate_limit) == (0.0, 0.0, "force")
 
 
 def test_a_load_that_is_no_number_is_refused(amber: Design) -> None:

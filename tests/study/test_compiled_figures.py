@@ -50,8 +50,8 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
             truth = stability_margins(getattr(loops, loop).open_loop)
             gain, phase = figures.gain_crossovers(loop), figures.phase_crossovers(loop)
             assert figures.stable(loop)[k] == truth.stable
-            assert gain.found[k] == len(truth.phase_margins)
-            assert phase.found[k] == len(truth.gain_margins)
+            assert gain.crossings[k] == len(truth.phase_margins)
+            assert phase.crossings[k] == len(truth.gain_margins)
             for j, margin in enumerate(truth.phase_margins):
                 assert gain.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
                 assert gain.margin[k, j] == pytest.approx(margin.deg, rel=1e-6, abs=1e-6)

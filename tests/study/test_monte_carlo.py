@@ -66,10 +66,10 @@ def test_same_bits_whatever_the_chunks_and_threads(study, design, tmp_path):
 
 def test_a_single_sample_is_replayed_by_its_number(study, design):
     sampler = sampler_of(design, seed=3)
-    found = replay(design, sampler, 617)
+    result = replay(design, sampler, 617)
     row = pq.read_table(study.folder / "samples-0000000400-400.parquet").slice(217, 1).to_pylist()[0]
     assert row["sample"] == 617
-    assert found.friction.load_coefficient == row["parameter.friction.load_coefficient"]
+    assert result.friction.load_coefficient == row["parameter.friction.load_coefficient"]
     alone = SampleTask(design, sampler).evaluate(617, 1)
     assert alone["position.phase_margin"][0] == row["position.phase_margin"]
 

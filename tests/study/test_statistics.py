@@ -20,22 +20,22 @@ def blocks_of(values, size):
     np.array([3.0]),
 ])  # fmt: skip
 def test_quantiles_are_the_order_statistics(values):
-    found = column_statistics(blocks_of(values, 4096), {"x": "1"})["x"]
+    result = column_statistics(blocks_of(values, 4096), {"x": "1"})["x"]
     ranks = np.clip(np.ceil(np.array(SHARES) * len(values)).astype(int) - 1, 0, None)
-    assert found.quantiles == tuple(np.sort(values)[ranks])
-    assert found.mean == pytest.approx(values.mean(), rel=1e-12)
-    assert found.count == sum(found.counts) == len(values)
+    assert result.quantiles == tuple(np.sort(values)[ranks])
+    assert result.mean == pytest.approx(values.mean(), rel=1e-12)
+    assert result.count == sum(result.counts) == len(values)
     if len(values) > 1:
-        assert found.std == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-300)
+        assert result.std == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-300)
 
 
 def test_infinite_and_missing_figures_are_counted_apart():
     values = np.concatenate([np.arange(90.0), np.full(10, np.inf), np.full(100, np.nan)])
-    found = column_statistics(blocks_of(values, 7), {"x": "dB"})["x"]
-    assert (found.count, found.missing, found.infinite) == (200, 100, 10)
-    assert found.quantiles[SHARES.index(0.5)] == 49.0  # of the 100 that are defined
-    assert found.quantiles[SHARES.index(0.95)] == np.inf
-    assert found.maximum == 89.0
+    result = column_statistics(blocks_of(values, 7), {"x": "dB"})["x"]
+    assert (result.count, result.missing, result.infinite) == (200, 100, 10)
+    assert result.quantiles[SHARES.index(0.5)] == 49.0  # of the 100 that are defined
+    assert result.quantiles[SHARES.index(0.95)] == np.inf
+    assert result.maximum == 89.0
 
 
 @pytest.mark.parametrize("probability", [0.003, 0.05, 0.5, 0.97])

@@ -30,9 +30,9 @@ from analyses.tuning import (
     symmetric_optimum,
     tune,
 )
+from analyses.tuning.asked_requirement import read_requirement
 from analyses.tuning.problem import loop_requirements, problem_of
 from analyses.tuning.program import maximise
-from analyses.tuning.wishes import read_requirement
 
 PERIOD, DELAY = 1e-3, 3e-3
 QUICK = TuningSettings(curve=False, check=False)
@@ -72,8 +72,8 @@ def test_the_closed_form_of_the_integrator_is_the_margin_engine_s():
     gain = integrator_gain(60.0, DELAY, PERIOD)
     design = integrator()
     changed = replace(design, controller=replace(design.controller, position=PositionLoop(gain=gain)))
-    found = stability_margins(assemble_loops(changed).position.open_loop)
-    assert found.phase_margin_deg == pytest.approx(60.0, abs=1e-4)
+    result = stability_margins(assemble_loops(changed).position.open_loop)
+    assert result.phase_margin_deg == pytest.approx(60.0, abs=1e-4)
     assert integrator_gain(60.0, 0.01) * 0.01 == pytest.approx(math.pi / 6)
 
 

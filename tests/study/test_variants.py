@@ -42,14 +42,14 @@ axes = [{ parameter = "limits.voltage", values = ["11 V", "13 V"] },
 samples = 50
 """,
     )
-    found = load_study(path)
+    result = load_study(path)
     assert is_study(path)
-    assert [v.name for v in found.variants][:2] == ["slow", "motor.resistance = 0.05 ohm"]
-    assert [v.design.motor.resistance_ohm for v in found.variants[1:4]] == [0.05, 0.055, 0.06]
-    assert [(v.design.limits.voltage_V, v.design.total_ratio) for v in found.variants[4:]] == [
+    assert [v.name for v in result.variants][:2] == ["slow", "motor.resistance = 0.05 ohm"]
+    assert [v.design.motor.resistance_ohm for v in result.variants[1:4]] == [0.05, 0.055, 0.06]
+    assert [(v.design.limits.voltage_V, v.design.total_ratio) for v in result.variants[4:]] == [
         (11, 66 * 30), (11, 66 * 40), (13, 66 * 30), (13, 66 * 40)]  # fmt: skip
-    assert found.monte_carlo.samples == 50
-    assert len({v.slug for v in found.all}) == len(found.all)
+    assert result.monte_carlo.samples == 50
+    assert len({v.slug for v in result.all}) == len(result.all)
 
 
 def test_another_motor_file_replaces_the_motor(tmp_path):
@@ -58,7 +58,7 @@ def test_another_motor_file_replaces_the_motor(tmp_path):
         'torque_constant = "11.8 mN*m/A"\nback_emf_constant = "11.8 mV*s/rad"\n'
     )
     (tmp_path / "m.toml").write_text("[motor]\n" + motor)
-    found = load_study(
+    result = load_study(
         study(
             tmp_path,
             HEAD
@@ -70,11 +70,11 @@ override = { "limits.voltage" = "24 V" }
 """,
         )
     )
-    assert found.variants[0].design.motor.inductance_H == pytest.approx(24e-6)
+    assert result.variants[0].design.motor.inductance_H == pytest.approx(24e-6)
 
 
 def test_requirements_of_the_study_replace_those_with_the_same_id(tmp_path):
-    found = load_study(
+    result = load_study(
         study(
             tmp_path,
             HEAD
@@ -87,7 +87,7 @@ minimum = "10 dB"
 """,
         )
     )
-    limits = {r.id: r.minimum for r in found.base.design.requirements}
+    limits = {r.id: r.minimum for r in result.base.design.requirements}
     assert limits["gain-margin"] == 10.0
     assert limits["phase-margin"] == 45.0
 
@@ -114,9 +114,9 @@ def test_a_refused_variant_is_kept_where_others_shall_go_on(tmp_path):
                  "[[variant]]\nname = 'good'\n")  # fmt: skip
     with pytest.raises(InputError, match="bad"):
         load_study(path)
-    found = load_study(path, keep_going=True)
-    assert [v.design is None for v in found.variants] == [True, False]
-    assert "motor.resistance" in found.variants[0].error
+    result = load_study(path, keep_going=True)
+    assert [v.design is None for v in result.variants] == [True, False]
+    assert "motor.resistance" in result.variants[0].error
 
 
 @pytest.mark.parametrize("name", ["../../etc", "a/b", "a" * 500, "‮", "..", "", "CON\n", "Ä"])
@@ -236,8 +236,8 @@ def test_one_page_says_which_variant_is_best_for_what_and_what_it_gives_up(compa
 
 def test_slopes_are_those_of_closed_forms():
     """Gain margin falls 0.0864 dB per percent of the loop's own gain (20 log10 1.01)."""
-    found = sensitivities(load_design("ilr33-amber"), ["control.velocity.gain"])
-    entry = next(e for e in found.entries if e.figure == "velocity.gain_margin")
+    result = sensitivities(load_design("ilr33-amber"), ["control.velocity.gain"])
+    entry = next(e for e in result.entries if e.figure == "velocity.gain_margin")
     assert entry.per_percent == pytest.approx(-20 * math.log10(math.e) / 100, rel=1e-5)
     assert entry.low - entry.high == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
 
@@ -276,9 +276,9 @@ def test_the_ledger_of_every_design_stands_side_by_side(tmp_path):
 
     change = 'override = { "control.velocity.gain" = "0.2 A*s/rad" }\n'
     path = study(tmp_path, HEAD + '[[variant]]\nname = "faster"\n' + change)
-    found = compare(load_study(path), validation=True)
-    assert len(found.base.ledger) == len(found.variants[0].ledger) > 20
-    (made,) = sections(found)
+    result = compare(load_study(path), validation=True)
+    assert len(result.base.ledger) == len(result.variants[0].ledger) > 20
+    (made,) = sections(result)
     assert made["status"] == "pass"
     first = made["blocks"][0]
     assert [column["label"] for column in first["columns"]] == ["Prediction", "Unit", "ilr33-amber", "faster"]

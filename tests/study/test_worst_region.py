@@ -53,8 +53,8 @@ def test_two_normal_parameters_stay_in_their_ellipse_and_reach_its_ends(r: float
         [np.column_stack([edge, 0.0 * edge]), np.column_stack([edge, 0.0 * edge + 1.0]),
          np.column_stack([0.0 * edge, edge]), np.column_stack([0.0 * edge + 1.0, edge])]
     )  # fmt: skip
-    found = region.values(faces)
-    widest = np.max(found[:, 0] / 2.0 - (found[:, 1] - 10.0) / 0.5)
+    result = region.values(faces)
+    widest = np.max(result[:, 0] / 2.0 - (result[:, 1] - 10.0) / 0.5)
     assert widest == pytest.approx(np.sqrt(squared * 2.0 * (1.0 - r)), rel=1e-4 if r > 0.0 else 0.1)
     drawn = values[free][:200]
     np.testing.assert_allclose(region.values(region.cube(drawn)), drawn, rtol=1e-7, atol=1e-9)

@@ -530,12 +530,12 @@ def stable_drives(first: int, count: int, kind: str = "") -> Iterator[Design]:
     kind : {"", "wider", "full"}
         Of `random_drive`, or `full_drive`.
     """
-    seed, found = first, 0
-    while found < count:
+    seed, result = first, 0
+    while result < count:
         design = full_drive(seed) if kind == "full" else random_drive(seed, wider=kind == "wider")
         seed += 1
         if is_stable(design):
-            found += 1
+            result += 1
             yield design
 
 
@@ -621,7 +621,7 @@ def validate_one(design: Design, settings: Settings, tally: Tally) -> None:
     judged = [row for row in found.ledger if row.passed is not None]
     border = None if found.large_signals is None else found.large_signals.border
     wrong_border = border is not None and border.passed is False
-    diverges = found.conditional is not None and found.conditional.found
+    diverges = found.conditional is not None and found.conditional.diverges
     stages = "".join(stage[0] for stage in design.controller.stages)
     verdict = "pass" if found.passed else "FAIL"
     print(

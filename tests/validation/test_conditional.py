@@ -33,7 +33,7 @@ def look(design: Design) -> Conditional:
 
 
 @pytest.fixture(scope="module")
-def found() -> Conditional:
+def conditional() -> Conditional:
     return look(load_design(str(FILE)))
 
 
@@ -45,56 +45,56 @@ def test_the_margins_are_healthy() -> None:
         assert margins.phase_margin_deg > 45.0
 
 
-def test_it_is_found(found: Conditional) -> None:
-    assert found.found
-    assert found.hidden
-    assert found.limiter == "voltage"
-    assert found.threshold_rad < found.full_deflection_rad
+def test_it_is_found(conditional: Conditional) -> None:
+    assert conditional.diverges
+    assert conditional.hidden
+    assert conditional.limiter == "voltage"
+    assert conditional.threshold_rad < conditional.full_deflection_rad
 
 
-def test_the_threshold_is_where_steps_stop_settling(found: Conditional) -> None:
+def test_the_threshold_is_where_steps_stop_settling(conditional: Conditional) -> None:
     """By the simulator itself, outside the validator: below it settles, above it runs away."""
     design = load_design(str(FILE))
     for factor, settles in ((0.99, True), (1.01, False)):
-        size = factor * found.threshold_rad
+        size = factor * conditional.threshold_rad
         run = simulate(design, commands.step(size), 20.0)
         left = np.abs(run.output_angle_rad[-2000:] - size).max() / size
         assert bool(left < 0.05) is settles
         assert bool(left > 1.0) is not settles
 
 
-def test_lower_gain_margin_by_hand(found: Conditional) -> None:
+def test_lower_gain_margin_by_hand(conditional: Conditional) -> None:
     """Three integrations, two zeros: stable above g = 1/(w_v (Tn + 1/Kv)), w_v = Kp kM/J, by Routh.
 
     The delay-free cubic with an ideal current loop; the sampled loop with its current loop lies within 3 %.
     """
     by_hand = 1.0 / (2.5 * 0.02 / 1e-3 * (0.041 + 1.0 / 24.0))
-    assert found.margins["i_ref"].gain_lower == pytest.approx(by_hand, rel=0.05)
+    assert conditional.margins["i_ref"].gain_lower == pytest.approx(by_hand, rel=0.05)
 
 
-def test_the_describing_function_predicts_the_limit_cycle(found: Conditional) -> None:
+def test_the_describing_function_predicts_the_limit_cycle(conditional: Conditional) -> None:
     """First harmonic only: amplitude and frequency of the limit cycle within a fifth."""
-    (one,) = found.predictions
+    (one,) = conditional.predictions
     assert one.point == "i_ref"
     assert one.limit == pytest.approx(12.0)
     assert not one.antiwindup
     assert saturation_gain(one.amplitude / one.limit) == pytest.approx(one.gain_lower, rel=1e-9)
-    assert found.oscillation_hz == pytest.approx(one.frequency_hz, rel=0.2)
-    assert found.oscillation_rad == pytest.approx(one.output_rad, rel=0.2)
+    assert conditional.oscillation_hz == pytest.approx(one.frequency_hz, rel=0.2)
+    assert conditional.oscillation_rad == pytest.approx(one.output_rad, rel=0.2)
 
 
 def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
     """More voltage: the border moves away. The current limited where the velocity controller knows: none."""
     design = load_design(str(FILE))
     more = replace(design, limits=replace(design.limits, voltage_V=48.0))
-    assert not look(more).found
+    assert not look(more).diverges
     known = replace(design, limits=replace(design.limits, peak_current_A=12.0, voltage_V=200.0))
     kept = look(known)
-    assert not kept.found
+    assert not kept.diverges
     assert all(one.antiwindup for one in kept.predictions)
 
 
-def test_the_threshold_grows_with_the_limit(found: Conditional) -> None:
+def test_the_threshold_grows_with_the_limit(conditional: Conditional) -> None:
     """A scaling truth: frictionless, all amplitudes go with the limit."""
     design = load_design(str(FILE))
     smooth = replace(design, friction=replace(design.friction, dry_torque_Nm=0.0))
@@ -105,9 +105,9 @@ def test_the_threshold_grows_with_the_limit(found: Conditional) -> None:
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps"])
 def test_shipped_designs_settle_from_every_step(name: str) -> None:
-    found = look(load_design(name))
-    assert not found.found
-    assert found.next_rad is None
+    result = look(load_design(name))
+    assert not result.diverges
+    assert result.next_rad is None
 
 
 def test_the_validator_says_so() -> None:

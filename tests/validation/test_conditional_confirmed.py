@@ -98,7 +98,7 @@ def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
     """A spring: P controllers end at r K/(K + c), no divergence; the limit holds beyond tau_max/c."""
     damped = Friction(viscous_Nms_rad=0.02)
     settled, _ = look(replace(unstable(-40.0, full_rad=1.2), friction=damped))
-    assert not settled.found
+    assert not settled.diverges
     found, _ = look(replace(unstable(-40.0), friction=damped))
     stiffness = 0.5 * 1.6 * 30.0 * 10.0**2
     assert found.ending == "is held by a limit"
@@ -109,4 +109,4 @@ def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
 @pytest.mark.parametrize("seed", [361, 372])
 def test_standing_beside_the_target_is_no_divergence(seed: int) -> None:
     """A spring against P controllers (361); a step below one count of the output's encoder (372)."""
-    assert not look(full_drive(seed))[0].found
+    assert not look(full_drive(seed))[0].diverges

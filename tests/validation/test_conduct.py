@@ -18,8 +18,8 @@ CONDITIONAL = Path(__file__).with_name("conditional.toml")
 
 
 def test_a_step_that_settles_is_ok() -> None:
-    found = conduct(simulate(AMBER, commands.step(0.02), 0.4))
-    assert (found.status, found.detail) == ("ok", "")
+    result = conduct(simulate(AMBER, commands.step(0.02), 0.4))
+    assert (result.status, result.detail) == ("ok", "")
 
 
 def test_a_step_cut_on_its_way_has_not_settled() -> None:
@@ -30,9 +30,9 @@ def test_a_linear_loop_beyond_its_gain_margin_keeps_oscillating() -> None:
     """Limits hold the growing oscillation: it neither dies out nor runs away."""
     control = AMBER.controller
     loud = replace(AMBER, controller=replace(control, position=replace(control.position, gain=4000.0)))
-    found = conduct(simulate(loud, commands.step(0.05), 0.5))
-    assert found.status == "keeps oscillating"
-    assert "Hz" in found.detail
+    result = conduct(simulate(loud, commands.step(0.05), 0.5))
+    assert result.status == "keeps oscillating"
+    assert "Hz" in result.detail
 
 
 def test_a_drive_that_is_held_sits_on_its_limit() -> None:
@@ -40,8 +40,8 @@ def test_a_drive_that_is_held_sits_on_its_limit() -> None:
     limits = AMBER.limits
     most = limits.peak_current_A * (AMBER.motor.torque_constant_Nm_A or 0.0)
     stuck = replace(AMBER, friction=replace(AMBER.friction, dry_torque_Nm=2.0 * most))
-    found = conduct(simulate(stuck, commands.step(0.1), 0.5))
-    assert found.status == "sits on a limit"
+    result = conduct(simulate(stuck, commands.step(0.1), 0.5))
+    assert result.status == "sits on a limit"
 
 
 def test_following_a_sine_is_no_oscillation() -> None:

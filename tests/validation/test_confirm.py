@@ -52,9 +52,9 @@ def confirmed(name: str) -> tuple[Confirmation, ...]:
     [("ilr33-amber", 16), ("ilr33-amber-multirate", 16), ("ctms-motor-position", 6), ("emps", 11)],
 )
 def test_every_margin_is_found_in_time(name: str, count: int) -> None:
-    found = confirmed(name)
-    assert len(found) == count
-    for item in found:
+    result = confirmed(name)
+    assert len(result) == count
+    for item in result:
         where = f"{item.loop} {item.kind}"
         assert item.passed, where
         if item.predicted is None:
@@ -67,10 +67,10 @@ def test_every_margin_is_found_in_time(name: str, count: int) -> None:
 
 def test_margins_of_the_baseline_are_the_known_ones() -> None:
     """Against an independent computation of this drive (its J is 1 % larger), not against our own loops."""
-    found = {(item.loop, item.kind): item for item in confirmed("ilr33-amber")}
+    result = {(item.loop, item.kind): item for item in confirmed("ilr33-amber")}
     known_db = {"current": 9.4, "velocity": 23.3, "position": 27.1}
     for loop, db in known_db.items():
-        border = found[loop, "gain up"].border
+        border = result[loop, "gain up"].border
         assert border.value is not None
         assert 20.0 * np.log10(border.value) == pytest.approx(db, abs=0.3)
 
@@ -124,9 +124,9 @@ def test_amplitude_and_friction_move_the_border() -> None:
         name: settling_ticks_of(loop.closed_loop, setups[name].hold_ticks, "")
         for name, loop in loops.present.items()
     }
-    found = release_margins(setups, confirmed("ilr33-amber"), settle)
-    assert len(found) == 36
-    by = {(item.loop, item.kind, item.size, item.friction_on): item for item in found}
+    result = release_margins(setups, confirmed("ilr33-amber"), settle)
+    assert len(result) == 36
+    by = {(item.loop, item.kind, item.size, item.friction_on): item for item in result}
     for loop in ("current", "velocity"):
         for kind in ("gain up", "delay"):
             for size in ("small", "medium", "large"):
@@ -155,8 +155,8 @@ def test_a_drive_that_drifts_away_has_a_lower_margin_at_no_frequency() -> None:
         slope * motor.resistance_ohm
         / (N**2 * motor.torque_constant_Nm_A * control.velocity.gain * control.position.gain)
     )  # fmt: skip
-    found = validate(design, SMALL).loops["position"].confirmed
-    item = next(one for one in found if one.kind == "gain down")
+    result = validate(design, SMALL).loops["position"].confirmed
+    item = next(one for one in result if one.kind == "gain down")
     assert item.predicted == pytest.approx(border, rel=1e-9)
     assert item.predicted_hz == 0.0
     assert item.border.value == pytest.approx(border, rel=1e-6)
@@ -177,8 +177,8 @@ def test_a_loop_that_alternates_at_its_border() -> None:
     a = exp(-motor.resistance_ohm * Ts / motor.inductance_H)
     b = (1.0 - a) / motor.resistance_ohm
     at_minus_one = control.gain_V_A * (1.0 + 0.5 * Ts / control.integral_time_s)
-    found = validate(design, SMALL).loops["current"].confirmed
-    item = next(one for one in found if one.kind == "gain up")
+    result = validate(design, SMALL).loops["current"].confirmed
+    item = next(one for one in result if one.kind == "gain up")
     assert item.predicted_hz == pytest.approx(0.5 / Ts)
     assert item.border.value == pytest.approx((1.0 + a) / (b * at_minus_one), rel=1e-6)
     assert item.border.frequency_hz == pytest.approx(0.5 / Ts)

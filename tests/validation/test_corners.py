@@ -58,8 +58,8 @@ def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -
     every = np.array(list(product((-1.0, 1.0), repeat=4))).T
     values = {path: nominal[path] + width[path] * every[k] for k, path in enumerate(kept)}  # type: ignore[operator]
     at_chosen = {path: np.append(values[path], chosen.get(path, nominal[path])) for path in kept}
-    found = population_figures(Population(design, at_chosen, 17), design)
-    margin = np.min([v for name, v in found.items() if name.endswith(f".{quantity}")], axis=0)
+    result = population_figures(Population(design, at_chosen, 17), design)
+    margin = np.min([v for name, v in result.items() if name.endswith(f".{quantity}")], axis=0)
     assert margin[16] == pytest.approx(margin[:16].min(), rel=1e-9)
 
 

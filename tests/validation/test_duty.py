@@ -30,83 +30,83 @@ def test_rms_current_of_a_slow_sine_is_friction_and_inertia() -> None:
     """kM i = Tc sgn(w) + Cv w + J dw/dt of the motion itself, the drive following (rigid, no load path)."""
     design = load_design("ilr33-amber")
     A, f, M = 0.02, 1.0, 4.0
-    found = duty(design, Asked.of(design, amplitude_rad=A, frequency_hz=f, load_Nm=M))
+    result = duty(design, Asked.of(design, amplitude_rad=A, frequency_hz=f, load_Nm=M))
     t = np.linspace(0.0, 1.0, 20001)
     w = A * design.total_ratio * 2 * pi * f * np.cos(2 * pi * f * t)
     dw = -A * design.total_ratio * (2 * pi * f) ** 2 * np.sin(2 * pi * f * t)
     dry = design.friction.dry_torque_Nm + design.friction.load_coefficient * M
     torque = dry * np.sign(w) + design.friction.viscous_Nms_rad * w + design.inertia_kgm2 * dw
-    assert found.rms_A == pytest.approx(np.sqrt(np.mean(torque**2)) / 5.9e-3, rel=0.02)
-    assert found.passed == (found.rms_A <= 4.0)
+    assert result.rms_A == pytest.approx(np.sqrt(np.mean(torque**2)) / 5.9e-3, rel=0.02)
+    assert result.passed == (result.rms_A <= 4.0)
 
 
 def test_motion_and_rest_add_by_their_squares() -> None:
     design = load_design("joint")
-    found = duty(design, Asked.of(design, share=0.25, cycle_s=8.0, load_Nm=30.0))
-    assert found.rms_A**2 == pytest.approx(
-        0.25 * found.moving_rms_A**2 + 0.75 * found.holding_A**2, rel=1e-12
+    result = duty(design, Asked.of(design, share=0.25, cycle_s=8.0, load_Nm=30.0))
+    assert result.rms_A**2 == pytest.approx(
+        0.25 * result.moving_rms_A**2 + 0.75 * result.holding_A**2, rel=1e-12
     )
-    assert found.holding_A > 0.0
+    assert result.holding_A > 0.0
 
 
 def test_the_overload_state_is_that_of_the_running_drive() -> None:
     """A short protection, so that a few seconds settle it: the largest state of the last period."""
     design = with_overrides(load_design("joint"), {"limits.peak_time": "50 ms"})
     asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=2.0, load_Nm=30.0)
-    found = duty(design, asked)
-    assert found.overload is not None
-    assert found.overload.acts_after_s is None
+    result = duty(design, asked)
+    assert result.overload is not None
+    assert result.overload.acts_after_s is None
     drive, states = Drive(design, load_Nm=30.0), []
-    Ts, ticks = design.controller.period_s, len(found.time_s)
+    Ts, ticks = design.controller.period_s, len(result.time_s)
     for k in range(8 * ticks):
         drive.step(0.3 * sin(2 * pi * k / ticks))
         states.append(drive.value("overload"))
     assert Ts * ticks == pytest.approx(0.5)
-    assert found.overload.peak == pytest.approx(max(states[-ticks:]), rel=1e-3)
+    assert result.overload.peak == pytest.approx(max(states[-ticks:]), rel=1e-3)
 
 
 def test_the_protection_acts_when_the_running_drive_says() -> None:
     design = with_overrides(load_design("joint"), {"limits.peak_time": "1 s"})
     asked = Asked.of(design, amplitude_rad=0.4, frequency_hz=2.0, load_Nm=60.0)
-    found = duty(design, asked)
-    assert found.overload is not None
-    assert not found.passed
-    drive, k, ticks = Drive(design, load_Nm=60.0), 0, len(found.time_s)
+    result = duty(design, asked)
+    assert result.overload is not None
+    assert not result.passed
+    drive, k, ticks = Drive(design, load_Nm=60.0), 0, len(result.time_s)
     while drive.value("overloaded") == 0.0 and k < 100 * ticks:
         drive.step(0.4 * sin(2 * pi * k / ticks))
         k += 1
-    assert found.overload.acts_after_s == pytest.approx(k * design.controller.period_s, abs=1.01 * 0.5)
+    assert result.overload.acts_after_s == pytest.approx(k * design.controller.period_s, abs=1.01 * 0.5)
 
 
 @pytest.mark.parametrize("rms", [1.0, 6.0, 11.0, 13.0])
 def test_temperature_against_its_equation(rms: float) -> None:
     """tau dT/dt = Ta - T + Rth R I^2 (1 + alpha (T - Tref)), by an integrator; at 13 A it runs away."""
     design = with_overrides(load_design("fin"), HOT)
-    found = heating(design, rms)
-    assert found is not None
+    result = heating(design, rms)
+    assert result is not None
     P = 2.0 * 1.0 * rms**2
     course = solve_ivp(
-        lambda _, T: (25.0 - T + P * (1 + 0.00393 * (T - 25.0))) / 60.0, (0.0, found.time_s[-1]), [25.0],
-        t_eval=found.time_s, rtol=1e-10, atol=1e-9,
+        lambda _, T: (25.0 - T + P * (1 + 0.00393 * (T - 25.0))) / 60.0, (0.0, result.time_s[-1]), [25.0],
+        t_eval=result.time_s, rtol=1e-10, atol=1e-9,
     )  # fmt: skip
-    assert found.temperature_degC == pytest.approx(course.y[0], rel=1e-7)
+    assert result.temperature_degC == pytest.approx(course.y[0], rel=1e-7)
     if P * 0.00393 >= 1.0:
-        assert found.final_degC == inf
+        assert result.final_degC == inf
     else:
-        assert found.final_degC == pytest.approx(25.0 + P / (1.0 - 0.00393 * P), rel=1e-12)
-    if found.limit_after_s is not None:
-        assert np.interp(found.limit_after_s, found.time_s, found.temperature_degC) == pytest.approx(
+        assert result.final_degC == pytest.approx(25.0 + P / (1.0 - 0.00393 * P), rel=1e-12)
+    if result.limit_after_s is not None:
+        assert np.interp(result.limit_after_s, result.time_s, result.temperature_degC) == pytest.approx(
             125.0, rel=5e-3
         )
-    assert (found.limit_after_s is None) == (found.final_degC <= 125.0)
+    assert (result.limit_after_s is None) == (result.final_degC <= 125.0)
 
 
 def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
     design = with_overrides(load_design("fin"), {**HOT, "temperature.resistance_coefficient": "0 1/K"})
-    found = heating(design, 5.0)
-    assert found is not None
+    result = heating(design, 5.0)
+    assert result is not None
     k = 100
-    assert found.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-found.time_s[k] / 60.0)))
+    assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
 
 
 def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,8 +12,8 @@ from actuator_lti import load_design
 from actuator_lti.design.model import Coupling, Design, Gravity, Load
 from analyses.validation import validate
 from analyses.validation.bench import on_the_bench
+from analyses.validation.bias_motion import bias_motion_at, on_its_stand
 from analyses.validation.reading import crossing, maximum
-from analyses.validation.riding import on_its_stand, riding_at
 from analyses.validation.rig import rig, small_rig
 from analyses.validation.tolerance import allowed
 from reports.sections.validation import section
@@ -31,10 +31,10 @@ def without(*stages: str) -> Design:
     [(("position",), 25), (("position", "velocity"), 14), (("position", "velocity", "current"), 1)],
 )
 def test_a_drive_of_any_outermost_stage_is_judged(left_out: tuple[str, ...], least: int) -> None:
-    found = validate(without(*left_out), SMALL)
-    judged = [row.quantity for row in found.ledger if row.passed is not None]
-    assert found.failed == ()
-    assert found.passed
+    validation = validate(without(*left_out), SMALL)
+    judged = [row.quantity for row in validation.ledger if row.passed is not None]
+    assert validation.failed == ()
+    assert validation.passed
     assert len(judged) >= least
     assert "response_command" in judged
 
@@ -44,8 +44,8 @@ def test_a_wrong_speed_drive_is_caught() -> None:
     wrong = without("position")
     motor = wrong.motor
     wrong = replace(wrong, motor=replace(motor, inductance_H=1.001 * (motor.inductance_H or 0.0)))
-    found = validate(without("position"), SMALL, model=wrong)
-    assert {(row.loop, row.quantity) for row in found.failed} >= {
+    validation = validate(without("position"), SMALL, model=wrong)
+    assert {(row.loop, row.quantity) for row in validation.failed} >= {
         ("current", "response_open"),
         ("velocity", "response_open"),
         ("velocity", "response_command"),
@@ -53,8 +53,8 @@ def test_a_wrong_speed_drive_is_caught() -> None:
 
 
 def test_nothing_judged_is_no_pass() -> None:
-    found = validate(without("position", "velocity", "current"), SMALL)
-    nothing = replace(found, ledger=())
+    validation = validate(without("position", "velocity", "current"), SMALL)
+    nothing = replace(validation, ledger=())
     assert not nothing.judged
     assert not nothing.passed
     assert "nothing judged" in str(nothing)
@@ -80,11 +80,11 @@ def test_a_ride_begins_in_its_steady_state(loop: str) -> None:
     row = setup.row()
     row["ticks"] = 2000
     run = row.trajectory()
-    assert setup.ride.speed_rad_s > 0.0
-    assert setup.ride.coupling_Nm > 0.0
+    assert setup.bias.speed_rad_s > 0.0
+    assert setup.bias.coupling_Nm > 0.0
     assert run.events == 0
-    assert np.ptp(run.motor_speed_rad_s) < 1e-9 * setup.ride.speed_rad_s
-    assert np.ptp(run.current_A) < 1e-9 * setup.ride.current_A
+    assert np.ptp(run.motor_speed_rad_s) < 1e-9 * setup.bias.speed_rad_s
+    assert np.ptp(run.current_A) < 1e-9 * setup.bias.current_A
 
 
 def test_gravity_is_held_while_the_drive_stands() -> None:
@@ -102,10 +102,10 @@ def test_gravity_is_held_while_the_drive_stands() -> None:
 def test_the_current_of_a_ride_is_that_of_the_friction() -> None:
     """Equations (2) and (9) by hand, with an AC motor: kM is its torque per rms ampere over sqrt(3/2)."""
     ac = replace(AMBER, motor=replace(AMBER.motor, constants="rms-line"))
-    found, friction = riding_at(ac, 50.0), AMBER.friction
+    result, friction = bias_motion_at(ac, 50.0), AMBER.friction
     kM = (AMBER.motor.torque_constant_Nm_A or 0.0) / np.sqrt(1.5)
     torque = friction.dry_torque_Nm + 50.0 * friction.viscous_Nms_rad + friction.offset_torque_Nm
-    assert found.current_A == pytest.approx(torque / kM, rel=1e-12)
+    assert result.current_A == pytest.approx(torque / kM, rel=1e-12)
 
 
 @pytest.mark.parametrize("points", [6, 10, 20])

@@ -55,8 +55,8 @@ def test_hard_over_is_the_motor_on_the_bus() -> None:
     A[1, 3] = -design.friction.dry_torque_Nm / J
     moving = np.array([start * U / m.resistance_ohm, 0.0, 0.0, 1.0])
     asked = Asked.of(design)
-    found = failures(design, asked).case("hard-over")
-    for level, seen in ((asked.deflection_rad, found.to_deflection_s), (asked.stop_rad, found.to_stop_s)):
+    result = failures(design, asked).case("hard-over")
+    for level, seen in ((asked.deflection_rad, result.to_deflection_s), (asked.stop_rad, result.to_stop_s)):
         time = brentq(lambda t, level=level: (expm(A * t) @ moving)[2] / N - level, 1e-4, 1.0)
         assert seen == pytest.approx(d + rest + time, rel=1e-5)  # a tick is a line
 
@@ -68,9 +68,9 @@ def test_an_open_phase_leaves_the_output_to_its_load() -> None:
     )
     M, N = 20.0, design.total_ratio
     rate = (M / N - design.friction.dry_torque_Nm) / design.inertia_kgm2 / N
-    found = failures(design, Asked.of(design, load_Nm=M)).case("open-phase")
-    k = int(np.searchsorted(found.time_s, 0.2))
-    assert found.deflection_rad[k] == pytest.approx(0.5 * rate * found.time_s[k] ** 2, rel=5e-3)
+    result = failures(design, Asked.of(design, load_Nm=M)).case("open-phase")
+    k = int(np.searchsorted(result.time_s, 0.2))
+    assert result.deflection_rad[k] == pytest.approx(0.5 * rate * result.time_s[k] ** 2, rel=5e-3)
 
 
 def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
@@ -78,13 +78,13 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     design = with_overrides(
         load_design("joint"), {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
     )
-    found = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
-    assert abs(found.deflection_rad).max() < 1e-6
-    k = np.searchsorted(found.time_s, 0.15)
-    assert found.current_A[k] == pytest.approx(15.0, rel=1e-3)
-    assert found.protected_s is not None
-    assert 0.1 < found.protected_s < 0.2  # a little was used on the way
-    assert found.current_A[-1] == pytest.approx(6.0, rel=1e-3)
+    result = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
+    assert abs(result.deflection_rad).max() < 1e-6
+    k = np.searchsorted(result.time_s, 0.15)
+    assert result.current_A[k] == pytest.approx(15.0, rel=1e-3)
+    assert result.protected_s is not None
+    assert 0.1 < result.protected_s < 0.2  # a little was used on the way
+    assert result.current_A[-1] == pytest.approx(6.0, rel=1e-3)
 
 
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
@@ -110,9 +110,9 @@ def test_a_frozen_sensor_runs_away_at_the_speed_of_its_error() -> None:
     """P position, perfect inner loops: rate Kv e, the error e constant (friction off the scale of 0.5 %)."""
     design = with_overrides(load_design("ballscrew"), {"control.position.sensor": "output"})
     asked = Asked.of(design)
-    found = failures(design, asked).case("frozen-sensor")
+    result = failures(design, asked).case("frozen-sensor")
     rate = design.controller.position_loop.gain * asked.deflection_rad
-    seen = np.gradient(found.deflection_rad, found.time_s)[-200:].mean()
+    seen = np.gradient(result.deflection_rad, result.time_s)[-200:].mean()
     assert seen == pytest.approx(rate, rel=0.02)
 
 
@@ -131,8 +131,8 @@ def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
 
 
 def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
-    found = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
-    made = section(found)
+    result = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
+    made = section(result)
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
     assert "Lost sensor" in draw_svg("failures", figure["data"], page=False)
     assert "until it is detected" in made["result"]
@@ -147,9 +147,9 @@ def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
     design = load_design("ilr33-amber")
     speed = replace(design, controller=replace(design.controller, position=None))
-    found = failures(speed, Asked.of(speed, watched_s=0.1))
-    assert [case.name for case in found.cases] == ["hard-over", "open-phase"]
-    assert found.left_out["jam"] == "the drive has no position loop"
+    result = failures(speed, Asked.of(speed, watched_s=0.1))
+    assert [case.name for case in result.cases] == ["hard-over", "open-phase"]
+    assert result.left_out["jam"] == "the drive has no position loop"
     with pytest.raises(InputError, match="beyond the stop"):
         Asked.of(design, stop_rad=0.1, deflection_rad=0.2)
 

@@ -23,12 +23,12 @@ def amber() -> Design:
 def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
     """EMPS: (Fc -+ offset)/(gtau kv kp), forward and backward; the simulator agrees to its grid of 0.2 %."""
     design = load_design("emps")
-    found = friction_effects(design).points[0].threshold
-    assert found is not None
+    result = friction_effects(design).points[0].threshold
+    assert result is not None
     stiffness = 35.15065 * 243.45 * 160.18
-    assert found.static.forward_rad == pytest.approx((20.3935 - 3.1648) / stiffness, rel=1e-12)
-    assert found.static.backward_rad == pytest.approx((20.3935 + 3.1648) / stiffness, rel=1e-12)
-    assert found.simulated_rad == pytest.approx(found.static.forward_rad, rel=1.1 * found.resolution)
+    assert result.static.forward_rad == pytest.approx((20.3935 - 3.1648) / stiffness, rel=1e-12)
+    assert result.static.backward_rad == pytest.approx((20.3935 + 3.1648) / stiffness, rel=1e-12)
+    assert result.simulated_rad == pytest.approx(result.static.forward_rad, rel=1.1 * result.resolution)
 
 
 def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
@@ -47,11 +47,11 @@ def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
 def test_a_small_step_waits_for_the_integral(amber: Design) -> None:
     """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N)."""
     for point in friction_effects(amber).points:
-        found = point.threshold
-        assert found is not None
+        result = point.threshold
+        assert result is not None
         expected = point.dry_torque_Nm / (5.9e-3 * 0.12 * 120.0 * 2376.0)
-        assert found.static.forward_rad == pytest.approx(expected, rel=1e-12)
-        for wait in found.waiting:
+        assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
+        for wait in result.waiting:
             assert wait.simulated_s is not None
             assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
 
@@ -87,17 +87,17 @@ def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway
     }
     design = with_values(amber, values)
     threshold = static_threshold(design).forward_rad
-    found = limit_cycles(design, 0.0, 0.05 * design.validation.full_deflection_rad, threshold)
-    assert found.confirmations == ()
-    assert (found.hunting is not None) == hunts
-    assert found.described == (not hunts)
-    if found.hunting is not None:
-        assert not found.hunting.limited
-        assert found.hunting.hunting_hz == pytest.approx(9.59, rel=0.01)
-        assert found.hunting.hunting_rad == pytest.approx(0.0991 * threshold, rel=0.02)
+    cycles = limit_cycles(design, 0.0, 0.05 * design.validation.full_deflection_rad, threshold)
+    assert cycles.confirmations == ()
+    assert (cycles.hunting is not None) == hunts
+    assert cycles.described == (not hunts)
+    if cycles.hunting is not None:
+        assert not cycles.hunting.limited
+        assert cycles.hunting.hunting_hz == pytest.approx(9.59, rel=0.01)
+        assert cycles.hunting.hunting_rad == pytest.approx(0.0991 * threshold, rel=0.02)
         # the same from any start: it is a cycle, not a slow decay
         again = settle(design, 0.0, 3.0 * threshold)
-        assert again.hunting_rad == pytest.approx(found.hunting.hunting_rad, rel=0.01)
+        assert again.hunting_rad == pytest.approx(cycles.hunting.hunting_rad, rel=0.01)
 
 
 @pytest.mark.parametrize("load", [0.0, 8.0])
@@ -106,9 +106,9 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(
 ) -> None:
     """Speed gain beyond its margin: small motion dies out, large grows; border to 15 %, frequency to 8 %."""
     design = with_values(amber, {"control.velocity.gain": 3.0})
-    found = limit_cycles(design, load, 1e-4)
-    assert len(found.confirmations) == 1
-    item = found.confirmations[0]
+    cycles = limit_cycles(design, load, 1e-4)
+    assert len(cycles.confirmations) == 1
+    item = cycles.confirmations[0]
     assert not item.foreseen.stable
     assert item.confirmed
     assert item.simulated_ratio == pytest.approx(1.0, rel=0.15)
@@ -154,9 +154,9 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design
 
 
 def test_not_applicable_without_dry_friction() -> None:
-    found = friction_effects(load_design("ctms-motor-position"))
-    assert found.points == ()
-    assert "no dry friction" in found.reason
+    result = friction_effects(load_design("ctms-motor-position"))
+    assert result.points == ()
+    assert "no dry friction" in result.reason
 
 
 def test_too_weak_to_move() -> None:

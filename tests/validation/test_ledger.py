@@ -10,9 +10,9 @@ import pytest
 
 from actuator_lti import InputError, load_design
 from analyses.validation import QUICK, Settings, Validation, validate
+from analyses.validation.bias_motion import bias_motion, bias_motion_at
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
-from analyses.validation.riding import ride, riding_at
 from reports.cli.main import main
 from reports.sections.validation import section
 
@@ -35,25 +35,25 @@ EACH = {
 
 
 @pytest.fixture(scope="module", params=["ilr33-amber", "ilr33-amber-multirate"])
-def found(request: pytest.FixtureRequest) -> Validation:
+def validation(request: pytest.FixtureRequest) -> Validation:
     return validate(load_design(request.param), OWN)
 
 
-def rows(found: Validation, loop: str, quantity: str) -> list[Entry]:
-    return [row for row in found.ledger if row.loop == loop and row.quantity == quantity]
+def rows(validation: Validation, loop: str, quantity: str) -> list[Entry]:
+    return [row for row in validation.ledger if row.loop == loop and row.quantity == quantity]
 
 
-def test_every_prediction_of_every_loop_is_there_and_holds(found: Validation) -> None:
+def test_every_prediction_of_every_loop_is_there_and_holds(validation: Validation) -> None:
     for loop in ("current", "velocity", "position"):
-        judged = {row.quantity for row in found.ledger if row.loop == loop and row.passed is not None}
+        judged = {row.quantity for row in validation.ledger if row.loop == loop and row.passed is not None}
         assert judged >= EACH, loop
-    assert found.failed == ()
-    assert found.passed
+    assert validation.failed == ()
+    assert validation.passed
 
 
-def test_figures_are_met_far_within_their_tolerances(found: Validation) -> None:
+def test_figures_are_met_far_within_their_tolerances(validation: Validation) -> None:
     """The simulator is the sampled loop while nothing acts: frequencies 1e-5, dB 1e-3, samples the same."""
-    for row in found.ledger:
+    for row in validation.ledger:
         if row.passed is None or row.difference is None:
             continue
         if row.unit == "Hz":
@@ -64,8 +64,8 @@ def test_figures_are_met_far_within_their_tolerances(found: Validation) -> None:
             assert abs(row.difference) < 1e-9, row
 
 
-def test_what_cannot_hold_is_shown_with_the_reason(found: Validation) -> None:
-    shown = [row for row in found.ledger if row.passed is None]
+def test_what_cannot_hold_is_shown_with_the_reason(validation: Validation) -> None:
+    shown = [row for row in validation.ledger if row.passed is None]
     assert shown
     assert all(row.reason for row in shown)
     steps = [row for row in shown if row.quantity == "rise_time"]
@@ -74,15 +74,15 @@ def test_what_cannot_hold_is_shown_with_the_reason(found: Validation) -> None:
     assert all(row.measured > row.predicted for row in steps)
 
 
-def test_from_rest_dry_friction_costs_bandwidth(found: Validation) -> None:
-    (at_rest,) = (row for row in rows(found, "position", "bandwidth") if row.passed is None)
+def test_from_rest_dry_friction_costs_bandwidth(validation: Validation) -> None:
+    (at_rest,) = (row for row in rows(validation, "position", "bandwidth") if row.passed is None)
     assert "dry friction" in at_rest.reason
     assert at_rest.measured < 0.99 * at_rest.predicted
 
 
-def test_break_points_are_swept_with_all_loops_closed(found: Validation) -> None:
-    assert set(found.points) == {"u", "i_ref"}
-    for point in found.points.values():
+def test_break_points_are_swept_with_all_loops_closed(validation: Validation) -> None:
+    assert set(validation.points) == {"u", "i_ref"}
+    for point in validation.points.values():
         assert point.sweep.valid.all()
         assert point.open_errors.worst_gain_db < 1e-4
 
@@ -106,9 +106,9 @@ def test_a_failure_is_a_failure() -> None:
     assert not_judged("position", "overshoot", "%", 1.0, 2.0, "a limit").passed is None
 
 
-def test_a_failed_entry_fails_the_validation(found: Validation) -> None:
+def test_a_failed_entry_fails_the_validation(validation: Validation) -> None:
     bad = entry("position", "bandwidth", "Hz", 10.0, Reading(10.02, 0.01 / 3.0))
-    worse = replace(found, ledger=(*found.ledger, bad))
+    worse = replace(validation, ledger=(*validation.ledger, bad))
     assert worse.failed == (bad,)
     assert not worse.passed
 
@@ -125,11 +125,11 @@ def test_an_unstable_loop_is_reported_not_raised() -> None:
 
 def test_ride_leaves_room_everywhere() -> None:
     design = load_design("ilr33-amber")
-    limits, found = design.limits, ride(design)
-    assert 0.2 * limits.speed_rad_s < found.speed_rad_s <= 0.4 * limits.speed_rad_s
-    assert found.voltage_V <= 0.4 * limits.voltage_V
-    assert found.current_A <= 0.4 * limits.peak_current_A
-    at_speed = riding_at(design, 100.0)
+    limits, result = design.limits, bias_motion(design)
+    assert 0.2 * limits.speed_rad_s < result.speed_rad_s <= 0.4 * limits.speed_rad_s
+    assert result.voltage_V <= 0.4 * limits.voltage_V
+    assert result.current_A <= 0.4 * limits.peak_current_A
+    at_speed = bias_motion_at(design, 100.0)
     friction = design.friction
     assert at_speed.current_A * 5.9e-3 == pytest.approx(
         friction.dry_Nm(0.0) + 100.0 * friction.viscous(), rel=1e-12
@@ -143,8 +143,8 @@ def test_a_drive_that_cannot_ride_is_refused() -> None:
         validate(stuck, QUICK)
 
 
-def test_sections_put_the_verdicts_first(found: Validation) -> None:
-    made = section(found)
+def test_sections_put_the_verdicts_first(validation: Validation) -> None:
+    made = section(validation)
     assert made[0]["id"] == "validation"
     assert made[0]["blocks"][0]["kind"] == "verdicts"
     assert all(item["passed"] for item in made[0]["blocks"][0]["items"])

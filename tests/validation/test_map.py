@@ -35,15 +35,15 @@ def amber_map(amber: Design) -> AmplitudeMap:
 @pytest.mark.parametrize("hz", [0.3, 7.77, 100.0, 389.0])
 def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
     design = load_design("ilr33-amber-multirate")
-    found, every = tone(hz, design), design.controller.position.every
-    updates = found.ticks // every
-    assert found.ticks == updates * every
-    assert math.gcd(found.cycles, updates) == 1
+    result, every = tone(hz, design), design.controller.position.every
+    updates = result.ticks // every
+    assert result.ticks == updates * every
+    assert math.gcd(result.cycles, updates) == 1
     assert updates >= LEAST_UPDATES
-    assert found.cycles / (found.ticks * design.controller.period_s) == pytest.approx(
-        found.frequency_hz, rel=1e-12
+    assert result.cycles / (result.ticks * design.controller.period_s) == pytest.approx(
+        result.frequency_hz, rel=1e-12
     )
-    assert found.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
+    assert result.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
 
 
 def test_amplitudes_hold_those_that_the_design_asks_for(amber: Design) -> None:
@@ -194,16 +194,16 @@ def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
     assert border is not None
     assert border.largest_error is None
     assert border.passed
-    found = amplitude_map(design, loops, counts=(6, 4))
-    assert found.share(("speed", "acceleration", "current", "voltage")) == 0.0
+    map_ = amplitude_map(design, loops, counts=(6, 4))
+    assert map_.share(("speed", "acceleration", "current", "voltage")) == 0.0
 
 
 def test_an_unstable_loop_has_no_border_and_still_a_map(amber: Design) -> None:
     design = with_values(amber, {"control.position.gain": 6000.0})
     loops = assemble_loops(design)
     assert check_border(design, loops, count=3) is None
-    found = amplitude_map(design, loops, counts=(6, 4))
-    assert np.isfinite(found.response).all()
+    map_ = amplitude_map(design, loops, counts=(6, 4))
+    assert np.isfinite(map_.response).all()
 
 
 def test_every_start_has_a_state_of_the_linear_drive() -> None:

@@ -87,15 +87,15 @@ CAUGHT_BY: tuple[tuple[Callable[[Design], Design], set[str]], ...] = (
 
 @pytest.mark.parametrize(("wrong", "quantities"), CAUGHT_BY, ids=[item[0].__name__ for item in CAUGHT_BY])
 def test_a_wrong_model_is_caught(wrong: Callable[[Design], Design], quantities: set[str]) -> None:
-    found = validate(AMBER, SMALL, model=wrong(AMBER))
-    assert not found.passed
-    assert {row.quantity for row in found.failed} >= quantities
+    validation = validate(AMBER, SMALL, model=wrong(AMBER))
+    assert not validation.passed
+    assert {row.quantity for row in validation.failed} >= quantities
 
 
 def test_the_right_model_is_not() -> None:
-    found = validate(AMBER, SMALL)
-    assert found.failed == ()
-    assert len([row for row in found.ledger if row.passed]) >= 36
+    validation = validate(AMBER, SMALL)
+    assert validation.failed == ()
+    assert len([row for row in validation.ledger if row.passed]) >= 36
 
 
 @pytest.mark.parametrize("limit", ["speed_rad_s", "peak_current_A", "voltage_V", "acceleration_rad_s2"])

@@ -19,20 +19,20 @@ FULL = (16, 24, 36, 47, 200, 201)  # feed-forward, filters, AC motors, couplings
 @pytest.mark.parametrize(("seed", "wider"), [*((s, False) for s in RIGID), *((s, True) for s in WIDER)])
 def test_a_random_stable_drive_has_no_false_failure(seed: int, wider: bool) -> None:
     with isolated() as missing:
-        found = validate(random_drive(seed, wider=wider), replace(TRIAL, seconds=120.0))
+        validation = validate(random_drive(seed, wider=wider), replace(TRIAL, seconds=120.0))
     assert not missing
-    assert found.failed == ()
-    assert all(row.reason for row in found.ledger if row.passed is None)
+    assert validation.failed == ()
+    assert all(row.reason for row in validation.ledger if row.passed is None)
 
 
 @pytest.mark.parametrize("seed", FULL)
 def test_a_random_drive_with_every_feature_has_no_false_failure(seed: int) -> None:
     with isolated() as missing:
-        found = validate(full_drive(seed), replace(TRIAL, seconds=120.0))
+        validation = validate(full_drive(seed), replace(TRIAL, seconds=120.0))
     assert not missing
-    assert found.failed == ()
-    assert found.judged
-    assert all(row.reason for row in found.ledger if row.passed is None)
+    assert validation.failed == ()
+    assert validation.judged
+    assert all(row.reason for row in validation.ledger if row.passed is None)
 
 
 def test_a_part_is_cut_when_its_share_is_used_up() -> None:

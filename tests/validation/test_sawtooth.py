@@ -22,20 +22,20 @@ from analyses.large_signal.sawtooth import sawtooth
 
 def test_h1_rate_limit() -> None:
     """Reference case H1: 10 deg, 5 Hz, 150 deg/s."""
-    found = rate_limited(10.0, 2.0 * math.pi * 5.0, 150.0)
+    result = rate_limited(10.0, 2.0 * math.pi * 5.0, 150.0)
     assert onset_frequency_rad_s(10.0, 150.0) / (2.0 * math.pi) == pytest.approx(2.3873, abs=5e-5)
-    assert found.regime == "triangle"
-    assert found.peak == pytest.approx(7.5)
-    assert found.gain == pytest.approx(0.607927, abs=5e-7)
-    assert 20.0 * math.log10(found.gain) == pytest.approx(-4.3230, abs=5e-5)
-    assert found.lag_deg == pytest.approx(41.4096, abs=5e-5)
+    assert result.regime == "triangle"
+    assert result.peak == pytest.approx(7.5)
+    assert result.gain == pytest.approx(0.607927, abs=5e-7)
+    assert 20.0 * math.log10(result.gain) == pytest.approx(-4.3230, abs=5e-5)
+    assert result.lag_deg == pytest.approx(41.4096, abs=5e-5)
 
 
 def test_h2_acceleration_limit() -> None:
     """Reference case H2: 20 000 deg/s2 at 20 Hz."""
-    found = acceleration_limited(20_000.0, 20.0)
-    assert found.peak == pytest.approx(1.5625)
-    assert found.fundamental == pytest.approx(1.6126, abs=5e-5)
+    result = acceleration_limited(20_000.0, 20.0)
+    assert result.peak == pytest.approx(1.5625)
+    assert result.fundamental == pytest.approx(1.6126, abs=5e-5)
 
 
 def test_the_regimes_join() -> None:
@@ -61,11 +61,11 @@ def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
     design = with_values(load_design("ilr33-amber"), {"limits.speed": 94.25})
     rate = 94.25 / design.total_ratio
     hz = x * rate / (2.0 * math.pi * design.validation.full_deflection_rad)
-    found = sawtooth(design, frequency_hz=hz)
-    assert found.applicable
-    assert found.passed
-    assert [run.load_Nm for run in found.runs] == [0.0, 8.0]
-    for run in found.runs:
+    result = sawtooth(design, frequency_hz=hz)
+    assert result.applicable
+    assert result.passed
+    assert [run.load_Nm for run in result.runs] == [0.0, 8.0]
+    for run in result.runs:
         assert run.formula.x == pytest.approx(x, rel=1e-3)
         assert abs(run.gain_error) < 0.01
         assert abs(run.lag_error_deg) < 1.0
@@ -76,22 +76,22 @@ def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
 
 def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
     """At 10 deg the gain is met, the lag comes 8 deg later: 27 ms of reversal, said and not judged."""
-    found = sawtooth(load_design("ilr33-amber"))
-    assert not found.applicable
-    assert found.passed is None
-    assert found.reversal_deg > 10.0
-    for run in found.runs:
+    result = sawtooth(load_design("ilr33-amber"))
+    assert not result.applicable
+    assert result.passed is None
+    assert result.reversal_deg > 10.0
+    for run in result.runs:
         assert abs(run.gain_error) < 0.01
-        assert 5.0 < run.lag_error_deg < found.reversal_deg
+        assert 5.0 < run.lag_error_deg < result.reversal_deg
 
 
 @pytest.mark.parametrize(
     ("name", "word"), [("emps", "no speed limit"), ("ctms-motor-position", "no speed limit")]
 )
 def test_not_applicable_with_a_reason(name: str, word: str) -> None:
-    found = sawtooth(load_design(name))
-    assert found.runs == ()
-    assert word in found.reason
+    result = sawtooth(load_design(name))
+    assert result.runs == ()
+    assert word in result.reason
 
 
 def test_a_load_that_keeps_the_drive_from_its_speed_limit() -> None:

@@ -89,10 +89,10 @@ def test_a_drive_that_cannot_move_says_so() -> None:
     weak = with_values(
         load_design("ilr33-amber"), {"limits.peak_current": 2.0, "limits.continuous_current": 2.0}
     )
-    found = specification(weak).capabilities
-    assert found[1].figures.output_rate_rad_s == 0.0
-    assert found[1].simulated_rate_rad_s is None
-    assert found[0].simulated_rate_rad_s == pytest.approx(found[0].figures.output_rate_rad_s, rel=1e-6)
+    result = specification(weak).capabilities
+    assert result[1].figures.output_rate_rad_s == 0.0
+    assert result[1].simulated_rate_rad_s is None
+    assert result[0].simulated_rate_rad_s == pytest.approx(result[0].figures.output_rate_rad_s, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -79,12 +79,12 @@ def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_m
 
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
 def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
-    found = stiffness(load_design(name))
-    assert len(found.checks) == 3
-    assert max(check.difference for check in found.checks) < 1e-6
-    assert found.agrees
-    wrong = replace(found.checks[0], foreseen_Nm_rad=1.00001 * found.checks[0].foreseen_Nm_rad)
-    assert not replace(found, checks=(wrong,)).agrees
+    result = stiffness(load_design(name))
+    assert len(result.checks) == 3
+    assert max(check.difference for check in result.checks) < 1e-6
+    assert result.agrees
+    wrong = replace(result.checks[0], foreseen_Nm_rad=1.00001 * result.checks[0].foreseen_Nm_rad)
+    assert not replace(result, checks=(wrong,)).agrees
 
 
 @pytest.mark.parametrize("play", [0.0, 2e-4, 3e-3])
@@ -108,15 +108,15 @@ def test_at_rest_play_softens_small_moments(moment: float) -> None:
     """A held motor, no friction: deflection b sgn(M) + M/k, so 1/K = 1/k + 4 b/(pi M) of the fundamental."""
     design = load_design("ilr33-amber-compliant")
     free = replace(design, load=replace(design.load, friction=None))
-    (found,) = stiffness_at_rest(free, [(0.5, moment)])
+    (result,) = stiffness_at_rest(free, [(0.5, moment)])
     by_hand = 1.0 / (1.0 / 1500.0 + 4 * 0.5e-3 / (np.pi * moment))
-    assert abs(found.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
+    assert abs(result.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
 
 
 def test_at_rest_dry_friction_holds_a_small_moment() -> None:
     """Less than the load's dry friction, 0.05 N m, does not move it in the gap."""
-    (found,) = stiffness_at_rest(load_design("ilr33-amber-compliant"), [(2.0, 0.04)])
-    assert found.seen_Nm_rad == complex(np.inf)
+    (result,) = stiffness_at_rest(load_design("ilr33-amber-compliant"), [(2.0, 0.04)])
+    assert result.seen_Nm_rad == complex(np.inf)
 
 
 def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:

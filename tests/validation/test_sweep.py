@@ -10,9 +10,9 @@ import pytest
 from actuator_lti import InputError, assemble_loops, load_design
 from analyses.validation import sweep as module
 from analyses.validation.at_rest import free_amplitude, sweep_from_rest
+from analyses.validation.bias_motion import bias_motion_at
 from analyses.validation.coherent import coherent, hold_factor
 from analyses.validation.response import sweep_errors
-from analyses.validation.riding import riding_at
 from analyses.validation.rig import Rig, rig
 from analyses.validation.sweep import frequency_response, stepped_sine
 from analyses.validation.tones import multisine_response
@@ -29,7 +29,7 @@ def test_every_loop_and_break_point_up_to_a_third_of_nyquist(name: str, loop: st
     linear = loops.present.get(loop) or loops.break_points[loop]
     sweep = frequency_response(design, loop, np.geomspace(3.0, 0.5 / 3.0 / linear.period_s, 25))
     assert sweep.valid.all()
-    assert sweep.speed_rad_s > 100.0  # it rides
+    assert sweep.speed_rad_s > 100.0  # on its bias motion
     for response in ("open_loop", "closed_loop", "sensitivity"):
         errors = sweep_errors(sweep, linear, response)
         # the simulator is exact: a hundredth of what is asked for, limited by what has not died out
@@ -61,18 +61,18 @@ def test_a_wrong_loop_is_seen() -> None:
 def test_plant_response_of_the_same_run() -> None:
     """L is the controller times the plant that the same run measured (single rate)."""
     design = load_design("ilr33-amber")
-    found = frequency_response(design, "velocity", [20.0, 80.0, 400.0])
+    result = frequency_response(design, "velocity", [20.0, 80.0, 400.0])
     velocity = design.controller.velocity
-    T, z = found.period_s, np.exp(2j * np.pi * found.frequency_hz * found.period_s)
+    T, z = result.period_s, np.exp(2j * np.pi * result.frequency_hz * result.period_s)
     controller = velocity.gain * (1.0 + T / velocity.integral_time_s * z / (z - 1.0))
-    assert np.abs(controller * found.plant / found.open_loop - 1.0).max() < 1e-6
+    assert np.abs(controller * result.plant / result.open_loop - 1.0).max() < 1e-6
 
 
 def test_amplitudes_keep_clear_of_limits_and_reversal() -> None:
     design = load_design("ilr33-amber")
     sweep = frequency_response(design, "position", np.geomspace(5.0, 300.0, 8))
     assert sweep.valid.all()
-    # large enough to be measured on a bench: the speed moves by several percent of the ride
+    # large enough to be measured on a bench: the speed moves by several percent of the bias motion
     moved = np.abs(sweep.plant * sweep.sensitivity) * sweep.amplitude
     assert moved.max() > 0.05 * sweep.speed_rad_s
 
@@ -102,16 +102,16 @@ def test_a_limit_that_acts_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_reversal_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Riding so slowly that a sine which no limit notices turns the rotor back."""
+    """A bias motion so slow that a sine which no limit notices turns the rotor back."""
     design = load_design("ilr33-amber")
-    setup = Rig(design, "position", riding_at(design, 20.0))
+    setup = Rig(design, "position", bias_motion_at(design, 20.0))
     monkeypatch.setattr(module, "EXTENSIONS", 0)
     loud = stepped_sine(setup, np.array([60.0]), 2000, amplitude=np.array([60.0]))
     assert loud.reason == ("speed reversal",)
 
 
 def test_distortion_is_that_of_the_signal() -> None:
-    """Linear on the ride: nothing but the fundamental; with a limit acting: harmonics."""
+    """Linear on the bias motion: nothing but the fundamental; with a limit acting: harmonics."""
     setup = rig(load_design("ilr33-amber"), "velocity")
     clean = stepped_sine(setup, np.array([50.0]), 2000)
     assert clean.distortion[0] < 1e-5
@@ -125,13 +125,13 @@ def test_distortion_is_that_of_the_signal() -> None:
 def test_multisine(name: str, loop: str) -> None:
     design = load_design(name)
     linear = assemble_loops(design).present[loop]
-    found = multisine_response(design, loop, np.geomspace(5.0, 0.5 / 3.0 / linear.period_s, 20), seed=3)
-    errors = sweep_errors(found, linear)
-    assert found.reason == ""
+    result = multisine_response(design, loop, np.geomspace(5.0, 0.5 / 3.0 / linear.period_s, 20), seed=3)
+    errors = sweep_errors(result, linear)
+    assert result.reason == ""
     assert errors.worst_gain_db < 1e-4
     assert errors.worst_phase_deg < 1e-3
-    assert found.coherence.min() > 1.0 - 1e-6
-    assert found.unsteadiness < 1e-6
+    assert result.coherence.min() > 1.0 - 1e-6
+    assert result.unsteadiness < 1e-6
 
 
 @pytest.mark.parametrize("name", DESIGNS)
@@ -140,29 +140,29 @@ def test_from_rest_the_describing_function_holds(name: str) -> None:
     design = load_design(name)
     f = np.geomspace(2.0, 40.0, 6)
     amplitude = free_amplitude(design, assemble_loops(design), f, 0.05)
-    found = sweep_from_rest(design, f, amplitude, 4000)
+    result = sweep_from_rest(design, f, amplitude, 4000)
     described, sliding = (
-        20.0 * np.log10(np.abs(found.measured / line)) for line in (found.described, found.sliding)
+        20.0 * np.log10(np.abs(result.measured / line)) for line in (result.described, result.sliding)
     )
     assert np.abs(described).max() < 0.02  # a describing function neglects harmonics
-    assert np.abs(np.degrees(np.angle(found.measured / found.described))).max() < 0.2
+    assert np.abs(np.degrees(np.angle(result.measured / result.described))).max() < 0.2
     assert np.abs(sliding).max() > 0.15
-    assert not any(found.limiter)
+    assert not any(result.limiter)
 
 
 def test_coherent_frequencies_fill_whole_ticks() -> None:
-    found = coherent(np.geomspace(0.7, 1600.0, 30), 1e-4, base_ticks=10)
-    assert (found.ticks % 10 == 0).all()
-    assert np.allclose(found.frequency_hz * found.ticks * 1e-4, found.cycles, rtol=1e-14)
-    assert np.abs(found.frequency_hz / np.geomspace(0.7, 1600.0, 30) - 1.0).max() < 1.3e-3
+    result = coherent(np.geomspace(0.7, 1600.0, 30), 1e-4, base_ticks=10)
+    assert (result.ticks % 10 == 0).all()
+    assert np.allclose(result.frequency_hz * result.ticks * 1e-4, result.cycles, rtol=1e-14)
+    assert np.abs(result.frequency_hz / np.geomspace(0.7, 1600.0, 30) - 1.0).max() < 1.3e-3
 
 
 def test_hold_factor_is_that_of_a_held_sine() -> None:
     k = np.arange(4000)
     held = np.sin(2.0 * np.pi * 35.0 * (k // 8 * 8) * 1e-4)
-    found = 2j * np.mean(held * np.exp(-2j * np.pi * 35.0 * k * 1e-4))
+    result = 2j * np.mean(held * np.exp(-2j * np.pi * 35.0 * k * 1e-4))
     # 4000 ticks hold 14 whole periods
-    assert abs(found - hold_factor(35.0, 1e-4, 8)[0]) < 1e-12
+    assert abs(result - hold_factor(35.0, 1e-4, 8)[0]) < 1e-12
 
 
 @pytest.mark.parametrize("bad", [[0.0], [-1.0], [6000.0], [float("nan")], []])

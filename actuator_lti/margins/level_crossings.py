@@ -120,7 +120,7 @@ def shifted(loop: RationalLoop, shift: float) -> ShiftedLoop:
     )
 
 
-class Circles:
+class LevelCrossings:
     """Candidates for the crossings of one loop; changes the shift where the first one does not do.
 
     Parameters

@@ -25,8 +25,8 @@ def read_requirement(words: str, design: Design) -> Requirement:
     Examples
     --------
     >>> from actuator_lti import load_design
-    >>> found = read_requirement("position.bandwidth >= 30 Hz", load_design("ilr33-amber"))
-    >>> found.id, found.minimum, found.unit
+    >>> result = read_requirement("position.bandwidth >= 30 Hz", load_design("ilr33-amber"))
+    >>> result.id, result.minimum, result.unit
     ('position-bandwidth-wanted', 30.0, 'Hz')
     """
     from actuator_lti.design.quantities import QUANTITIES, parse_limit

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 
-def hats(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
+def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
     """Piecewise linear functions, one for each knot: 1 there and 0 at the others; the last slope continues.
 
     Examples
     --------
-    >>> hats(np.array([0.0, 1.0, 4.0]), (0.0, 2.0, 3.0)).tolist()
+    >>> linear_basis(np.array([0.0, 1.0, 4.0]), (0.0, 2.0, 3.0)).tolist()
     [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, -1.0, 2.0]]
     """
     v = np.asarray(knots, dtype=float)

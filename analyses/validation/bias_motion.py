@@ -2,7 +2,8 @@
 
 Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
 at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive whose load
-changes with the angle cannot ride: it stands, without dry friction, and a constant moment holds gravity.
+changes with the angle has no bias motion: it stands, without dry friction, and a constant moment holds
+gravity.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from nonlinear import Rows
 from nonlinear.filters import section
 
 Value = float | npt.NDArray[np.float64]
-SHARE = 0.4  # of each limit that riding may take
+SHARE = 0.4  # of each limit that the bias motion may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
 SLOWEST = 1e-9  # of that
@@ -31,7 +32,7 @@ FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 
 @dataclass(frozen=True)
-class Ride:
+class BiasMotion:
     """A drive at constant speed: every signal of the cascade, motor side.
 
     Attributes
@@ -63,7 +64,7 @@ class Ride:
     extra_Nm: float = 0.0
 
     def load(self, rows: Rows) -> None:
-        """Write the constant moment and torque of the ride into rows."""
+        """Write the constant moment and torque of the bias motion into rows."""
         rows["load"] = self.load_Nm
         if self.extra_Nm:
             rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
@@ -74,13 +75,13 @@ class Ride:
         return self.friction_on or self.coupling_Nm != 0.0
 
     def operating(self, design: Design) -> Operating:
-        """Where the linear loops have to be taken to be those of this ride."""
+        """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
             return Operating(point="driving", speed_rad_s=self.speed_rad_s)
         return Operating(speed_rad_s=self.speed_rad_s)
 
 
-def ride(design: Design, load_Nm: float = 0.0) -> Ride:
+def bias_motion(design: Design, load_Nm: float = 0.0) -> BiasMotion:
     """Choose a constant speed that leaves room to every limit and stays far from reversal.
 
     The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
@@ -94,8 +95,8 @@ def ride(design: Design, load_Nm: float = 0.0) -> Ride:
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> found = ride(load_design("ilr33-amber"))
-    >>> found.speed_rad_s > 100.0, found.voltage_V < 0.5 * 12.0
+    >>> result = bias_motion(load_design("ilr33-amber"))
+    >>> result.speed_rad_s > 100.0, result.voltage_V < 0.5 * 12.0
     (True, True)
     """
     if has_to_stand(design):
@@ -106,10 +107,10 @@ def ride(design: Design, load_Nm: float = 0.0) -> Ride:
         loads = [load_Nm - part * whole for part in PRESSED]
     for share in (SHARE, MOST):
         for moment in loads:
-            found = _fastest(design, moment, share)
-            if found is not None:
-                return found
-    least, limits = riding_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
+            motion = _fastest(design, moment, share)
+            if motion is not None:
+                return motion
+    least, limits = bias_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
     if stuck or bent_about_rest(design):
         message = f"friction takes more than {1.0 if stuck else MOST:.0%} of the current or voltage limit"
@@ -151,7 +152,7 @@ def on_its_stand(design: Design) -> Design:
     return design if friction == design.friction else replace(design, friction=friction)
 
 
-def standing(design: Design) -> Ride:
+def standing(design: Design) -> BiasMotion:
     """At rest at zero without dry friction; a constant moment holds gravity and presses a coupling with play.
 
     The drive is one that `may_stand`, `on_its_stand`.
@@ -159,13 +160,13 @@ def standing(design: Design) -> Ride:
     load, coupling = design.load, design.coupling
     moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
     if coupling is None or coupling.play_rad == 0.0:
-        return Ride(0.0, 0.0, 0.0, False, load_Nm=moment)
+        return BiasMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
     twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
     passed = 1.0 if load.path == "back-drivable" else 0.0
     held = passed * coupling_Nm / design.ratio_to_coupling
-    return Ride(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
+    return BiasMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
 
 
 def full_torque_Nm(design: Design) -> float:
@@ -183,27 +184,27 @@ def _felt(design: Design) -> float:
     return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
 
 
-def _fastest(design: Design, load_Nm: float, share: float) -> Ride | None:
-    """The fastest ride within the limits; None where there is none."""
+def _fastest(design: Design, load_Nm: float, share: float) -> BiasMotion | None:
+    """The fastest motion within the limits; None where there is none."""
     limits = design.limits
     speed = SHARE * limits.speed_rad_s if isfinite(limits.speed_rad_s) else FASTEST_RAD_S
     current = share * min(limits.peak_current_A, limits.continuous_current_A)
     while speed > SLOWEST * FASTEST_RAD_S:
-        found = riding_at(design, speed, load_Nm)
-        fits = found.voltage_V <= share * limits.voltage_V and abs(found.current_A) <= current
-        if fits and _commands_fit(design, found) and found.room_rad_s > 0.0:
-            return found
+        motion = bias_motion_at(design, speed, load_Nm)
+        fits = motion.voltage_V <= share * limits.voltage_V and abs(motion.current_A) <= current
+        if fits and _commands_fit(design, motion) and motion.room_rad_s > 0.0:
+            return motion
         speed *= 0.8
     return None
 
 
-def _commands_fit(design: Design, found: Ride) -> bool:
+def _commands_fit(design: Design, motion: BiasMotion) -> bool:
     """Whether commands leave room to the limits: a controller without an integral needs an error."""
-    control, limits, wanted = design.controller, design.limits, found.voltage_V
+    control, limits, wanted = design.controller, design.limits, motion.voltage_V
     if control.current is not None:
         loop = control.current
         state = current_state(
-            found,
+            motion,
             loop.gain_V_A,
             loop.integral_time_s is not None,
             loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
@@ -215,7 +216,7 @@ def _commands_fit(design: Design, found: Ride) -> bool:
     if control.velocity is not None:
         velocity = control.velocity
         integral = velocity.integral_time_s is not None
-        wanted = velocity_state(design, found, wanted, velocity.gain, integral).command
+        wanted = velocity_state(design, motion, wanted, velocity.gain, integral).command
         return abs(wanted) <= COMMANDED * limits.speed_rad_s
     return True
 
@@ -229,18 +230,20 @@ class Steady:
     output: Value
 
 
-def current_state(ride: Ride, gain: Value, integral: bool, back_emf: Value, resistance: Value) -> Steady:
-    """The current controller of a ride; the last two are shares of feed-forward in V s/rad and ohm."""
-    i, left = ride.current_A, ride.voltage_V - back_emf * ride.speed_rad_s
+def current_state(
+    bias: BiasMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
+) -> Steady:
+    """The current controller on a bias motion; the last two are shares of feed-forward in V s/rad and ohm."""
+    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
     if integral:
-        return Steady(i, left - resistance * i, ride.voltage_V)
-    return Steady((left + gain * i) / (gain + resistance), 0.0, ride.voltage_V)
+        return Steady(i, left - resistance * i, bias.voltage_V)
+    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
 
 
-def velocity_state(design: Design, ride: Ride, wanted: Value, gain: Value, integral: bool) -> Steady:
-    """The velocity controller of a ride whose output behind the filters is ``wanted``."""
+def velocity_state(design: Design, bias: BiasMotion, wanted: Value, gain: Value, integral: bool) -> Steady:
+    """The velocity controller on a bias motion whose output behind the filters is ``wanted``."""
     before = wanted / steady_gain(design, "torque")
-    seen = ride.speed_rad_s * steady_gain(design, "speed")
+    seen = bias.speed_rad_s * steady_gain(design, "speed")
     return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
 
 
@@ -249,14 +252,14 @@ def steady_gain(design: Design, place: FilterPlace) -> float:
     velocity = design.controller.velocity
     if velocity is None:
         return 1.0
-    found, period_s = 1.0, velocity.every * design.controller.period_s
+    result, period_s = 1.0, velocity.every * design.controller.period_s
     for item in velocity.filters_on(place):
         b0, b1, b2, a1, a2 = section(item, period_s)
-        found *= (b0 + b1 + b2) / (1.0 + a1 + a2)
-    return found
+        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return result
 
 
-def riding_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> Ride:
+def bias_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> BiasMotion:
     """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
     friction = design.friction
     passed = 1.0 if design.load.path == "back-drivable" else 0.0
@@ -273,7 +276,7 @@ def riding_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> Ride:
     torque += _own(friction, speed_rad_s) + friction.offset_torque_Nm
     room = _room(friction, speed_rad_s)
     current, voltage = _driven(design, torque, speed_rad_s)
-    return Ride(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
+    return BiasMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
 
 
 def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:
