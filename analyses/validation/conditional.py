@@ -290,9 +290,9 @@ def _bisected(design: Design, settle_ticks: int) -> tuple[float | None, float | 
         if low == 0.0 and least > LEAST_PART:
             sizes, least = full * np.geomspace(LEAST_PART, SMALLEST_PART, STEPS), LEAST_PART
             continue
-        if low == 0.0 or high - low < CLOSE * high:  # type: ignore[operator]
+        if low == 0.0 or high - low < CLOSE * high:
             return low, high
-        sizes = np.geomspace(low, high, STEPS + 2)[1:-1]  # type: ignore[type-var]
+        sizes = np.geomspace(low, high, STEPS + 2)[1:-1]
 
 
 def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:

@@ -21,6 +21,7 @@ from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench import on_the_bench
 from analyses.validation.bias_motion import bias_motion, has_to_stand, may_stand, on_its_stand
+from analyses.validation.breakaway import breakaway_entry
 from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.commanded import command_sweep
 from analyses.validation.conditional import Conditional, conditional_stability
@@ -172,6 +173,7 @@ class _Work:
             answer = self._within(0.2, "response to the command", self._answer, None) if stable else None
         with self.timed("constant speed"):
             steady = self._within(0.1, "constant speed", self._steady, None) if ready else None
+            started = self._within(0.1, "breakaway", self._breakaway, None) if stable else None
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -199,7 +201,7 @@ class _Work:
             ledger=(
                 *self._ledger(loops, points, rest_steps, rest_sweep),
                 *self._answered(answer),
-                *([] if steady is None else [steady]),
+                *(row for row in (steady, started) if row is not None),
             ),
             command=answer,
             counts=counts,
@@ -432,6 +434,9 @@ class _Work:
 
     def _steady(self) -> Entry:
         return steady_entry(self.linear, on_the_bench(self.model), max(self.settle.values()))
+
+    def _breakaway(self) -> Entry | None:
+        return breakaway_entry(self.linear, self.model)
 
     @cached_property
     def _model_steered(self) -> Design:

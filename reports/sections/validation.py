@@ -22,6 +22,7 @@ MORE = {
     "resonance": "resonance frequency",
     "stability": "stability",
     "steady_current": "current at a constant speed",
+    "breakaway_torque": "breakaway torque",
     "steady_voltage": "drive signal at a constant speed",
     "response_open": "response of the open loop",
     "response_closed": "response of the closed loop",
