@@ -71,6 +71,7 @@ def circuit_resistance_ohm(design: Design) -> Any:
     of more resistance than the winding gives its most current at less than its whole voltage.
     """
     resistance = design.effective_motor.resistance_ohm
+    assert resistance is not None
     return resistance if design.supply is None else resistance + design.supply.resistance_ohm
 
 

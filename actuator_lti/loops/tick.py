@@ -39,7 +39,8 @@ class TickProgram(Program):
     @cached_property
     def _walked(self) -> dict[tuple[bool, ...], TickWalk]:
         """A walk for each kind of tick that occurs."""
-        return {self._kind(k): TickWalk(self, k) for k in reversed(range(self.ticks))}
+        first = {self._kind(k): k for k in reversed(range(self.ticks))}
+        return {kind: TickWalk(self, k) for kind, k in first.items()}
 
     def _kind(self, k: int) -> tuple[bool, ...]:
         return tuple(k % every == 0 for every in self.drive.interval.values())

@@ -7,27 +7,31 @@ closed loop lies on the unit circle.  Dry friction of either side adds ``4 Tc/(p
 speed in the same cycle; friction by load is left out.
 
 Quantisation: an angle that swings about the edge of a count is a relay of one count, ``2 q/(pi A)`` up to
-A = q.  The sensor of the output multiplies the loop at the output by it, so a cycle is foreseen at the upper
-gain border g of that loop: ``A = 2 q/(pi g)``, stable.
+A = q.  The sensor multiplies the loop that it stands in by it (the output's that of the position, the
+motor's that of the speed made of it), so a cycle is foreseen at the gain g that brings this loop to its
+border: ``A = 2 q/(pi g)``, stable.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import asin, exp, log, pi, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.design.model import Coupling, Design, Friction, LoadFriction
+from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
 from actuator_lti.loops.tick import TickProgram
-from analyses.limit_cycles.result import Cycle
+from analyses.limit_cycles.result import Cause, Cycle
 
 LEAST, MOST, POINTS = 1.02, 300.0, 48  # of the half play: amplitudes of the twist that are looked at
+MOST_GAIN, GAINS = 1e3, 73  # of a speed made of counts
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
 _STEPS = 60  # of the fixed point between the amplitudes of both speeds
 
@@ -176,28 +180,105 @@ def _output(design: Design, state: dict[str, complex]) -> complex:
 
 
 def cycles_of_quantisation(design: Design) -> tuple[Cycle, ...]:
-    """The cycle about the edge of a count of the output's sensor, friction left out."""
-    position, q = design.controller.position, design.output_quantum_rad
-    if position is None or position.sensor != "output" or q is None:
+    """The cycles about the edge of a count of each sensor, friction left out."""
+    return (*_of_counts(design, "quantisation"), *_of_counts(design, "motor-quantisation"))
+
+
+def quantum_of(design: Design, cause: Cause) -> float | None:
+    """One count of a sensor: of the output's in rad at the output, of the motor's in rad at the motor."""
+    return design.output_quantum_rad if cause == "quantisation" else design.angle_quantum_rad
+
+
+def counts_matter(design: Design, cause: Cause) -> bool:
+    """Whether a loop sees the counts of a sensor (the motor's: where a speed is made of them)."""
+    control, estimated = design.controller, design.encoder.speed != "ideal"
+    if control.position is None or quantum_of(design, cause) is None:
+        return False
+    by_speed = control.velocity is not None and estimated
+    if cause == "quantisation":
+        return control.position.sensor == "output"
+    return by_speed and control.velocity is not None and control.velocity.sensor == "motor"
+
+
+def _of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
+    """The cycle of one sensor: where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up."""
+    q = quantum_of(design, cause)
+    if q is None or not counts_matter(design, cause):
         return ()
     free = without_nonlinearities(design)
-    border = exact_margins(assemble_loops(free), "output").gain_upper
-    if not np.isfinite(border):  # none, or the linear loop is unstable
+    found = _border_of_speed(free) if cause == "motor-quantisation" else _border_at_output(free)
+    if found is None:
         return ()
-    wired = wire(free, Operating())
-    blocks = point_blocks(wired, "output")
+    border, mode = found
+    amplitude = 2.0 * q / (pi * border)
+    seen = _output(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
+    state = {name: amplitude / seen * value for name, value in mode.shape.items()}
+    output = abs(_output(free, state))
+    return (Cycle(cause, False, output, amplitude, mode.frequency_hz, True, state),)
+
+
+def _border_at_output(free: Design) -> tuple[float, _Mode] | None:
+    """Gain of a sensor at the output that brings the loop to its border, and the oscillation there.
+
+    Where the speed is made of that angle too, all that is behind it goes through the velocity controller: its
+    loop is that at this controller's output.
+    """
+    control, point = free.controller, "output"
+    velocity = control.velocity
+    if velocity is not None and velocity.sensor == "output" and free.encoder.speed != "ideal":
+        point = "u" if control.current is None else "i_ref"
+    border = exact_margins(assemble_loops(free), point, 0.0).gain_upper
+    if not np.isfinite(border):  # none, or the linear loop is unstable
+        return None
+    blocks = point_blocks(wire(free, Operating()), point)
     A = np.eye(len(blocks[0].states))
     for block in blocks:
         A = (block.A - border * block.B @ block.C) @ A
+    mode = _oscillation(A, blocks[0].states, free, at_border=True)
+    return None if mode is None else (border, mode)
+
+
+def _border_of_speed(free: Design) -> tuple[float, _Mode] | None:
+    """Gain of the speed made of the motor's angle that brings the loop to its border."""
+
+    def mode(log_gain: float) -> _Mode | None:
+        velocity = free.controller.velocity
+        assert velocity is not None
+        gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(1.0,))
+        louder = replace(velocity, filters=(*velocity.filters, gain))
+        design = replace(free, controller=replace(free.controller, velocity=louder))
+        program = TickProgram(wire(design, Operating()), "position")
+        return _oscillation(_over_a_period(program), program.states, design)
+
+    def excess(log_gain: float) -> float:
+        found = mode(log_gain)
+        return -1.0 if found is None else found.radius - 1.0
+
+    if excess(0.0) >= 0.0:
+        return None
+    grid = np.log(np.geomspace(1.0, MOST_GAIN, GAINS))
+    for low, high in pairwise(map(float, grid)):
+        if excess(high) >= 0.0:
+            root = float(brentq(excess, low, high, xtol=1e-10))
+            there = mode(root)
+            return None if there is None else (exp(root), there)
+    return None
+
+
+def _oscillation(
+    A: np.ndarray, states: Sequence[str], design: Design, *, at_border: bool = False
+) -> _Mode | None:
+    """The largest eigenvalue that turns, or that nearest to the unit circle; None without any."""
     values, vectors = np.linalg.eig(A)
     turning = np.flatnonzero(np.angle(values) > _TURNS)
-    k = int(turning[np.argmin(np.abs(np.abs(values[turning]) - 1.0))])
-    shape = dict(zip(blocks[0].states, map(complex, vectors[:, k]), strict=True))
-    amplitude = 2.0 * q / (pi * border)
-    state = {name: amplitude / _output(free, shape) * value for name, value in shape.items()}
-    period = wired.period_s("position")
+    if not turning.size:
+        return None
+    size = np.abs(values[turning])
+    k = int(turning[np.argmin(np.abs(size - 1.0)) if at_border else np.argmax(size)])
+    period = wire(design, Operating()).period_s("position")
     frequency = float(np.angle(values[k])) / (2.0 * pi * period)
-    return (Cycle("quantisation", False, amplitude, amplitude, frequency, True, state),)
+    shape = dict(zip(states, map(complex, vectors[:, k]), strict=True))
+    return _Mode(float(abs(values[k])), frequency, shape)
 
 
 def without_nonlinearities(design: Design) -> Design:

@@ -8,7 +8,7 @@ from typing import Literal
 from actuator_lti.design.model import Design
 from analyses.friction_effects.cycles import Settling
 
-Cause = Literal["play", "quantisation"]
+Cause = Literal["play", "quantisation", "motor-quantisation"]
 Verdict = Literal["confirmed", "refuted"]
 
 
@@ -18,7 +18,8 @@ class Cycle:
 
     Attributes
     ----------
-    cause : {"play", "quantisation"}
+    cause : {"play", "quantisation", "motor-quantisation"}
+        Quantisation: of the output's sensor, or of the motor's.
     with_friction : bool
         Whether the drive's dry friction, by its own describing function, is in it.
     output_rad : float

@@ -10,8 +10,13 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.friction_effects.cycles import settle, simulate_row
 from analyses.large_signal.steady_start import PLACES
-from analyses.limit_cycles.foreseen import cycles_of_play, cycles_of_quantisation, without_nonlinearities
-from analyses.limit_cycles.result import Confirmation, Cycle, LimitCycles, Rest
+from analyses.limit_cycles.foreseen import (
+    counts_matter,
+    cycles_of_play,
+    cycles_of_quantisation,
+    without_nonlinearities,
+)
+from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles, Rest
 from nonlinear import Rows
 
 SCALES = np.geomspace(0.4, 2.5, 41)
@@ -39,7 +44,6 @@ def limit_cycles(design: Design) -> LimitCycles:
     if design.controller.position is None:
         raise InputError("limit cycles: needs a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
-    quantised = design.output_quantum_rad is not None and design.controller.position.sensor == "output"
     foreseen = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
     foreseen += cycles_of_quantisation(design)
     full = design.validation.full_deflection_rad
@@ -48,8 +52,9 @@ def limit_cycles(design: Design) -> LimitCycles:
         for load in design.validation.loads_Nm
         for share in (min(design.validation.amplitude_fractions), 1e-3)
     )
-    causes = (("play", has_play), ("quantisation", quantised))
-    looked_for = tuple(name for name, there in causes if there)
+    names: tuple[Cause, ...] = ("play", "quantisation", "motor-quantisation")
+    there = (has_play, *(counts_matter(design, name) for name in names[1:]))
+    looked_for = tuple(name for name, yes in zip(names, there, strict=True) if yes)
     return LimitCycles(design, tuple(confirm(design, cycle) for cycle in foreseen), rests, looked_for)
 
 
@@ -82,21 +87,22 @@ def confirm(design: Design, cycle: Cycle) -> Confirmation:
 
 
 def _centre(design: Design, cycle: Cycle) -> float:
-    """The command about which the cycle swings: half a count below the edge, as the mean of the sensor is."""
-    q = design.output_quantum_rad
-    return -0.5 * q if cycle.cause == "quantisation" and q is not None else 0.0
+    """The command about which the cycle swings: half a count below the edge, as the mean of the sensor is.
+
+    A speed made of counts has no mean: the motor swings about the edge itself.
+    """
+    return -0.5 * (design.output_quantum_rad or 0.0) if cycle.cause == "quantisation" else 0.0
 
 
 def _tried(design: Design, cycle: Cycle) -> Design:
     """The drive with the one nonlinearity that the cycle is of, and friction where it is in it."""
+    motor = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+    output = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
     if cycle.cause == "quantisation":
-        return without_nonlinearities(design)
-    return replace(
-        design,
-        friction=replace(design.friction, load_coefficient=0.0),
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
-    )
+        return without_nonlinearities(motor)
+    if cycle.cause == "motor-quantisation":
+        return without_nonlinearities(output)
+    return replace(output, friction=replace(design.friction, load_coefficient=0.0), encoder=motor.encoder)
 
 
 def _speed_command(design: Design, cycle: Cycle) -> float:

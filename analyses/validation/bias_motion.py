@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from math import cosh, inf, isfinite
 
 import numpy as np
+import numpy.typing as npt
 
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, segments
@@ -19,6 +20,7 @@ from actuator_lti.errors import InputError
 from nonlinear import Rows
 from nonlinear.filters import section
 
+Value = float | npt.NDArray[np.float64]
 SHARE = 0.4  # of each limit that the bias motion may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
@@ -208,13 +210,13 @@ def _commands_fit(design: Design, motion: BiasMotion) -> bool:
             loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
             loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
         )
-        wanted = state.command
+        wanted = float(state.command)
         if abs(wanted) > COMMANDED * limits.peak_current_A:
             return False
     if control.velocity is not None:
         velocity = control.velocity
         integral = velocity.integral_time_s is not None
-        wanted = velocity_state(design, motion, wanted, velocity.gain, integral).command
+        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
         return abs(wanted) <= COMMANDED * limits.speed_rad_s
     return True
 
@@ -223,13 +225,13 @@ def _commands_fit(design: Design, motion: BiasMotion) -> bool:
 class Steady:
     """A controller in its steady state: its command, its integrator, and its output before filters."""
 
-    command: float
-    integrator: float
-    output: float
+    command: Value
+    integrator: Value
+    output: Value
 
 
 def current_state(
-    bias: BiasMotion, gain: float, integral: bool, back_emf: float, resistance: float
+    bias: BiasMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
 ) -> Steady:
     """The current controller on a bias motion; the last two are shares of feed-forward in V s/rad and ohm."""
     i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
@@ -238,7 +240,7 @@ def current_state(
     return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
 
 
-def velocity_state(design: Design, bias: BiasMotion, wanted: float, gain: float, integral: bool) -> Steady:
+def velocity_state(design: Design, bias: BiasMotion, wanted: Value, gain: Value, integral: bool) -> Steady:
     """The velocity controller on a bias motion whose output behind the filters is ``wanted``."""
     before = wanted / steady_gain(design, "torque")
     seen = bias.speed_rad_s * steady_gain(design, "speed")

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import exp, inf, isfinite, log
 from typing import Literal
@@ -106,7 +107,7 @@ class Search:
     def rows(self, values: Floats) -> Rows:
         """One run a value."""
         window = self._window()
-        rows = Rows.join([self.row(float(value)) for value in values])
+        rows = self.started(values)
         rows["ticks"] = self.settle_ticks + 2 * window.ticks[0]
         rows.window(window.ticks[0], window.cycles[0])
         return rows
@@ -121,12 +122,16 @@ class Search:
         """Length of one run."""
         return self.settle_ticks + 2 * int(self._window().ticks[0])
 
-    def row(self, value: float) -> Rows:
-        """The rig at one value, with a faint kick at the point at first."""
-        setup = self.setup
-        row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
-        row.series(setup.point, self._burst() if self.smooth and not self.real_pole else IMPULSE, self.kick)
-        return row
+    def started(self, values: Floats) -> Rows:
+        """The rig at each value, with a faint kick at the point at first."""
+        rows = self.set_up(values)
+        shape = self._burst() if self.smooth and not self.real_pole else IMPULSE
+        rows.series(self.setup.point, shape, self.kick)
+        return rows
+
+    def set_up(self, values: Floats) -> Rows:
+        """The rig at each value."""
+        return self.setup.rows(delay_samples=values) if self.kind == "delay" else self.setup.rows(values)
 
     def _burst(self) -> Floats:
         """Some periods of the expected oscillation, swelling and dying away: other modes are hardly moved."""
@@ -140,7 +145,7 @@ class Search:
         """Whether the nominal drive is known to come to rest, which is looked at first."""
         return True
 
-    @property
+    @cached_property
     def kick(self) -> float:
         """Size of the impulse, in the unit of the point."""
         signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}

@@ -13,30 +13,38 @@ it and goes on integrating.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import asin, isfinite, pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Instruments
 from analyses.validation.bias_motion import full_torque_Nm
 from analyses.validation.confirm import oscillation_hz
 from analyses.validation.release import full_range
 from analyses.validation.rig import points_of
-from nonlinear import Rows
+from nonlinear import LIMITERS, Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
 
 Floats = npt.NDArray[np.float64]
+Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
 SMALLEST_PART, LARGEST_PART = 0.01, 1.0  # of full deflection
+LEAST_PART = 1e-6  # of full deflection, where the smallest part does not settle
 STEPS = 16
 CLOSE = 1e-3
 CONVERGED = 0.05  # error left, relative to the step
 LASTING = 0.9  # error of the last window over that of the one before
+RESTING = 1e-3  # of the step: the output moves by less in the last window
+HELD = 0.5  # of the last window: a limit that acts longer holds the drive
+GROWS = 1.2  # from window to window
+OWN = tuple(name for name in LIMITERS if name != "profile")  # limits of the drive, not of its command
+AGAIN = (1, 4, 16)  # times the wait
 WINDOWS = 20.0  # time constants of the loop that are waited for, beside the travel
 SETTLED = 14.0  # time constants in the settling ticks
 LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
@@ -85,14 +93,20 @@ class Conditional:
         At every break point.
     predictions : tuple of Prediction
     threshold_rad : float or None
-        Largest step of the output that still settles; ``None`` where all steps up to full deflection do.
+        Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
+        where not even the smallest tried does.
     next_rad : float or None
-        Smallest step tried that does not.
+        Smallest step tried that does not; it has been watched for four times as long.
     full_deflection_rad : float
     oscillation_hz, oscillation_rad : float or None
         Frequency, and amplitude of the output error, while the step at the threshold hovers there.
     limiter : str
-        The limit that acted longest at that step.
+        The limit that acts longest at the end of the smallest step that does not settle.
+    limiter_share : float
+        Of the ticks at that end.
+    ending : {"diverges", "keeps oscillating", "is held by a limit", ""}
+    end_rad : float or None
+        Half of the output's span at that end.
     """
 
     margins: dict[str, ExactMargins]
@@ -103,6 +117,9 @@ class Conditional:
     oscillation_hz: float | None
     oscillation_rad: float | None
     limiter: str
+    limiter_share: float = 0.0
+    ending: Ending | Literal[""] = ""
+    end_rad: float | None = None
 
     @property
     def diverges(self) -> bool:
@@ -135,7 +152,9 @@ def saturation_ratio(gain: float) -> float:
     return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
 
 
-def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Conditional:
+def conditional_stability(
+    design: Design, loops: Loops, settle_ticks: int, margins: Mapping[str, ExactMargins] | None = None
+) -> Conditional:
     """Look for conditional stability: by margins, by describing functions, and by steps in time.
 
     Parameters
@@ -145,21 +164,30 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
         Sampled, sliding.
     settle_ticks : int
         In which the linear drive settles.
+    margins : mapping of str to ExactMargins, optional
+        Those already known, by break point.
     """
     from actuator_lti.loops import exact_margins
 
-    margins = {point: exact_margins(loops, point) for point in points_of(design) if point != "output"}
+    known = dict(margins or {})
+    margins = {
+        point: known.get(point) or exact_margins(loops, point)
+        for point in points_of(design)
+        if point != "output"
+    }
     result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
         if margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
     predictions = tuple(one for one in result if one is not None)
+    design = _quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
-    hertz = amplitude = None
-    limiter = ""
+    hertz, amplitude, end = None, None, None
+    if following is not None:
+        end = _end(design, following, settle_ticks)
     if threshold is not None and threshold > 0.0:
-        hertz, amplitude, limiter = _hovering(design, threshold, settle_ticks)
+        hertz, amplitude = _hovering(design, threshold, settle_ticks)
     return Conditional(
         margins=margins,
         predictions=predictions,
@@ -168,7 +196,20 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
         full_deflection_rad=design.validation.full_deflection_rad,
         oscillation_hz=hertz,
         oscillation_rad=amplitude,
-        limiter=limiter,
+        limiter="" if end is None else end.limiter,
+        limiter_share=0.0 if end is None else end.share,
+        ending="" if end is None else end.words,
+        end_rad=None if end is None else end.output_rad,
+    )
+
+
+def _quiet(design: Design) -> Design:
+    """A drive without counts and noise: what they do at rest is a finding of its own."""
+    return replace(
+        design,
+        encoder=replace(design.encoder, counts_per_rev=None),
+        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+        instruments=Instruments(),
     )
 
 
@@ -218,10 +259,25 @@ def _to_output(design: Design, point: str, omega: float) -> float:
 
 
 def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
-    """Largest step (rad, output) that settles and smallest tried that does not, up to full deflection."""
+    """Largest step (rad, output) that settles and smallest tried that does not, up to full deflection.
+
+    A step that does not settle is run again for longer before it is believed; where it settles then, all are
+    given that time.
+    """
+    for longer in AGAIN:
+        low, high = _bisected(design, longer * settle_ticks)
+        if high is None:
+            break
+        if not settles(design, np.array([high]), AGAIN[1] * longer * settle_ticks)[0]:
+            return low, high
+    return None, None
+
+
+def _bisected(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
+    """The threshold with one time to settle; 0 where not even the smallest step tried settles."""
     full = design.validation.full_deflection_rad
     sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS)
-    low, high = 0.0, None
+    low, high, least = 0.0, None, SMALLEST_PART
     while True:
         bad = np.flatnonzero(~settles(design, sizes, settle_ticks))
         if not bad.size:
@@ -231,21 +287,30 @@ def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, flo
         else:
             k = int(bad[0])
             low, high = (float(sizes[k - 1]) if k else low), float(sizes[k])
-        if high - low < CLOSE * high or low == 0.0:
+        if low == 0.0 and least > LEAST_PART:
+            sizes, least = full * np.geomspace(LEAST_PART, SMALLEST_PART, STEPS), LEAST_PART
+            continue
+        if low == 0.0 or high - low < CLOSE * high:
             return low, high
         sizes = np.geomspace(low, high, STEPS + 2)[1:-1]
 
 
 def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:
-    """Which steps from rest settle: the error left is small, or at least still falls."""
-    rows = step_rows(design, sizes_rad, settle_ticks)
-    result = rows.run()
+    """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
+
+    A controller without an integral comes to rest beside its target where the load has a slope; a drive that
+    stands because a limit holds it has not settled.
+    """
+    result = step_rows(design, sizes_rad, settle_ticks).run()
     errors = []
     for last in (0, 1):
         low, high = result.span("output_angle_rad", last)
         errors.append(np.maximum(np.abs(high - sizes_rad), np.abs(low - sizes_rad)))
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design))
-    return result.ok & (near | (errors[0] < LASTING * errors[1]))
+    low, high = result.span("output_angle_rad")
+    rests = high - low <= RESTING * sizes_rad
+    held = rests & (np.max([result.window_limit_fraction(name) for name in OWN], axis=0) > HELD)
+    return result.ok & ~held & (near | rests | (errors[0] < LASTING * errors[1]))
 
 
 def _standing(design: Design) -> float:
@@ -269,8 +334,11 @@ def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Rows:
     """Runs of steps from rest, long enough to travel and to settle."""
     rows = Rows.of(design, sizes_rad.size)
     way, tick_s = sizes_rad * design.total_ratio, design.controller.period_s
-    travel = way / (full_range(design)["velocity"] * tick_s)
-    swing = 4.0 * np.sqrt(2.0 * way * design.inertia_kgm2 / full_torque_Nm(design)) / tick_s
+    asked, ratio = design.command, design.total_ratio  # a profile may be slower than the drive
+    speed = min(full_range(design)["velocity"], asked.rate_rad_s * ratio)
+    speeding = min(full_torque_Nm(design) / design.inertia_kgm2, asked.acceleration_rad_s2 * ratio)
+    travel = way / (speed * tick_s)
+    swing = 4.0 * (np.sqrt(2.0 * way / speeding) + np.cbrt(way / (asked.jerk_rad_s3 * ratio))) / tick_s
     window = np.ceil(np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
     rows["ticks"] = np.ceil(2.0 * travel) + 4 * window
     rows.window(window, 1, 0)
@@ -278,7 +346,32 @@ def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Rows:
     return rows
 
 
-def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None, str]:
+@dataclass(frozen=True)
+class _End:
+    """What a step that does not settle ends in."""
+
+    words: Ending
+    output_rad: float
+    limiter: str
+    share: float
+
+
+def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
+    """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
+    result = step_rows(design, np.array([size_rad]), AGAIN[1] * settle_ticks).run()
+    spans = [float(np.subtract(*result.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
+    used = result.window_limit_fraction if result.ok[0] else result.limit_fraction  # it may not get so far
+    shares = {name: float(used(name)[0]) for name in OWN}
+    limiter = max(shares, key=lambda name: shares[name])
+    ending: Ending = "keeps oscillating"
+    if not result.ok[0] or spans[0] > GROWS * spans[1]:
+        ending = "diverges"
+    elif spans[0] <= RESTING * size_rad:
+        ending = "is held by a limit"
+    return _End(ending, 0.5 * spans[0], limiter if shares[limiter] > 0.0 else "", shares[limiter])
+
+
+def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
     from nonlinear import commands, simulate
 
@@ -289,10 +382,9 @@ def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))
-    limiter = max(run.limits, key=lambda name: run.limits[name].fraction)
     if crossings.size < 4:
-        return None, None, limiter
+        return None, None
     peaks = np.array([np.abs(error[a + 1 : b + 1]).max() for a, b in pairwise(crossings)])
     k = int(np.argmin(np.abs(np.log(peaks[1:] / peaks[:-1])))) + 1
     half = float(crossings[k + 1] - crossings[k]) * run.period_s
-    return 0.5 / half, float(peaks[k]), limiter
+    return 0.5 / half, float(peaks[k])

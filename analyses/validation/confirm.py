@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from analyses.responses import response_at
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.coherent import LEAST_SAMPLES
 from analyses.validation.rig import Rig
@@ -19,7 +20,7 @@ from nonlinear import Rows
 from nonlinear.probe import fractional_delay
 
 if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
+    from actuator_lti.loops import ExactMargins, Loops
     from actuator_lti.margins import StabilityMargins
 
 Floats = npt.NDArray[np.float64]
@@ -102,13 +103,15 @@ class Confirmation:
 class ComputingDelay(Search):
     """A search over the computing delay itself, exact at any fraction of a tick."""
 
-    def row(self, value: float) -> Rows:
-        """The rig with the voltage acting ``value`` ticks later."""
+    def set_up(self, values: Floats) -> Rows:
+        """The rig with the voltage acting so many ticks later."""
+        return Rows.join([self._later(float(value)) for value in values])
+
+    def _later(self, ticks: float) -> Rows:
         design = self.setup.design
         control = design.controller
-        later = replace(control, computing_delay_s=control.computing_delay_s + value * control.period_s)
-        moved = replace(self.setup, design=replace(design, controller=later))
-        return Search(moved, "gain up", self.frequency_hz, self.settle_ticks).row(1.0)
+        later = replace(control, computing_delay_s=control.computing_delay_s + ticks * control.period_s)
+        return replace(self.setup, design=replace(design, controller=later)).row()
 
 
 @dataclass(frozen=True)
@@ -185,17 +188,22 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     return result
 
 
-def point_questions(setups: Mapping[str, Rig], loops: Loops, settle_ticks: int) -> list[Question]:
+def point_questions(
+    setups: Mapping[str, Rig],
+    loops: Loops,
+    settle_ticks: int,
+    margins: Mapping[str, ExactMargins] | None = None,
+) -> list[Question]:
     """Gain up and down at each break point with all other loops closed, and the computing delay at ``u``.
 
     Predicted by the eigenvalues of the whole loop over a position period (`exact_margins`), so also where it
-    is periodically time-varying.
+    is periodically time-varying; ``margins`` holds those already known.
     """
     from actuator_lti.loops import exact_margins
 
     result = []
     for point, setup in setups.items():
-        exact, loop = exact_margins(loops, point), loops.break_points[point]
+        exact, loop = (margins or {}).get(point) or exact_margins(loops, point), loops.break_points[point]
         if not exact.stable:
             continue
         radius = exact.spectral_radius
@@ -222,8 +230,7 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
         omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
-        z = np.exp(1j * omega * loop.period_s)
-        return np.abs(1.0 + gain * np.atleast_1d(loop.open_loop(z)) * np.exp(-1j * omega * delay_s))
+        return np.abs(1.0 + gain * response_at(loop.open_loop, omega) * np.exp(-1j * omega * delay_s))
 
     grid = np.log(np.geomspace(SLOWEST, 0.999, GRID) * 0.5 / loop.period_s)
     values = distance(grid)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import nan, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
+from analyses.validation.budget import OutOfTime
 from analyses.validation.coherent import coherent
 from analyses.validation.reading import (
     NOTHING,
@@ -25,7 +26,7 @@ from analyses.validation.reading import (
 )
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig, producer, small_rig
-from analyses.validation.sweep import LONGEST_SETTLE_TICKS, SETTLE_TIME_CONSTANTS, stepped_sine
+from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
@@ -38,6 +39,7 @@ SETTLED = 0.02  # band of the settling time
 UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
 ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
 HIGHEST_OF_NYQUIST = 0.4995
+NO_TIME = "no time left for it"
 STEP_PART = 0.02  # of the room of the signal
 
 
@@ -83,6 +85,8 @@ class Measured:
         transient.
     no_dc : str
         Why the value at zero frequency is not known; then what is related to it is nothing.
+    cut : str
+        What was left out for lack of time: coarser readings say so by their own errors.
     """
 
     bandwidth: Reading
@@ -97,6 +101,7 @@ class Measured:
     sweep: Sweep
     point_error: Floats
     no_dc: str = ""
+    cut: str = ""
 
 
 def measure_figures(
@@ -114,17 +119,25 @@ def measure_figures(
     slowest_ticks : float, optional
         Slowest time constant of the loop; by default that which the step response is made for.
     """
-    step = step_response(setup, step_ticks)
+    cut = ""
+    try:
+        step = step_response(setup, step_ticks)
+    except OutOfTime:
+        step, cut = StepMeasured(nan, nan, nan, nan, np.empty(0), np.empty(0), NO_TIME), "step response"
     lost = step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0
     if not sweep.valid.any():
         raise NotMeasured(f"no frequency could be measured: {most_frequent(sweep.reason)}")
     dc = 1.0 if lost else step.final_value
-    fine = refined(setup, sweep, [*_brackets(sweep, dc), *_dips(sweep, dc)], settle_ticks)
-    wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
-    fine = refined(setup, fine, wide, settle_ticks)
-    fine, changed = _peaks_refined(setup, fine, settle_ticks)
+    fine, changed = sweep, 0.0
+    try:
+        fine = refined(setup, fine, [*_brackets(fine, dc), *_dips(fine, dc)], settle_ticks)
+        wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
+        fine = refined(setup, fine, wide, settle_ticks)
+        fine, changed = _peaks_refined(setup, fine, settle_ticks)
+    except OutOfTime:  # the sweep stands as it is
+        cut = ", ".join([*([cut] if cut else []), "points about each figure"])
     f = fine.frequency_hz
-    own = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
+    own = point_errors(setup, fine, settle_ticks, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
     error = float(own[fine.valid].max())
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
@@ -149,13 +162,14 @@ def measure_figures(
         no_dc=f"the step that gives the value at zero frequency: {step.reason or 'no motion'}"
         if lost
         else "",
+        cut=cut,
     )
 
 
 BESIDE = 2  # points on either side
 
 
-def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
+def point_errors(setup: Rig, sweep: Sweep, settle_ticks: float, slowest_ticks: float) -> Floats:
     """Relative error of each point: the change between its windows, carried on, and rounding."""
     from scipy.ndimage import maximum_filter1d
 
@@ -166,7 +180,7 @@ def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
     if own.size > 2 * BESIDE:  # a transient that swings may hide from one point, not from those beside it
         own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)
     seen = np.maximum(np.abs(sweep.closed_loop * sweep.amplitude), 1e-300)
-    rounding = angle_rounding(setup, window) / seen
+    rounding = angle_rounding(setup, window, settle_ticks) / seen
     return carried_on(own, window, slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
 
 
@@ -178,7 +192,7 @@ def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
     return change / -np.expm1(-np.asarray(window) / slowest)
 
 
-def angle_rounding(setup: Rig, window: npt.NDArray[np.int64]) -> Floats:
+def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], waited_ticks: float) -> Floats:
     """What rounding of the growing angle leaves in a fundamental in front of the instrument.
 
     A speed made from angles divides their last bit by the time between them; over the samples of a window
@@ -191,7 +205,7 @@ def angle_rounding(setup: Rig, window: npt.NDArray[np.int64]) -> Floats:
     tick_s = control.period_s
     span = encoder.difference_samples * velocity.every * tick_s
     per_angle = 1.0 / span if encoder.speed == "difference" else 2.0 * (encoder.bandwidth_rad_s or 0.0)
-    angle = abs(setup.bias.speed_rad_s) * (LONGEST_SETTLE_TICKS + 2.0 * window) * tick_s
+    angle = abs(setup.bias.speed_rad_s) * (waited_ticks + 2.0 * window) * tick_s
     speed = np.spacing(np.maximum(angle, 1e-300)) * per_angle
     stage = producer(setup.design, setup.point)
     gain = 1.0 if stage == "position" else velocity.gain

@@ -152,9 +152,11 @@ def response_entries(
 def _unless_hidden(row: Entry, figures: LoopFigures, measured: Measured) -> Entry:
     """An entry, not judged where the frequencies that decide it could not be measured."""
     sweep = measured.sweep
-    if row.passed is not False or "margin_" in row.quantity or row.quantity == "delay_margin":
+    if row.passed is None or "margin_" in row.quantity or row.quantity in ("delay_margin", *RESPONSES):
         return row
-    if row.quantity in RESPONSES:
+    if measured.cut:
+        return replace(row, passed=None, tolerance=inf, reason=f"{measured.cut}: no time left to measure it")
+    if row.passed:
         return row
     band, peaks, margins = figures.bandwidth, figures.peaks, figures.margins
     at = {

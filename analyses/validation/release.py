@@ -51,18 +51,17 @@ class Release(Search):
             [[1.0], np.geomspace(max(self.expected / 3.0, 1.05), 4.0 * self.expected, VALUES)]
         )
 
-    def row(self, value: float) -> Rows:
+    def started(self, values: Floats) -> Rows:
         """The rig standing, then let go."""
-        setup = self.setup
-        row = setup.row(delay_samples=value) if self.kind == "delay" else setup.row(gain=value)
+        rows, setup = self.set_up(values), self.setup
         design, sizes = setup.design, full_range(setup.design)
         if setup.outer == "position":
-            row["angle_start"] = -self.part * sizes["position"] * design.total_ratio
+            rows["angle_start"] = -self.part * sizes["position"] * design.total_ratio
         elif setup.outer == "velocity":
-            row["speed_start"] = self.part * sizes["velocity"]
+            rows["speed_start"] = self.part * sizes["velocity"]
         else:
-            row["current_start"] = self.part * sizes["current"]
-        return row
+            rows["current_start"] = self.part * sizes["current"]
+        return rows
 
     @property
     def controlled(self) -> bool:

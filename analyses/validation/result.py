@@ -14,6 +14,7 @@ from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.conditional import Conditional
 from analyses.validation.confirm import Confirmation
+from analyses.validation.counts import Counts
 from analyses.validation.figures import Measured
 from analyses.validation.from_rest import RestSteps
 from analyses.validation.ledger import Entry
@@ -87,6 +88,8 @@ class Validation:
     rest_steps : RestSteps or None
     command : Sweep or None
         Response to the command.
+    counts : tuple of Counts
+        What the counts of each encoder do.
     large_signals, friction, specification : results or None
         Of `analyses.large_signal`, `analyses.friction_effects`, `analyses.specification`.
     seconds : mapping of str to float
@@ -109,6 +112,7 @@ class Validation:
     seconds: Mapping[str, float]
     notes: tuple[str, ...] = ()
     command: Sweep | None = None
+    counts: tuple[Counts, ...] = ()
 
     @property
     def failed(self) -> tuple[Entry, ...]:
@@ -137,5 +141,9 @@ class Validation:
         words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
         if self.conditional is not None and self.conditional.diverges:
-            words += "; a command within full deflection makes the drive diverge"
+            ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
+            does = ending.get(self.conditional.ending, "diverge")
+            words += f"; a command within full deflection makes the drive {does}"
+            if self.conditional.limiter:
+                words += f" ({self.conditional.limiter} limit)"
         return words

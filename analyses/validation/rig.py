@@ -27,9 +27,10 @@ from analyses.validation.bias_motion import (
     velocity_state,
 )
 from nonlinear import Rows
-from nonlinear.probe import Probe
+from nonlinear.probe import Probe, write_probe
 
 Floats = npt.NDArray[np.float64]
+Value = float | npt.NDArray[np.float64]
 STAGES = ("current", "velocity", "position")
 HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
@@ -112,21 +113,27 @@ class Rig:
         return "standing, without dry friction"
 
     def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
-        """Parameters of a run that starts in the steady state of the bias motion.
+        """Parameters of a run that starts in the steady state of the bias motion; see `rows`."""
+        return self.rows(np.array([gain]), np.array([delay_samples]))
+
+    def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
+        """Parameters of runs that start in the steady state of the bias motion, one a value.
 
         Parameters
         ----------
-        gain : float
+        gain : array_like
             Factor on all parts of the controller in front of the point: the loop gain.
-        delay_samples : float
+        delay_samples : array_like
             Extra delay at the point, in its own samples.
         """
-        row = self._base.copy()
-        row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
+        gains, delays = np.broadcast_arrays(np.atleast_1d(gain), np.atleast_1d(delay_samples))
+        rows = self._base.repeat(gains.size)
+        for values, delay in zip(rows.values, delays, strict=True):
+            write_probe(Probe(point=self.point, delay_samples=float(delay)), values)  # type: ignore[arg-type]
         for place in GAINS[producer(self.design, self.point)]:
-            row[place] *= gain
-        self._start(row)
-        return row
+            rows[place] *= gains
+        self._start(rows)
+        return rows
 
     @cached_property
     def _base(self) -> Rows:
@@ -151,7 +158,8 @@ class Rig:
         row["twist_start"] = self.bias.twist_rad
         row["angle_start"] = self.twisted
         row["load_speed_start"] = self.bias.speed_rad_s / self.design.ratio_to_coupling
-        wanted, point = self.bias.voltage_V, "u"
+        wanted: Value = self.bias.voltage_V
+        point = "u"
         row["voltage_start"] = wanted
         for stage in self._running:
             if stage == "position":
@@ -167,29 +175,29 @@ class Rig:
             row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         self._constant(row, point, wanted)
 
-    def _current(self, row: Rows) -> float:
+    def _current(self, row: Rows) -> Value:
         """The current controller in its steady state; returns the current command."""
         steady = current_state(
             self.bias,
-            row.value("current_gain"),
+            row["current_gain"],
             row.value("current_integral") != 0.0,
-            row.value("back_emf_feedforward"),
-            row.value("resistance_feedforward"),
+            row["back_emf_feedforward"],
+            row["resistance_feedforward"],
         )
         row["current_integrator_start"] = steady.integrator
         return steady.command
 
-    def _velocity(self, row: Rows, wanted: float) -> float:
+    def _velocity(self, row: Rows, wanted: Value) -> Value:
         """The velocity controller in its steady state; returns the speed command."""
         integral = row.value("velocity_integral") != 0.0
-        steady = velocity_state(self.design, self.bias, wanted, row.value("velocity_gain"), integral)
+        steady = velocity_state(self.design, self.bias, wanted, row["velocity_gain"], integral)
         row["velocity_integrator_start"] = steady.integrator
         row["current_command_start"] = steady.output  # what the torque filters begin with
         return steady.command
 
-    def _position(self, row: Rows, wanted: float) -> None:
+    def _position(self, row: Rows, wanted: Value) -> None:
         """Let the command run with the drive, the motor behind it by what the controller needs."""
-        row["angle_start"] = self.twisted - wanted / row.value("position_gain")
+        row["angle_start"] = self.twisted - wanted / row["position_gain"]
         seen = 0.0 if self.design.controller.position_loop.sensor == "output" else self.twisted
         if self.bias.speed_rad_s == 0.0:
             row.step("bias", seen / self.design.total_ratio, -1.0)
@@ -208,7 +216,7 @@ class Rig:
         return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
 
     @staticmethod
-    def _constant(row: Rows, point: str, value: float) -> None:
+    def _constant(row: Rows, point: str, value: Value) -> None:
         """Replace the outer controllers, which are out of action, by a constant command."""
         row.step(point, value, -1.0)
 

@@ -32,10 +32,11 @@ STEADY = 1e-5  # relative change of the fundamental from one window to the next 
 ARRIVED = 1e-4  # of the injected sine: so much of it may be missing behind the instrument
 USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the amplitude takes
 SETTLE_TIME_CONSTANTS = 14.0
-LONGEST_SETTLE_TICKS = 20_000  # at first; a point that is not steady then is given more
+LONGEST_SETTLE_TICKS = 100_000  # at first; a point that is not steady then is given more
+LONGEST_EXTENDED_TICKS = 1_600_000
 SMALL_ANGLE_RAD = 1e-3  # sin x is x to 2e-7 in the fundamental
 FAINT_SETTLE_TICKS = 2_000
-EXTENSIONS = 3
+EXTENSIONS, LONGER = 3, 4
 PLANT_SIGNAL = {"u": "current_A", "i_ref": "motor_speed_rad_s", "w_ref": "motor_speed_rad_s"}
 
 
@@ -102,10 +103,12 @@ def stepped_sine(
         poor = np.flatnonzero([bool(text) for text in reasons])
         if not poor.size:
             break
-        settle_ticks *= 4
         limited = np.array([reasons[k] != "not steady" for k in poor])
         amplitude[poor[limited]] *= 0.4
-        settle_ticks = min(4 * settle_ticks, LONGEST_SETTLE_TICKS)
+        longer = min(LONGER * settle_ticks, LONGEST_EXTENDED_TICKS)
+        if longer <= settle_ticks and not limited.any():
+            break  # the same run again would show the same
+        settle_ticks = max(longer, settle_ticks)
         part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
         try:
             again = _run(setup, part, amplitude[poor], settle_ticks, threads)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from math import inf, pi
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,6 +21,7 @@ from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench import on_the_bench
 from analyses.validation.bias_motion import bias_motion, has_to_stand, may_stand, on_its_stand
+from analyses.validation.breakaway import breakaway_entry
 from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.commanded import command_sweep
 from analyses.validation.conditional import Conditional, conditional_stability
@@ -30,6 +32,7 @@ from analyses.validation.confirm import (
     point_questions,
     stage_questions,
 )
+from analyses.validation.counts import Counts, counts_of
 from analyses.validation.figures import NotMeasured, hertz, measure_figures
 from analyses.validation.from_rest import RestSteps, rest_entries, steps_from_rest
 from analyses.validation.ledger import (
@@ -50,13 +53,14 @@ from analyses.validation.tones import tone_sweep
 from nonlinear import Rows
 
 if TYPE_CHECKING:
-    from actuator_lti.loops import Loop, Loops
+    from actuator_lti.loops import ExactMargins, Loop, Loops
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 T = TypeVar("T")
 U = TypeVar("U")
 HIGHEST = 0.49  # of the sampling frequency
+LOADED = ("actuator_lti.loops.limiter_responses", "scipy.interpolate", "scipy.ndimage", "scipy.optimize")
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
 EVER_TICKS = 10**9  # no run is so long: this tells how slow a loop is
@@ -129,7 +133,7 @@ class _Work:
     held: Loop | None = None
     answer_loops: Any = None
     done: int = 0
-    STEPS = 11
+    STEPS = 12
 
     def __post_init__(self) -> None:
         """Take the instruments' errors out of the small signals, and start the clock."""
@@ -140,7 +144,9 @@ class _Work:
             self.notes.append("small signals are measured with ideal instruments: without counts and noise")
 
     def _warm_up(self) -> None:
-        """Have the simulator compiled before the clock starts."""
+        """Have the simulator compiled, and libraries loaded, before the clock starts."""
+        for name in LOADED:
+            import_module(name)
         rows = Rows.of(self.design)
         rows["ticks"] = 2 * max(every(self.design, stage) for stage in (*stages_of(self.design), "current"))
         rows.run()
@@ -167,6 +173,7 @@ class _Work:
             answer = self._within(0.2, "response to the command", self._answer, None) if stable else None
         with self.timed("constant speed"):
             steady = self._within(0.1, "constant speed", self._steady, None) if ready else None
+            started = self._within(0.1, "breakaway", self._breakaway, None) if stable else None
         with self.timed("from rest"):
             nothing = (None, None)
             rest_sweep, rest_steps = (
@@ -183,6 +190,8 @@ class _Work:
                 if wanted
                 else ()
             )
+        with self.timed("counts of the encoders"):
+            counts = self._within(0.2, "counts of the encoders", self._counts, ()) if whole else ()
         large, friction, specification = self._others(whole)
         for name, loop in loops.items():
             own = tuple(item for item in confirmed if item.loop == name)
@@ -192,9 +201,10 @@ class _Work:
             ledger=(
                 *self._ledger(loops, points, rest_steps, rest_sweep),
                 *self._answered(answer),
-                *([] if steady is None else [steady]),
+                *(row for row in (steady, started) if row is not None),
             ),
             command=answer,
+            counts=counts,
             loops=loops,
             points=points,
             amplitude_margins=released,
@@ -286,10 +296,15 @@ class _Work:
         ever = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, EVER_TICKS)
         measured = measure_figures(setup, sweep, settle, whole, ever / SETTLE_TIME_CONSTANTS)
         fine = measured.sweep
+        if measured.cut:
+            self.budget.cut.append(
+                f"{name} loop: {measured.cut}: its share of {self.budget.seconds:g} s is used up"
+            )
         tones = errors = None
-        if self.settings.multisine:
-            tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
-            errors = sweep_errors(tones, loop)
+        if self.settings.multisine and not measured.cut:
+            with suppress(OutOfTime):  # it only confirms the sweep
+                tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
+                errors = sweep_errors(tones, loop)
         return LoopValidation(
             name=name,
             figures=figures,
@@ -348,8 +363,17 @@ class _Work:
             )
         if self.settle and len(self.settle) == len(self.figures):
             setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
-            questions += point_questions(setups, self.loops, max(self.settle.values()))
+            questions += point_questions(setups, self.loops, max(self.settle.values()), self._exact)
         return confirm_margins(questions)
+
+    @cached_property
+    def _exact(self) -> dict[str, ExactMargins]:
+        """Borders of the whole loop at every break point where something drives the motor."""
+        from actuator_lti.loops import exact_margins
+
+        return {
+            point: exact_margins(self.loops, point) for point in points_of(self.design) if point != "output"
+        }
 
     def _inner_points(self) -> list[str]:
         """Break points whose loop differs from that of a stage: all but the outermost, and the output."""
@@ -411,6 +435,9 @@ class _Work:
     def _steady(self) -> Entry:
         return steady_entry(self.linear, on_the_bench(self.model), max(self.settle.values()))
 
+    def _breakaway(self) -> Entry | None:
+        return breakaway_entry(self.linear, self.model)
+
     @cached_property
     def _model_steered(self) -> Design:
         filtered = replace(self.model.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
@@ -446,7 +473,16 @@ class _Work:
         return sweep, steps_from_rest(design, settle)
 
     def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self.loops, self.settle["position"])
+        slow = settling_ticks_of(
+            self.loops.present["position"].closed_loop,
+            rig(self.linear, "position").hold_ticks,
+            self.design.name,
+            LONGEST_STEP_TICKS,
+        )
+        return conditional_stability(self.design, self.loops, slow, self._exact)
+
+    def _counts(self) -> tuple[Counts, ...]:
+        return counts_of(self.design, self.loops, self.settle["position"])
 
     def _others(self, stable: bool) -> tuple[Any, Any, Any]:
         """Large signals, friction effects, specification."""

@@ -31,20 +31,27 @@ def section(conditional: Conditional, axis: str = "rotary") -> Section:
     )  # fmt: skip
 
 
+def sentence(conditional: Conditional, axis: str = "rotary") -> str:
+    """Say in one sentence what large commands do."""
+    return _words(conditional, *((1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")))[0]
+
+
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     """Say in some sentences what was found, the result first."""
     full = f"{conditional.full_deflection_rad * scale:.4g} {unit}"
     if not conditional.diverges:
         return [f"Every step from rest up to full deflection ({full}) settles."]
-    threshold = (conditional.threshold_rad or 0.0) * scale
-    words = f"Steps beyond {threshold:.4g} {unit} do not settle (full deflection {full})"
-    words += ", although every loop is stable by its linear margins." if conditional.hidden else "."
+    threshold = conditional.threshold_rad or 0.0
+    beyond = f"beyond {threshold * scale:.4g} {unit}" if threshold else "of any size"
+    words = f"Steps {beyond} do not settle (full deflection {full})"
+    words += ", although every loop is stable by its linear margins" if conditional.hidden else ""
+    words += f": {_ending(conditional, scale, unit)}." if conditional.ending else "."
     made = [words]
     if conditional.oscillation_hz is not None and conditional.oscillation_rad is not None:
         size = f"{conditional.oscillation_rad * scale:.3g} {unit}"
         made.append(
-            f"At the threshold the output approaches a limit cycle of {size} "
-            f"at {conditional.oscillation_hz:.3g} Hz; the {conditional.limiter} limit acts."
+            f"At the threshold the output nears a limit cycle of {size} at "
+            f"{conditional.oscillation_hz:.3g} Hz."
         )
         free = [one for one in conditional.predictions if not one.antiwindup]
         if free:
@@ -54,6 +61,20 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
                 f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
             )
     return made
+
+
+def _ending(conditional: Conditional, scale: float, unit: str) -> str:
+    """Say what the smallest step that does not settle ends in, and which limit acts."""
+    swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
+    sizes = {
+        "diverges": "the output diverges",
+        "keeps oscillating": f"the output keeps oscillating with {swing}",
+        "is held by a limit": "the drive stops short of the command",
+    }
+    words = sizes[conditional.ending]
+    if conditional.limiter:
+        words += f"; the {conditional.limiter} limit acts {conditional.limiter_share:.0%} of the time"
+    return words
 
 
 def _facts(conditional: Conditional, scale: float, unit: str) -> Block:

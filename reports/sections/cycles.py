@@ -13,7 +13,11 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.limit_cycles import Confirmation, LimitCycles, Rest
 
-CAUSES = {"play": "play", "quantisation": "quantised output sensor"}
+CAUSES = {
+    "play": "play",
+    "quantisation": "quantised output sensor",
+    "motor-quantisation": "quantised motor encoder",
+}
 
 
 def of_design(design: Design) -> Section:

@@ -9,6 +9,7 @@ from analyses.validation.result import Validation
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.findings import Finding
+from reports.sections.conditional import sentence
 from reports.sections.names import LOOPS, POINTS, QUANTITIES
 
 MORE = {
@@ -19,6 +20,7 @@ MORE = {
     "resonance": "resonance frequency",
     "stability": "stability",
     "steady_current": "current at a constant speed",
+    "breakaway_torque": "breakaway torque",
     "steady_voltage": "drive signal at a constant speed",
     "response_open": "response of the open loop",
     "response_closed": "response of the closed loop",
@@ -30,7 +32,7 @@ WORD = {True: "agrees", False: "DISAGREES", None: "not judged"}
 
 def section(validation: Validation, *, timing: bool = True) -> list[Section]:
     """Make all sections of a validation, verdicts first; without ``timing`` the same input gives the same."""
-    from reports.sections import conditional, confirmation, sweep
+    from reports.sections import conditional, confirmation, counts, sweep
 
     sections = [
         summary(validation, timing=timing),
@@ -39,6 +41,8 @@ def section(validation: Validation, *, timing: bool = True) -> list[Section]:
     ]
     if validation.conditional is not None:
         sections.append(conditional.section(validation.conditional, validation.design.axis))
+    if validation.counts:
+        sections.append(counts.section(validation.counts, validation.design.axis))
     return [*sections, *_others(validation)]
 
 
@@ -111,12 +115,8 @@ def _large(validation: Validation) -> list[Finding]:
     conditional = validation.conditional
     if conditional is None or not conditional.diverges:
         return []
-    unit = "mm" if validation.design.axis == "linear" else "deg"
-    size = _size(conditional.next_rad or 0.0, validation.design.axis)
-    text = f"A step of {size:.3g} {unit} does not settle"
-    if conditional.limiter:
-        text += f": the {conditional.limiter} limit takes gain away"
-    return [Finding(severity="fail", text=f"{text}.", where="conditional")]
+    text = sentence(conditional, validation.design.axis)
+    return [Finding(severity="fail", text=text, where="conditional")]
 
 
 def _unknown(validation: Validation) -> list[Finding]:
@@ -138,27 +138,7 @@ def _left_out(validation: Validation) -> list[Finding]:
     if validation.design.coupling is None:
         text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
         findings.append(Finding(severity="info", text=text, where="validation"))
-    quantum = validation.design.angle_quantum_rad
-    if quantum is not None:
-        ripple = _ripple(validation)
-        text = f"Small signals are judged without the encoder's counts; at constant speed they add {ripple}."
-        findings.append(Finding(severity="info", text=text, where="validation"))
     return findings
-
-
-def _ripple(validation: Validation) -> str:
-    """Ripple of the speed estimate and standing error due to counts."""
-    design = validation.design
-    quantum = design.angle_quantum_rad or 0.0
-    standing = _size(quantum / design.total_ratio, design.axis)
-    unit = "mm" if design.axis == "linear" else "deg"
-    words = f"up to one count, {standing:.2g} {unit} at the output, of standing error"
-    velocity = design.controller.velocity
-    if design.encoder.speed == "difference" and velocity is not None:
-        span = design.encoder.difference_samples * velocity.every * design.controller.period_s
-        speed = "m/s" if design.axis == "linear" else "rad/s"
-        words += f" and steps of {quantum / span:.3g} {speed} in the speed estimate"
-    return words
 
 
 def verdict_items(validation: Validation) -> list[VerdictItem]:

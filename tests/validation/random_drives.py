@@ -5,17 +5,21 @@ Run as a script it validates a number of them and prints a line for each::
 
     python -m tests.validation.random_drives 0 40            # rigid cascades
     python -m tests.validation.random_drives 0 40 full all   # every feature, every part of a validation
+    python -m tests.validation.random_drives 0 400 full all 3600   # no new drive after so many seconds
+
+Every drive has to keep the bound of processor time; the last line is the table of all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import inf, pi
 from typing import TypeVar
 
 import numpy as np
 
+from actuator_lti.design import load_design
 from actuator_lti.design.model import (
     Command,
     Controller,
@@ -41,7 +45,7 @@ from actuator_lti.design.model import (
     VelocityLoop,
 )
 from actuator_lti.errors import InputError, NumericalError
-from analyses.validation.settings import Settings
+from analyses.validation.settings import QUICK, Settings
 
 TRIAL = Settings(
     frequencies=20,
@@ -551,55 +555,111 @@ def is_stable(design: Design) -> bool:
         return False
 
 
-def main(first: int, count: int, kind: str, everything: bool) -> None:
-    """Validate and print a line for each."""
+@dataclass
+class Tally:
+    """What some validations came to."""
+
+    drives: int = 0
+    judged: int = 0
+    nothing_judged: int = 0
+    tracebacks: int = 0
+    refused: int = 0
+    failed: int = 0
+    large_commands: int = 0
+    unstable: int = 0
+    cut: int = 0
+    over_time: int = 0
+    last: str = ""
+
+    def __str__(self) -> str:
+        words = ", ".join(f"{name} {value}" for name, value in vars(self).items())
+        return f"TABLE {words}"
+
+
+BOUND_S = 1.1 * Settings().seconds  # what is done when the time is up is a part of the last batch
+
+
+def main(first: int, count: int, kind: str, everything: bool, until_s: float = inf) -> Tally:
+    """Validate and print a line for each, and at the end what they came to."""
+    import time
+
+    began, tally = time.monotonic(), Tally()
+    validate_one(load_design("ilr33-amber"), QUICK, Tally())  # libraries loaded, kernels compiled
+    for design in stable_drives(first, count, kind):
+        if time.monotonic() - began > until_s:
+            break
+        validate_one(design, Settings() if everything else TRIAL, tally)
+        tally.last = design.name
+        if tally.drives % 10 == 0:
+            print(tally, flush=True)
+    print(tally, flush=True)
+    return tally
+
+
+def validate_one(design: Design, settings: Settings, tally: Tally) -> None:
+    """Validate one drive and print what it came to."""
     import time
     import traceback
 
     from analyses.isolation import isolated
     from analyses.validation import validate
 
-    for design in stable_drives(first, count, kind):
-        started = time.process_time()
-        try:
-            with isolated() as missing:
-                validation = validate(design, Settings() if everything else TRIAL)
-        except InputError as error:
-            print(f"{design.name}  refused: {error}", flush=True)
-            continue
-        except Exception:
-            print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
-            continue
-        took = time.process_time() - started
-        judged = [row for row in validation.ledger if row.passed is not None]
-        stages = "".join(stage[0] for stage in design.controller.stages)
-        verdict = "pass" if validation.passed else "FAIL"
+    started = time.process_time()
+    tally.drives += 1
+    try:
+        with isolated() as missing:
+            found = validate(design, settings)
+    except InputError as error:
+        tally.refused += 1
+        print(f"{design.name}  refused: {error}", flush=True)
+        return
+    except Exception:
+        tally.tracebacks += 1
+        print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
+        return
+    took = time.process_time() - started
+    judged = [row for row in found.ledger if row.passed is not None]
+    border = None if found.large_signals is None else found.large_signals.border
+    wrong_border = border is not None and border.passed is False
+    diverges = found.conditional is not None and found.conditional.diverges
+    stages = "".join(stage[0] for stage in design.controller.stages)
+    verdict = "pass" if found.passed else "FAIL"
+    print(
+        f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s",
+        flush=True,
+    )
+    tally.judged += len(judged)
+    tally.nothing_judged += not judged
+    tally.tracebacks += len(missing)
+    tally.failed += bool(found.failed) or wrong_border
+    tally.large_commands += diverges
+    tally.unstable += any(not loop.figures.stable for loop in found.loops.values())
+    tally.cut += any("cut" in note for note in found.notes)
+    tally.over_time += took > BOUND_S
+    for item in missing:
+        print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
+    for row in found.failed:
         print(
-            f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(validation.failed)} failed, {took:.1f} s",
-            flush=True,
+            f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason} [{row.condition}]"
         )
-        for item in missing:
-            print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
-        for row in validation.failed:
-            print(
-                f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason} [{row.condition}]"
-            )
-        border = None if validation.large_signals is None else validation.large_signals.border
-        if border is not None and border.passed is False:
-            print(f"    BORDER {border}")
-        if validation.conditional is not None and validation.conditional.diverges:
-            print(
-                f"    CONDITIONAL diverges from {validation.conditional.next_rad} of {validation.conditional.full_deflection_rad}"
-            )
-        if not judged:
-            print(f"    NOTES {validation.notes} {[row.reason for row in validation.ledger][:6]}")
-        for note in validation.notes:
-            if "cut" in note or "refused" in note:
-                print(f"    {note}")
+    if wrong_border:
+        print(f"    BORDER {border}")
+    if found.conditional is not None and diverges:
+        one = found.conditional
+        print(
+            f"    LARGE COMMANDS: {one.ending} from {one.next_rad} of {one.full_deflection_rad}: {one.limiter} limit {one.limiter_share:.0%}"
+        )
+    if not judged:
+        print(f"    NOTES {found.notes} {[row.reason for row in found.ledger][:6]}")
+    for note in found.notes:
+        if "cut" in note or "refused" in note:
+            print(f"    {note}")
 
 
 if __name__ == "__main__":
     import sys
 
     words = sys.argv[3:]
-    main(int(sys.argv[1]), int(sys.argv[2]), next((w for w in words if w != "all"), ""), "all" in words)
+    seconds = next((float(w) for w in words if w.replace(".", "").isdigit()), inf)
+    kinds = [w for w in words if w in ("wider", "full")]
+    main(int(sys.argv[1]), int(sys.argv[2]), kinds[0] if kinds else "", "all" in words, seconds)

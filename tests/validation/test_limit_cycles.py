@@ -99,7 +99,10 @@ def test_a_drive_with_too_much_gain_hunts_and_says_so(capsys: pytest.CaptureFixt
 
 def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
-    assert made["result"] == "The drive as it is comes to rest after every step; none is foreseen."
+    assert (
+        made["result"]
+        == "The drive as it is comes to rest after every step; 0 of 1 foreseen cycles confirmed."
+    )
     design: Design = load_design("fin")
     with pytest.raises(InputError, match="position loop"):
         limit_cycles(replace(design, controller=replace(design.controller, position=None)))

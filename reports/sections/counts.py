@@ -1,0 +1,105 @@
+"""What the counts of the encoders do, which the small signals leave out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from analyses.validation.counts import WITHIN, Counts
+from reports import document as doc
+from reports.document_schema import Block, FactItem, Section, Status
+from reports.findings import Finding
+
+NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
+
+
+def section(found: Sequence[Counts], axis: str = "rotary") -> Section:
+    """Make the section: standing error, ripple, limit cycles, and from where the loop is linear."""
+    intro = (
+        "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(pi A)); for "
+        "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "
+        "output's in its position."
+    )
+    blocks: list[Block] = [doc.facts(_facts(one, axis)) for one in found]
+    cycles = [(one, cycle) for one in found for cycle in one.cycles]
+    if cycles:
+        blocks.append(_cycles(cycles, axis))
+    words = [sentence(one, axis) for one in found]
+    status: Status = "warn" if any(one.resting_rad for one in found) else "info"
+    findings = [
+        Finding(severity="warn" if one.resting_rad else "info", text=text, where="counts")
+        for one, text in zip(found, words, strict=True)
+    ]
+    return doc.section(
+        "counts", "Counts of the encoders", blocks, result=" ".join(words), intro=intro, status=status,
+        findings=findings,
+    )  # fmt: skip
+
+
+def sentence(one: Counts, axis: str) -> str:
+    """Say in one sentence what the counts do."""
+    scale, unit, speed = _units(axis)
+    words = [f"{one.ripple_rad_s:.2g} {speed} of ripple at {one.ripple_at_rad_s:.3g} {speed} (motor side)"]
+    if one.speed_step_rad_s is not None:
+        words.append(f"steps of {one.speed_step_rad_s:.3g} {speed} in the speed estimate")
+    if one.standing_rad:
+        words.append(f"up to {one.standing_rad * scale:.2g} {unit} of standing error")
+    rests = "the drive comes to rest"
+    if one.resting_rad:
+        rests = f"the drive does not rest: its output moves by {one.resting_rad * scale:.2g} {unit}"
+    return f"{NAMES[one.sensor]}: counts add {', '.join(words)}; {rests}."
+
+
+def _facts(one: Counts, axis: str) -> list[FactItem]:
+    scale, unit, speed = _units(axis)
+    name = NAMES[one.sensor]
+    items = [
+        doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
+        doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),
+        doc.fact("at a motor speed of", one.ripple_at_rad_s, speed),
+        doc.fact("Standing error, one count", one.standing_rad * scale, unit),
+        doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit),
+        doc.fact(
+            f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function",
+            one.linear_rad * scale,
+            unit,
+        ),
+    ]
+    if one.linear_seen_rad is not None:
+        label = "Linear from this amplitude on, simulated at the bandwidth"
+        items.append(doc.fact(label, one.linear_seen_rad * scale, unit))
+    if one.speed_step_rad_s is not None:
+        items.append(doc.fact("Steps of the speed estimate", one.speed_step_rad_s, speed))
+    return items
+
+
+def _cycles(cycles: Sequence[tuple[Counts, Any]], axis: str) -> Block:
+    """Foreseen limit cycles beside what the simulator says of them."""
+    scale, unit, _ = _units(axis)
+    columns = [
+        doc.column("sensor", "Sensor"),
+        doc.column("amplitude", "Amplitude at the sensor", unit, format="sig:3"),
+        doc.column("output", "At the output", unit, format="sig:3"),
+        doc.column("hertz", "Frequency", "Hz", format="sig:3"),
+        doc.column("ratio", "Simulated over foreseen", format="sig:3"),
+        doc.column("verdict", "Simulation"),
+    ]
+    rows = [
+        {
+            "sensor": NAMES[one.sensor],
+            "amplitude": seen.cycle.inner_rad * scale,
+            "output": seen.cycle.output_rad * scale,
+            "hertz": seen.cycle.frequency_hz,
+            "ratio": seen.ratio,
+            "verdict": "found" if seen.verdict == "confirmed" else "not found",
+        }
+        for one, seen in cycles
+    ]
+    note = "Without dry friction, which quiets most of them; the drive as it is: see the sentence above."
+    return doc.table("Limit cycles of the counts", columns, rows, note)
+
+
+def _units(axis: str) -> tuple[float, str, str]:
+    """Scale and unit of an angle, unit of a speed."""
+    return (1e3, "mm", "m/s") if axis == "linear" else (math.degrees(1.0), "deg", "rad/s")

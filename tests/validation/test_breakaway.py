@@ -1,0 +1,50 @@
+"""Breaking away: the static friction in the simulator is that of the design, and a wrong ratio is seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Friction
+from analyses.validation.breakaway import breakaway_entry
+
+AMBER = load_design("ilr33-amber")
+
+
+def with_friction(**values: float) -> Friction:
+    return replace(AMBER.friction, **values)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.4])
+@pytest.mark.parametrize("offset", [0.0, 0.5e-3])
+def test_it_starts_at_the_ratio_times_dry_friction_and_the_offset(ratio: float, offset: float) -> None:
+    """T = r Tc + T_offset, by hand."""
+    friction = with_friction(dry_torque_Nm=2e-3, breakaway_ratio=ratio, offset_torque_Nm=offset)
+    design = replace(AMBER, friction=friction)
+    row = breakaway_entry(design, design)
+    assert row.passed
+    assert row.measured == pytest.approx(ratio * 2e-3 + offset, rel=3e-5)
+
+
+@pytest.mark.parametrize("wrong", [1e-4, -1e-4, 0.3])
+def test_a_wrong_ratio_is_seen(wrong: float) -> None:
+    design = replace(AMBER, friction=with_friction(breakaway_ratio=1.2))
+    model = replace(AMBER, friction=with_friction(breakaway_ratio=1.2 * (1.0 + wrong)))
+    assert breakaway_entry(design, model).passed is False
+
+
+def test_without_dry_friction_there_is_nothing_to_see() -> None:
+    design = replace(AMBER, friction=with_friction(dry_torque_Nm=0.0))
+    assert breakaway_entry(design, design) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "why"), [("fin", "coupling"), ("ilr33-amber-tanh", "tanh law has no friction at rest")]
+)
+def test_what_is_not_judged_says_why(name: str, why: str) -> None:
+    design = load_design(name)
+    row = breakaway_entry(design, design)
+    assert row.passed is None
+    assert why in row.reason
