@@ -24,6 +24,13 @@ Direction = Literal["both", "forward", "reverse"]
 MotorConstants = Literal["dc", "rms-line", "peak-phase"]
 AntiWindup = Literal["conditional", "clamped", "back-calculation"]
 FilterKind = Literal["lowpass", "notch", "leadlag", "biquad"]
+FILTER_KEYS: dict[FilterKind, tuple[set[str], set[str]]] = {
+    "lowpass": ({"frequency_rad_s"}, {"order", "damping"}),
+    "notch": ({"frequency_rad_s", "width_rad_s"}, {"depth"}),
+    "leadlag": ({"zero_rad_s", "pole_rad_s"}, set()),
+    "biquad": ({"b", "a"}, set()),
+}
+"""What each kind of filter needs, and what it may have besides."""
 FilterPlace = Literal["torque", "speed"]
 Overload = Literal["thermal", "excess"]
 Stage = Literal["position", "velocity", "current", "voltage"]

@@ -166,11 +166,11 @@ def centre_rad_s(item: Filter) -> Any:
     """The frequency at which Tustin's rule is prewarped; ``None`` for a sampled biquad."""
     if item.kind == "biquad":
         return None
-    if item.kind == "leadlag":
-        assert item.zero_rad_s is not None
-        assert item.pole_rad_s is not None
-        return (item.zero_rad_s * item.pole_rad_s) ** 0.5
-    return item.frequency_rad_s
+    if item.frequency_rad_s is not None:
+        return item.frequency_rad_s
+    assert item.zero_rad_s is not None
+    assert item.pole_rad_s is not None
+    return (item.zero_rad_s * item.pole_rad_s) ** 0.5
 
 
 def biquad(item: Filter, period_s: Any) -> Block:
