@@ -29,7 +29,7 @@ class StiffnessFigures:
     ----------
     static_stiffness_Nm_rad, least_stiffness_Nm_rad : float or ndarray
         Powered, friction sliding: limit at zero frequency (0 of an output that runs away, inf of one that
-        comes back), and smallest size between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
+        comes back), and smallest size there and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
     lost_motion_rad : float or ndarray
         2 (b + C0_l/k)/N_r; 0 of a rigid drive train.
     """
@@ -51,7 +51,9 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
     """
     response = compliance(design)
     size = np.abs(stiffness_at(response, frequencies_hz(response)))
-    return StiffnessFigures(static_stiffness(response), _plain(size.min(axis=-1)), lost_motion_rad(design))
+    static = static_stiffness(response)
+    least = _plain(np.minimum(size.min(axis=-1), static))
+    return StiffnessFigures(static, least, lost_motion_rad(design))
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:

@@ -70,7 +70,9 @@ def nonlinear_checks(
 
     worst = int(np.argmin(result.min(axis=1)))
     plan = LargeSignal.plan(tuned)
-    rows = {"nominal": problem.all_corners[0], "worst corner": problem.all_corners[worst]}
+    rows = {"nominal": problem.all_corners[0]}
+    if worst:
+        rows["worst corner"] = problem.all_corners[worst]
     population = Population(
         tuned,
         {f.path: np.array([row[k] for row in rows.values()]) for k, f in enumerate(problem.factors)},

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import typer
 
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, UnstableError
 from reports.cli import time_limit
 from reports.cli.crash import write_crash_file
 
@@ -67,6 +67,8 @@ def _run(call: Callable[[], object]) -> int:
     try:
         status = call()
         sys.stdout.flush()
+    except UnstableError as error:
+        return _say(str(error), VERDICT_FAILED)
     except InputError as error:
         return _say(_by_option(error), BAD_INPUT)
     except NumericalError as error:

@@ -131,3 +131,13 @@ def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg("stiffness", figure["data"], page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
+
+
+def test_the_least_stiffness_is_never_above_the_static_one() -> None:
+    """A shorted winding damps a spring of 40 N m/rad: stiffer at every frequency than at rest."""
+    design = load_design("fin")
+    _, shorted, _ = stiffness_curves(design)
+    assert abs(design.load.moment_slope_Nm_rad) == pytest.approx(shorted.static_Nm_rad, rel=1e-3)
+    assert shorted.least == (shorted.static_Nm_rad, 0.0)
+    for curve in stiffness_curves(drive_e()):
+        assert curve.least[0] <= curve.static_Nm_rad
