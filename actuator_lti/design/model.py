@@ -739,7 +739,7 @@ _EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
 
 
 def _times(value: float | None, factor: float) -> float | None:
-    return value if value is None or factor == 1.0 else value * factor
+    return None if value is None else value * factor
 
 
 def _train_inertia(gears: tuple[Gear, ...]) -> float:

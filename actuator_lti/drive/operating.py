@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, isfinite, pi
+from math import isfinite, pi
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -159,4 +159,4 @@ def moment_slope(design: Design, at: Operating) -> Any:
     load = design.load
     if load.gravity is None:
         return load.moment_slope_Nm_rad
-    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * cos(at.angle_rad + load.gravity.offset_rad)
+    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * np.cos(at.angle_rad + load.gravity.offset_rad)

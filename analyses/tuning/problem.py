@@ -30,6 +30,7 @@ GAINS = (
 )
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
+PLENTY = 10.0  # relative distance beyond which the search does not look
 MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor for a drive with two masses
 
 
@@ -122,7 +123,7 @@ class Problem:
         points = np.tile(nominal, (2 * len(nominal) + 1, 1))
         for k in range(len(nominal)):
             points[2 * k + 1 : 2 * k + 3, k] = ends[k]
-        result = self._distances(self.start[None, :], points, self.toleranced)[0]
+        result = np.minimum(self._distances(self.start[None, :], points, self.toleranced)[0], PLENTY)
         moved = np.abs(result[1:] - result[0]).max(axis=1).reshape(-1, 2).max(axis=1)
         chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
         return tuple(self.toleranced[k] for k in chosen)
@@ -152,6 +153,10 @@ class Problem:
 
         Unstable designs get a number below -3 that falls with the distance of the poles from the circle.
         """
+        return np.minimum(self._distances(gains, corners, self.factors), PLENTY)
+
+    def exact_distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """The same where they are far from the limit too; inf where nothing bounds the figure."""
         return self._distances(gains, corners, self.factors)
 
     def _distances(self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...]) -> np.ndarray:
@@ -169,7 +174,7 @@ class Problem:
         for k, requirement in enumerate(self.requirements):
             result = judge(requirement, self.design, columns).distance / size_of(requirement)
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
-        return np.minimum(out, 10.0).reshape(count, many, len(self.requirements))
+        return out.reshape(count, many, len(self.requirements))
 
     def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """One figure of one loop, shape (candidates, corners)."""

@@ -102,7 +102,7 @@ def tune(
     assert best is not None
     placed, problem, solution = best.placed, best.problem, best.solution
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
-    result = problem.distances(gains[None, :], problem.all_corners)[0]
+    result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     tuned = replace(_tuned(problem, gains), name=f"{design.name}-tuned")
     tell(len(choices) + 1, stages)
     requirements = _binding(problem, gains, result, settings.aim)
@@ -196,7 +196,7 @@ def _binding(
     for k, requirement in enumerate(problem.requirements):
         corner = int(np.argmin(result[:, k]))
         relative = float(result[corner, k])
-        known = -3.0 < relative < 10.0
+        known = -3.0 < relative < np.inf
         distance = relative * size_of(requirement) if known else None
         made.append(
             BindingRequirement(
