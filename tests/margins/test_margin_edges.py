@@ -10,6 +10,7 @@ import pytest
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import stability_margins
+from actuator_lti.margins.nyquist import slope_at_dc
 from actuator_lti.margins.results import Agreement, StabilityMargins
 
 s = control.tf("s")
@@ -179,3 +180,9 @@ def test_band_limits_the_lists_and_not_the_verdict() -> None:
 def test_unspecified_period_counts_as_one_second() -> None:
     m = stability_margins(control.tf([0.5], [1, 0], True))
     assert m.gain_margins[0].frequency_rad_s == pytest.approx(math.pi)
+
+
+def test_a_response_that_vanishes_below_some_frequency_has_no_slope_there() -> None:
+    """L = 1/x above 1e-4 and 0 below, as rounding cuts it: one pole, and no warning."""
+    order, _ = slope_at_dc(lambda x: np.where(x < 1e-4, 0.0, 1.0 / x).astype(complex), 1.0, 3)
+    assert order == 1
