@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
+BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
 _SLOW_HZ = 1e-5  # where the limit at zero frequency is read
 
 
@@ -58,7 +59,7 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
     """Frequencies over which a stiffness is drawn and its least value sought."""
-    highest = np.minimum(HIGHEST_HZ, 0.5 / np.asarray(response.period_s))
+    highest = np.minimum(HIGHEST_HZ, BELOW_NYQUIST / np.asarray(response.period_s))
     return np.moveaxis(np.geomspace(LOWEST_HZ, highest, POINTS), 0, -1)
 
 
