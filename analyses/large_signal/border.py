@@ -96,9 +96,9 @@ def check_border(
     ----------
     friction_on : bool
         Without dry friction the border is that of the linear loop; with it, the shift is what is asked for.
-        The overload protection (I2t) is left out as well: at its border it acts after many time constants.
-    Encoder counts are left out together with the friction, and so is the drop of a soft supply, which
-        lowers the voltage limit by what the drive draws: neither is a part of the linear loop.
+        Encoder counts are left out together with the friction, and so is the drop of a soft supply, which
+        lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is the
+        overload protection (I2t) in any case: at its border it acts after many of its time constants.
     """
     design, loops = _at_once(design, loops)
     if not friction_on:
