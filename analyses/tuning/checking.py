@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.batch import Population
+from actuator_lti.design import with_values
+from actuator_lti.loops import assemble_loops
 from actuator_lti.quantities import QUANTITIES
 from analyses.monte_carlo.stepping import StepCheck, step_columns
 from analyses.tuning.problem import Problem
@@ -36,8 +38,6 @@ def confirm(
     binding : tuple of BindingRequirement
         The same at their worst corners.
     """
-    from actuator_lti.design import with_values
-    from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
     from analyses.verdicts import judged
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import Population, linear_figures
+from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
@@ -107,8 +108,6 @@ class Problem:
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
         """All toleranced parameters that are no gain."""
-        from actuator_lti.batch import variable_paths
-        from actuator_lti.design import tolerances
 
         known = set(variable_paths(self.design)) - set(self.paths)
         return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
@@ -229,7 +228,6 @@ def problem_of(
     most : int
         Designs that a search may look at.
     """
-    from actuator_lti.design import parameter_value, paths_of
     from analyses.tuning.objects import allowed_range
 
     variables = []
