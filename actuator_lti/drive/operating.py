@@ -32,7 +32,7 @@ class Operating:
         with the coupling's torque against or with the motion, which decides the sign of the load-dependent
         friction; ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
     load_Nm : float
-        Hinge moment at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
+        Load torque at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
     speed_amplitude_rad_s : float or None
         W (peak, motor side), for the describing function.
     direction : {1, -1}

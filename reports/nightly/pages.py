@@ -84,7 +84,7 @@ def figures_csv(design: DesignView, history: History) -> str:
 
 
 def _render(template: str, **context: Any) -> str:
-    script = asset("nightly/nightly.js")
+    script = asset("nightly/nightly.js") + asset("live.js")
     counter = itertools.count(1)
     return (
         environment()
