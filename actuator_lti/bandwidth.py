@@ -23,6 +23,7 @@ from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import subdivided, variation
+from actuator_lti.plain_system import PlainSystem
 from actuator_lti.rest_mode import without_rest_mode
 
 Level = Literal["1/sqrt(2)", "-3 dB"]
@@ -171,11 +172,9 @@ def _shown(system: Any) -> Any:
     """A state space without a mode at zero frequency that it does not show."""
     if not hasattr(system, "A") or system.ninputs != 1 or system.noutputs != 1:
         return system
-    from control import StateSpace
-
     in_z = system.dt is not None and system.dt != 0
     A, B, C, kept = without_rest_mode(system.A, system.B, system.C, 1.0 if in_z else 0.0)
-    return system if kept.all() else StateSpace(A, B, C, system.D, system.dt, remove_useless_states=False)
+    return system if kept.all() else PlainSystem(A, B, C, system.D, system.dt)
 
 
 def _bandwidth(

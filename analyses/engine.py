@@ -214,6 +214,7 @@ def _local_cluster(workers: int) -> LocalCluster:
                 protocol="tls://",
                 security=Security.temporary(),
                 dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # or it asks for 8787, and warns
                 silence_logs=50,
             )
     finally:

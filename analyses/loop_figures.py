@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.plain_system import as_control
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -25,7 +27,7 @@ class LoopFigures:
     ----------
     loop : Loop
         The loop itself.
-    response : python-control system
+    plain_response : PlainSystem or python-control system
         What bandwidth and step are taken of: the closed loop; for the position loop the command to the
         output, feed-forward included.
     margins : StabilityMargins
@@ -37,12 +39,17 @@ class LoopFigures:
     """
 
     loop: Loop
-    response: Any
+    plain_response: Any
     margins: StabilityMargins
     bandwidth: Bandwidth | None
     peaks: Peaks | None
     step: StepFigures | None
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def response(self) -> Any:
+        """What bandwidth and step are taken of, as a python-control system."""
+        return as_control(self.plain_response)
 
     @property
     def stable(self) -> bool:
@@ -63,7 +70,7 @@ def loop_figures(
     Parameters
     ----------
     loop : Loop
-    response : python-control system, optional
+    response : PlainSystem or python-control system, optional
         Taken instead of the closed loop for bandwidth and step.
     bandwidth, step : bool
         Whether these are wanted; the step of a continuous loop with delays takes its time.
@@ -79,17 +86,17 @@ def loop_figures(
     from actuator_lti.margins import stability_margins
     from actuator_lti.step import step_figures
 
-    response = loop.closed_loop if response is None else response
-    margins = stability_margins(loop.open_loop, certify=certify)
+    response = loop.plain_closed if response is None else response
+    margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:
         return LoopFigures(loop, response, margins, None, None, None)
     notes: list[str] = []
     return LoopFigures(
         loop=loop,
-        response=response,
+        plain_response=response,
         margins=margins,
         bandwidth=_if_there_is(lambda: closed_loop_bandwidth(response), notes) if bandwidth else None,
-        peaks=peaks(loop.open_loop),
+        peaks=peaks(loop.plain_open),
         step=_if_there_is(lambda: step_figures(response), notes) if step else None,
         notes=tuple(dict.fromkeys(notes)),
     )
@@ -126,7 +133,7 @@ def all_loop_figures(
     """
     result = {}
     for name, loop in loops.present.items():
-        response = loops.reference_to_output if name == "position" else None
+        response = loops.plain_response if name == "position" else None
         try:
             result[name] = loop_figures(loop, response, step=step, certify=certify)
         except (InputError, NumericalError) as error:

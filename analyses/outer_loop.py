@@ -95,9 +95,9 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     return Loop(
         name=outer.name,
         break_point="command",
-        open_loop=around,
-        closed_loop=around.feedback(1),
-        sensitivity=_sensitivity(around),
+        plain_open=around,
+        plain_closed=around.feedback(1),
+        plain_sensitivity=_sensitivity(around),
         period_s=period,
         unit_in=unit,
         unit_out=unit,

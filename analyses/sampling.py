@@ -303,7 +303,7 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
         raise InputError(f"column {shown(unknown[0])}: no parameter of this design", where=where)
     try:
         rows = frame.to_numpy(dtype=float)
-    except ValueError as error:
+    except (ValueError, OverflowError, TypeError) as error:
         raise InputError(f"a value is no number: {error}", where=where) from error
     if rows.size == 0 or not np.all(np.isfinite(rows)):
         raise InputError("a table with at least one row of finite numbers is needed", where=where)

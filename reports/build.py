@@ -11,6 +11,7 @@ from actuator_lti.atomic import write_together
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from reports import document as doc
+from reports.document_schema import Document
 
 if TYPE_CHECKING:
     from analyses.isolation import Missing
@@ -25,7 +26,7 @@ FURTHER = ("failures", "duty", "cycles", "corners")
 
 def design_report(
     design: Design, validation: Sequence[doc.Section] = (), progress: Progress | None = None
-) -> dict[str, Any]:
+) -> Document:
     """Compute the report of a design as a document.
 
     Parameters
@@ -66,7 +67,11 @@ def design_report(
         *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
     with isolated() as unanswered:
-        items = [item for block in doc.walk(loops[0]) for item in block.get("items", ())] if loops else []
+        items = (
+            [item for block in doc.walk(loops[0]) if block["kind"] == "verdicts" for item in block["items"]]
+            if loops
+            else []
+        )
         answered = attempt("first screen", lambda: answer.section(figures, items, sections), None)
     first_screen = [answered] if answered and figures else []
     sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
@@ -78,7 +83,9 @@ def design_report(
         sections=sections,
     )
     live = attempt("sliders", lambda: live_model(design), None)
-    return {**made, "live": live} if live and figures else made
+    if live and figures:
+        made["live"] = live
+    return made
 
 
 def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, LoopFigures], list[doc.Section]]:

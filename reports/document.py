@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,31 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
 from reports.certain import certain
-from reports.document_schema import SCHEMA, VERSION, validate
+from reports.document_schema import (
+    SCHEMA,
+    VERSION,
+    Align,
+    Block,
+    Cell,
+    Column,
+    Document,
+    FactItem,
+    Layout,
+    Row,
+    Section,
+    Status,
+    VerdictItem,
+    validate,
+)  # fmt: skip
 from reports.findings import Finding
 from reports.findings import plain as plain_findings
 from reports.verdict_summary import summary
 
-Block = dict[str, Any]
-Section = dict[str, Any]
+__all__ = [
+    "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
+    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "load", "loads", "plain",
+    "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "walk", "with_columns",
+]  # fmt: skip
 
 
 def plain(value: Any) -> Any:
@@ -60,9 +78,14 @@ def rounded(values: Any, digits: int = 5) -> list[float | None]:
     return [float(f"{item:.{digits}g}") if math.isfinite(item) else None for item in array.tolist()]
 
 
+def abscissa(values: Any, digits: int = 5) -> list[float]:
+    """Give what stands along an axis, where every value is there, as `rounded` gives a curve."""
+    return [float(f"{item:.{digits}g}") for item in np.asarray(values, dtype=float).tolist()]
+
+
 def column(
-    key: str, label: str, unit: str = "", *, align: str | None = None, format: str = "text"
-) -> dict[str, Any]:
+    key: str, label: str, unit: str = "", *, align: Align | None = None, format: str = "text"
+) -> Column:
     """Describe a table's column.
 
     Parameters
@@ -71,12 +94,12 @@ def column(
         ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
         ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
     """
-    side = align or ("left" if format in ("text", "yesno") else "right")
+    side: Align = align or ("left" if format in ("text", "yesno") else "right")
     return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
 
 
 def table(
-    caption: str, columns: Sequence[dict[str, Any]], rows: Iterable[Mapping[str, Any]], note: str = ""
+    caption: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any]], note: str = ""
 ) -> Block:
     """Make a table; a row is a mapping by column key, with ``_status`` where it has one."""
     return {
@@ -88,7 +111,7 @@ def table(
     }
 
 
-def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout: str = "wide") -> Block:
+def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout: Layout = "wide") -> Block:
     """Make a figure, drawn by the module registered under ``name`` from these data alone.
 
     Parameters
@@ -100,8 +123,21 @@ def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
-    made = {"kind": "figure", "figure": name, "data": plain(data), "caption": caption, "alt": alt}
-    return {**made, "layout": layout}
+    return {
+        "kind": "figure",
+        "figure": name,
+        "data": plain(data),
+        "caption": caption,
+        "alt": alt,
+        "layout": layout,
+    }
+
+
+def with_columns(block: Block, keys: Collection[str]) -> Block:
+    """A table with some of its columns only, as a narrow page has room for; any other block as it is."""
+    if block["kind"] != "table":
+        return block
+    return {**block, "columns": [column for column in block["columns"] if column["key"] in keys]}
 
 
 def text(content: str) -> Block:
@@ -109,12 +145,12 @@ def text(content: str) -> Block:
     return {"kind": "text", "text": content}
 
 
-def fact(label: str, value: Any, unit: str = "") -> dict[str, Any]:
+def fact(label: str, value: Any, unit: str = "") -> FactItem:
     """Make one item of `facts`."""
     return {"label": label, "value": plain(value), "unit": unit}
 
 
-def facts(items: Iterable[Mapping[str, Any]]) -> Block:
+def facts(items: Iterable[FactItem]) -> Block:
     """Make a list of labelled values."""
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
@@ -134,12 +170,12 @@ def verdict(
     source: str = "",
     reason: str = "",
     comparison: str = "",
-) -> dict[str, Any]:
+) -> VerdictItem:
     """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` may be None.
 
     ``comparison`` is the good side of the limit, ``">="`` or ``"<="``; it is kept as it is printed.
     """
-    return plain(
+    item: VerdictItem = plain(
         {
             "id": id,
             "label": label,
@@ -153,9 +189,10 @@ def verdict(
             "reason": reason,
         }
     )
+    return item
 
 
-def verdicts(items: Iterable[Mapping[str, Any]], what: str = "requirements") -> Block:
+def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
     """Make a list of verdicts; ``what`` is a key of `reports.verdict_summary.WORDS`."""
     return {"kind": "verdicts", "items": [plain(item) for item in items], "what": what}
 
@@ -172,7 +209,7 @@ def section(
     *,
     result: str = "",
     intro: str = "",
-    status: str = "info",
+    status: Status = "info",
     findings: Iterable[Finding] = (),
 ) -> Section:
     """Make a section.
@@ -188,8 +225,15 @@ def section(
     findings : iterable of Finding
         What the first screen has to say of it.
     """
-    made = {"id": id, "title": title, "result": result, "intro": intro, "status": status}
-    return {**made, "blocks": list(blocks), "findings": plain_findings(findings)}
+    return {
+        "id": id,
+        "title": title,
+        "result": result,
+        "intro": intro,
+        "status": status,
+        "blocks": list(blocks),
+        "findings": plain_findings(findings),
+    }
 
 
 def document(
@@ -200,12 +244,12 @@ def document(
     provenance: Mapping[str, Any],
     sections: Sequence[Section],
     kind: str = "report",
-) -> dict[str, Any]:
+) -> Document:
     """Put a document together; its verdict counts every verdict in its sections.
 
     Numbers are rounded to the digits that are the same on every machine (`reports.certain`).
     """
-    made = {
+    made: Document = {
         "schema": SCHEMA,
         "version": VERSION,
         "kind": kind,

@@ -5,61 +5,95 @@ Keys beyond these are allowed: a later version may say more. What a figure holds
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal, NotRequired
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+    with_config,
+)
+from typing_extensions import TypedDict
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
-SCHEMA = "actuator-lti/report"
-VERSION = 1
+SCHEMA: Final = "actuator-lti/report"
+VERSION: Final = 1
 STATUSES = ("pass", "fail", "warn", "info")
 
 Status = Literal["pass", "fail", "warn", "info"]
+Layout = Literal["wide", "half", "tall"]
+Align = Literal["left", "right", "center"]
+Severity = Literal["fail", "warn", "info"]
 Scalar = None | bool | int | float | str
+Format = Annotated[str, Field(pattern=r"^(text|yesno|int|fix:1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
+
+_strict = with_config(
+    ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
+)  # no NaN; more keys may stand
 
 
-class _Part(BaseModel):
-    """Strict types, no NaN; unknown keys may stand."""
-
-    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False, frozen=True)
-
-
-class Mark(_Part):
+@_strict
+class Mark(TypedDict):
     """A cell with a state."""
 
     text: Scalar
-    status: Status | Literal[""] | None = None
+    status: Status | Literal[""] | None
+
+
+@_strict
+class State(TypedDict):
+    """A word with a state that is known."""
+
+    text: str
+    status: Status
 
 
 Cell = Annotated[
     Annotated[Mark, Tag("mark")] | Annotated[Scalar, Tag("plain")],
-    Discriminator(lambda value: "mark" if isinstance(value, dict | Mark) else "plain"),
+    Discriminator(lambda value: "mark" if isinstance(value, dict) else "plain"),
 ]
 
 
-class Column(_Part):
+def _row_state(row: dict[str, Any]) -> dict[str, Any]:
+    if row.get("_status") not in (*STATUSES, "", None):
+        raise ValueError(f"_status = {shown(row['_status'])}: allowed: {', '.join(STATUSES)}")
+    return row
+
+
+# by the keys of the columns; ``_status`` colours the row
+Row = Annotated[dict[str, Cell], AfterValidator(_row_state)]
+
+
+@_strict
+class Column(TypedDict):
     """A column of a table; see `reports.document.column`."""
 
     key: str
     label: str
     unit: str
-    align: Literal["left", "right", "center"]
-    format: Annotated[str, Field(pattern=r"^(text|yesno|int|(sig|short|fix|ms):1?[0-9])$")]
+    align: Align
+    format: Format
 
 
-class TableBlock(_Part):
+@_strict
+class TableBlock(TypedDict):
     """A table."""
 
     kind: Literal["table"]
     caption: str
     columns: list[Column]
-    rows: list[dict[str, Cell]]
-    note: str = ""
+    rows: list[Row]
+    note: NotRequired[str]
 
 
-class FigureBlock(_Part):
+@_strict
+class FigureBlock(TypedDict):
     """A figure: its module draws it from the data alone."""
 
     kind: Literal["figure"]
@@ -67,17 +101,19 @@ class FigureBlock(_Part):
     data: dict[str, Any]
     caption: str
     alt: str
-    layout: Literal["wide", "half", "tall"] = "wide"
+    layout: NotRequired[Layout]
 
 
-class TextBlock(_Part):
+@_strict
+class TextBlock(TypedDict):
     """Paragraphs."""
 
     kind: Literal["text"]
     text: str
 
 
-class FactItem(_Part):
+@_strict
+class FactItem(TypedDict):
     """A labelled value."""
 
     label: str
@@ -85,14 +121,16 @@ class FactItem(_Part):
     unit: str
 
 
-class FactsBlock(_Part):
+@_strict
+class FactsBlock(TypedDict):
     """Labelled values."""
 
     kind: Literal["facts"]
     items: list[FactItem]
 
 
-class VerdictItem(_Part):
+@_strict
+class VerdictItem(TypedDict):
     """One verdict."""
 
     id: str
@@ -105,17 +143,21 @@ class VerdictItem(_Part):
     passed: bool | None
     source: str
     reason: str
+    loop: NotRequired[str | None]
+    quantity: NotRequired[str]
 
 
-class VerdictsBlock(_Part):
+@_strict
+class VerdictsBlock(TypedDict):
     """Verdicts of one kind."""
 
     kind: Literal["verdicts"]
     items: list[VerdictItem]
-    what: str = "requirements"
+    what: NotRequired[str]
 
 
-class DetailsBlock(_Part):
+@_strict
+class DetailsBlock(TypedDict):
     """Blocks that open on demand."""
 
     kind: Literal["details"]
@@ -123,42 +165,55 @@ class DetailsBlock(_Part):
     blocks: list[Block]
 
 
-class GlanceFigure(_Part):
+@_strict
+class GlanceFigure(TypedDict):
     """One figure of a loop on the first screen, with the limit that is nearest to it."""
 
     label: str
     value: Scalar
     unit: str
-    format: str
+    format: Format
     limit: float | None
     comparison: str
     distance: float | None
     passed: bool | None
 
 
-class GlanceLoop(_Part):
+@_strict
+class GlanceLoop(TypedDict):
     """One loop on the first screen."""
 
     loop: str
     anchor: str
-    stable: Cell
+    stable: State
     figures: list[GlanceFigure]
 
 
-class FindingItem(_Part):
+@_strict
+class FindingItem(TypedDict):
     """One sentence that a reader must know."""
 
-    severity: Literal["fail", "warn", "info"]
+    severity: Severity
     text: str
     where: str
 
 
-class GlanceBlock(_Part):
+@_strict
+class Weakest(TypedDict):
+    """The requirement that is nearest to its limit, in words."""
+
+    label: str
+    words: str
+    passed: bool | None
+
+
+@_strict
+class GlanceBlock(TypedDict):
     """The first screen."""
 
     kind: Literal["glance"]
     loops: list[GlanceLoop]
-    weakest: dict[str, Scalar] | None
+    weakest: Weakest | None
     findings: list[FindingItem]
     more: int
 
@@ -169,39 +224,66 @@ Block = Annotated[
 ]
 
 
-class SectionPart(_Part):
+@_strict
+class Section(TypedDict):
     """A section."""
 
     id: Annotated[str, Field(min_length=1)]
     title: str
-    result: str = ""
+    result: NotRequired[str]
     intro: str
     status: Status
-    findings: list[FindingItem] = Field(default_factory=list)
+    findings: NotRequired[list[FindingItem]]
     blocks: list[Block]
 
 
-class Verdict(_Part):
+@_strict
+class Counts(TypedDict):
+    """Verdicts of one kind, counted."""
+
+    failed: int
+    not_judged: int
+    total: int
+
+
+@_strict
+class Verdict(TypedDict):
     """The verdicts of the whole document, counted."""
 
     passed: bool
     failed: int
     not_judged: int
     total: int
+    parts: NotRequired[dict[str, Counts]]
 
 
-class Document(_Part):
+@_strict
+class Provenance(TypedDict):
+    """By whom, of what and when it was made; more may stand."""
+
+    version: NotRequired[str | None]
+    time: NotRequired[str | None]
+    commit: NotRequired[str | None]
+    design_hash: NotRequired[str | None]
+
+
+@_strict
+class Document(TypedDict):
     """A whole report.json."""
 
-    schema_: Annotated[Literal["actuator-lti/report"], Field(alias="schema")]
+    schema: Literal["actuator-lti/report"]
     version: Literal[1]
     kind: str
     title: str
     subtitle: str
     design: dict[str, Scalar]
-    provenance: dict[str, Scalar | dict[str, Scalar]]
+    provenance: Provenance
     verdict: Verdict
-    sections: list[SectionPart]
+    sections: list[Section]
+    live: NotRequired[dict[str, Any]]
+
+
+_DOCUMENT: TypeAdapter[Document] = TypeAdapter(Document)
 
 
 def validate(made: Any, origin: str | None = None) -> None:
@@ -219,7 +301,7 @@ def validate(made: Any, origin: str | None = None) -> None:
             f"version = {shown(made.get('version'))}: this program reads version {VERSION}", where=origin
         )
     try:
-        Document.model_validate(made)
+        _DOCUMENT.validate_python(made)
     except (ValidationError, RecursionError) as error:
         raise InputError(_line(error), where=origin) from None
 

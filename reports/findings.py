@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
-Severity = Literal["fail", "warn", "info"]
+from reports.document_schema import FindingItem, Severity
+
 ORDER: tuple[Severity, ...] = ("fail", "warn", "info")
 
 
@@ -29,9 +30,9 @@ class Finding:
     where: str
 
 
-def plain(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+def plain(findings: Iterable[Finding]) -> list[FindingItem]:
     """Give findings as a section carries them."""
-    return [asdict(item) for item in findings]
+    return [{"severity": item.severity, "text": item.text, "where": item.where} for item in findings]
 
 
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:

@@ -14,7 +14,7 @@ from typing import Any
 from actuator_lti.errors import InputError
 from nonlinear.native import kernel_name
 
-LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "pint", "jinja2")
+LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2")
 
 
 def package_version() -> str:

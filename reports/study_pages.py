@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.atomic import write_together
 from reports import document as doc
+from reports.document_schema import Document
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def study_document(
     design: Design, sections: Sequence[doc.Section], *, title: str, subtitle: str, kind: str
-) -> dict[str, Any]:
+) -> Document:
     """Put a document of a study of a design together."""
     from actuator_lti.design import design_hash
     from reports.build import design_head

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from reports.document_schema import Counts, Verdict
+
 WORDS = {
     "requirements": ("requirements", "met", "not met"),
     "checks": ("checks by simulation", "passed", "failed"),
@@ -12,7 +14,7 @@ WORDS = {
 }
 
 
-def summary(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+def summary(blocks: Iterable[Mapping[str, Any]]) -> Verdict:
     """Count the verdicts, of each kind too: passed if none failed; those not judged are counted apart."""
     outcomes: dict[str, list[bool | None]] = {}
     for block in blocks:
@@ -21,10 +23,16 @@ def summary(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
             kind += [item["passed"] for item in block["items"]]
     whole = _counts([outcome for kind in outcomes.values() for outcome in kind])
     parts = {what: _counts(kind) for what, kind in outcomes.items()}
-    return {"passed": whole["failed"] == 0, **whole, "parts": parts}
+    return {
+        "passed": whole["failed"] == 0,
+        "failed": whole["failed"],
+        "not_judged": whole["not_judged"],
+        "total": whole["total"],
+        "parts": parts,
+    }
 
 
-def _counts(outcomes: Sequence[bool | None]) -> dict[str, int]:
+def _counts(outcomes: Sequence[bool | None]) -> Counts:
     return {
         "failed": sum(outcome is False for outcome in outcomes),
         "not_judged": sum(outcome is None for outcome in outcomes),
@@ -49,7 +57,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, bool]]:
     return [(_words(what, n), not n["failed"]) for what, n in parts.items() if n["total"]]
 
 
-def _words(what: str, counts: Mapping[str, int]) -> str:
+def _words(what: str, counts: Counts) -> str:
     name, good, bad = WORDS.get(what, (what, "passed", "failed"))
     total, failed, unjudged = counts["total"], counts["failed"], counts["not_judged"]
     words = f"{failed} of {total} {name} {bad}" if failed else f"{total - unjudged} of {total} {name} {good}"

@@ -60,7 +60,9 @@ def quoted(row, period, out):
     _margins(row, period, out)
     out[MODULUS_MARGIN] = row[MODULUS]
     out[SENSITIVITY_PEAK] = -_decibel(row[MODULUS])
-    out[RESONANCE_PEAK] = max(_decibel(row[PEAK_T] / abs(row[DC_GAIN])), 0.0)
+    out[RESONANCE_PEAK] = math.nan
+    if abs(row[DC_GAIN]) > 0.0:
+        out[RESONANCE_PEAK] = max(_decibel(row[PEAK_T] / abs(row[DC_GAIN])), 0.0)
     out[BANDWIDTH_HZ] = row[BANDWIDTH_X] / period / (2.0 * math.pi)
     out[BANDWIDTH_90DEG] = row[QUARTER_X] / period / (2.0 * math.pi)
     out[RISE_TIME], out[OVERSHOOT_PERCENT] = row[RISE] * period, row[OVERSHOOT]

@@ -13,6 +13,7 @@ from ._figures import (
     FINAL,
     GAIN_CROSSOVERS,
     HIDDEN,
+    PEAK_T,
     PHASE_CROSSOVERS,
     RADIUS,
     STABLE,
@@ -30,6 +31,7 @@ TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated 
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
 POINTS = 600  # angles to start from
 SMOOTH = 0.05
+NO_GAIN = 1e-9  # of the peak of |T|: less at DC is rounding of a response that is zero there
 LOG_10 = 2.302585092994046
 
 
@@ -145,6 +147,8 @@ def _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, s
             row[DC_GAIN] = real
     row[FINAL] = row[DC_GAIN]
     resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
+    if abs(row[DC_GAIN]) < NO_GAIN * row[PEAK_T]:  # speed against a spring: nothing to measure a fall from
+        row[DC_GAIN], row[FINAL] = math.nan, 0.0
     bandwidths(count, xs, rs, ss, row[DC_GAIN], lead, row, n, a, b, c, work, state, exchanged)
 
 

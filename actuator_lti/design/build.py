@@ -201,7 +201,7 @@ class Builder:
         values = tuple(object_from(label, entry, self.where) for label, entry in raw.values.items())
         check_objects(values, self.where)
         factor = checked_factor(raw.velocity_gain_factor, self.where)
-        return model.ControllerObjects(velocity_gain_factor=factor, values=values)
+        return model.ControllerObjects(velocity_gain_factor=factor, values=values, family=raw.family)
 
     def design(self, origin: str) -> model.Design:
         """The whole design."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.field_table import ALL_FIELDS
 from actuator_lti.design.sections import template_of
@@ -23,6 +25,7 @@ def field_of(path: str) -> Field | None:
     return None if "*" in path else FIELDS.get(template_of(path))
 
 
+@cache
 def fields_in(section: str) -> tuple[Field, ...]:
     """All keys of a section such as ``"control.velocity"`` or ``"gear.*"``."""
     return tuple(field for field in ALL_FIELDS if field.section == section)

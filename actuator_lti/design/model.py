@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf, log, pi, prod, sin, sqrt
+from math import inf, pi, prod, sin, sqrt
 from typing import Any, Literal
+
+import numpy as np
 
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
@@ -26,6 +28,7 @@ AntiWindup = Literal["conditional", "clamped", "back-calculation"]
 FilterKind = Literal["lowpass", "notch", "leadlag", "biquad"]
 FilterPlace = Literal["torque", "speed"]
 Overload = Literal["thermal", "excess"]
+ObjectFamily = Literal["", "faulhaber-mc-v3"]
 Stage = Literal["position", "velocity", "current", "voltage"]
 
 STANDARD_GRAVITY_m_s2 = 9.80665
@@ -391,7 +394,7 @@ class Limits:
         return (
             self.peak_time_s * (r2 - 1)
             if self.overload == "excess"
-            else self.peak_time_s / log(r2 / (r2 - 1))
+            else self.peak_time_s / np.log(r2 / (r2 - 1))
         )
 
 
@@ -546,6 +549,8 @@ class ControllerObject:
 class ControllerObjects:
     """The controller's own settings that a design was imported from, also those that no key holds.
 
+    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges
+    and steps of its objects.
     ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
     9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
     index and subindex.
@@ -553,6 +558,12 @@ class ControllerObjects:
 
     velocity_gain_factor: float = 1.0
     values: tuple[ControllerObject, ...] = ()
+    family: ObjectFamily = ""
+
+    @property
+    def named(self) -> bool:
+        """Whether the drive is run by the motion controller whose objects these are."""
+        return bool(self.family or self.values)
 
     def __post_init__(self) -> None:
         """Put the values in order."""

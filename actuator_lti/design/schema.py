@@ -18,6 +18,7 @@ from pydantic import (
 from pydantic import Field as Slot
 
 from actuator_lti.design.fields import Field, fields_in
+from actuator_lti.design.model import ObjectFamily
 from actuator_lti.design.sections import children
 
 MAX_GEARS = 20
@@ -87,6 +88,7 @@ class RawObjects(BaseModel):
 
     model_config = _STRICT
     velocity_gain_factor: StrictFloat | StrictInt = 1.0
+    family: ObjectFamily = ""
     values: Annotated[dict[str, Any], Slot(max_length=MAX_OBJECTS)] = Slot(default_factory=dict)
 
 

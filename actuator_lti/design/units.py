@@ -1,6 +1,6 @@
 """Quantities as a data sheet writes them: ``"6 uH"``, ``"9.2 g*cm^2"``, ``"9000 rpm"``.
 
-pint does the arithmetic, in a small registry of the units that a drive needs.  The angle is a dimension
+A unit is a product of powers of names, its factor exact until it is rounded once.  The angle is a dimension
 of its own here, so that ``120 1/s`` (a gain) and ``120 rad/s`` (a speed) are not mistaken for each other;
 where SI lets the radian go (``V*s/rad`` or ``V*s``) it may be left out.
 """
@@ -8,56 +8,53 @@ where SI lets the radian go (``V*s/rad`` or ``V*s``) it may be left out.
 from __future__ import annotations
 
 import re
+from collections import Counter, deque
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
+from fractions import Fraction
 from functools import lru_cache
 from math import isfinite
-from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
-_DEFINITIONS = """
-tera- = 1e12 = T-
-giga- = 1e9 = G-
-mega- = 1e6 = M-
-kilo- = 1e3 = k-
-centi- = 1e-2 = c-
-milli- = 1e-3 = m-
-micro- = 1e-6 = u- = µ-
-nano- = 1e-9 = n-
-pico- = 1e-12 = p-
-meter = [length] = m = metre
-second = [time] = s = sec
-kilogram = [mass] = kg
-ampere = [current] = A = amp
-radian = [angle] = rad
-percent = 0.01
-gram = 1e-3 * kilogram = g
-inch = 0.0254 * meter = in
-foot = 0.3048 * meter = ft
-pound = 0.45359237 * kilogram = lb
-ounce = 0.028349523125 * kilogram = oz
-minute = 60 * second = min
-hour = 3600 * second = h
-newton = kilogram * meter / second ** 2 = N
-pound_force = 4.4482216152605 * newton = lbf
-ounce_force = 0.27801385095378125 * newton = ozf
-joule = newton * meter = J
-newton_meter = newton * meter = Nm
-watt = joule / second = W
-volt = watt / ampere = V
-ohm = volt / ampere = Ω = Ohm
-henry = volt * second / ampere = H
-farad = ampere * second / volt = F
-kelvin = [temperature] = K
-celsius = [celsius] = degC
-degree = 0.017453292519943295 * radian = deg
-turn = 6.283185307179586 * radian = rev = _ = revolution
-rpm = 0.10471975511965977 * radian / second
-hertz = 6.283185307179586 * radian / second = Hz
-"""
+_PREFIXES = {
+    "tera": 12, "T": 12, "giga": 9, "G": 9, "mega": 6, "M": 6, "kilo": 3, "k": 3, "centi": -2, "c": -2,
+    "milli": -3, "m": -3, "micro": -6, "u": -6, "µ": -6, "nano": -9, "n": -9, "pico": -12, "p": -12,
+}  # fmt: skip
+_BASE = {
+    "m meter metre": "[length]", "s second sec": "[time]", "kg kilogram": "[mass]",
+    "A ampere amp": "[current]", "rad radian": "[angle]",
+    "K kelvin": "[temperature]", "degC celsius": "[celsius]",
+}  # fmt: skip
+# What each is, in units that stand above it.
+_DERIVED = {
+    "percent": ("0.01", "1"),
+    "g gram": ("0.001", "kg"),
+    "in inch": ("0.0254", "m"),
+    "ft foot": ("0.3048", "m"),
+    "lb pound": ("0.45359237", "kg"),
+    "oz ounce": ("0.028349523125", "kg"),
+    "min minute": ("60", "s"),
+    "h hour": ("3600", "s"),
+    "N newton": ("1", "kg*m/s^2"),
+    "lbf pound_force": ("4.4482216152605", "N"),
+    "ozf ounce_force": ("0.27801385095378125", "N"),
+    "J joule": ("1", "N*m"),
+    "Nm newton_meter": ("1", "N*m"),
+    "W watt": ("1", "J/s"),
+    "V volt": ("1", "W/A"),
+    "ohm Ω Ohm": ("1", "V/A"),
+    "H henry": ("1", "V*s/A"),
+    "F farad": ("1", "A*s/V"),
+    "deg degree": ("0.017453292519943295", "rad"),
+    "rev turn revolution": ("6.283185307179586", "rad"),
+    "rpm": ("0.10471975511965977", "rad/s"),
+    "Hz hertz": ("6.283185307179586", "rad/s"),
+}
+_WORD = 4  # letters from which a name may stand in the plural: "volts", but "Nms" and "As" are no units
+_PLURALS = ("sec", "min", "rev", "amp", "ohm")
 
 _TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))")
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
@@ -67,6 +64,8 @@ _RUN_TOGETHER = re.compile(r"\b(k?g)(c?m\^2)")
 _MAX_TEXT = 120
 
 Dimension = tuple[tuple[str, int], ...]
+Exact = tuple[Fraction, Counter[str]]  # a factor to SI, and exponents
+Units = dict[str, Exact]
 
 
 @dataclass(frozen=True)
@@ -86,15 +85,6 @@ class UnitValue:
         return tuple(item for item in self.dimension if item[0] != "[angle]")
 
 
-@lru_cache(maxsize=1)
-def _registry() -> Any:
-    import pint
-
-    registry: Any = pint.UnitRegistry(None, cache_folder=None)
-    registry.load_definitions([line for line in _DEFINITIONS.splitlines() if line])
-    return registry
-
-
 def _tidy(unit: str) -> str:
     text = unit.strip()
     for old, new in (("²", "^2"), ("³", "^3"), ("·", "*"), ("⋅", "*"), ("×", "*"), ("μ", "µ"), ("**", "^")):
@@ -105,27 +95,80 @@ def _tidy(unit: str) -> str:
     return _RUN_TOGETHER.sub(r"\1*\2", _BARE_POWER.sub(r"^\1", text)).rstrip()
 
 
-def _expression(unit: str) -> str:
-    """The unit in pint's grammar, let through only if it is a product of powers of names."""
-    text, position, depth, last = _tidy(unit), 0, 0, "("
-    parts: list[str] = []
+def _tokens(unit: str) -> deque[str]:
+    """Names, powers, signs and parentheses, with a sign between two factors."""
+    text, position = _tidy(unit), 0
+    found: deque[str] = deque()
     while position < len(text):
         match = _TOKEN.match(text, position)
-        if match is None or len(parts) > 40:
+        if match is None or len(found) > 40:
             raise ValueError(f"{shown(unit)} is not a unit")
-        kind, token = str(match.lastgroup), match.group().strip()
-        operand, ended = kind == "name" or token == "(", last in ("name", ")", "power")
-        depth += {"(": 1, ")": -1}.get(token, 0)
-        if depth < 0 or not (operand or ended) or (kind == "power" and last == "power"):
-            raise ValueError(f"{shown(unit)} is not a unit")
-        if operand and ended:
-            parts.append("*")
-        parts.append(token.replace("^", "**"))
-        last = token if kind == "sign" else kind
+        token = match.group().strip()
+        begins = token == "(" or match.lastgroup == "name"
+        if begins and found and (found[-1] not in ("*", "/", "(")):
+            found.append("*")
+        found.append(token)
         position = match.end()
-    if depth or last in ("*", "/", "("):
-        raise ValueError(f"{shown(unit)} is not a unit")
-    return " ".join(parts)
+    return found
+
+
+def _product(tokens: deque[str], units: Units) -> Exact:
+    """A product up to the end or a closing parenthesis, from left to right; IndexError where it is none."""
+    factor, powers = _factor(tokens, units)
+    while tokens and tokens[0] in ("*", "/"):
+        sign = 1 if tokens.popleft() == "*" else -1
+        more, others = _factor(tokens, units)
+        factor *= more**sign
+        powers = _summed(powers, others, sign)
+    return factor, powers
+
+
+def _factor(tokens: deque[str], units: Units) -> Exact:
+    """A name or a product in parentheses, with its power."""
+    token = tokens.popleft()
+    if token == "(":
+        factor, powers = _product(tokens, units)
+        if tokens.popleft() != ")":
+            raise IndexError
+    elif token[0] in ")*/^":
+        raise IndexError
+    else:
+        factor, powers = _named(token, units)
+    if tokens and tokens[0][0] == "^":
+        power = int(tokens.popleft()[1:])
+        factor, powers = factor**power, Counter({name: power * n for name, n in powers.items()})
+    return factor, powers
+
+
+def _summed(powers: Counter[str], others: Counter[str], sign: int) -> Counter[str]:
+    return Counter({name: powers[name] + sign * others[name] for name in {**powers, **others}})
+
+
+@lru_cache(maxsize=1)
+def _units() -> Units:
+    """Every name without a prefix."""
+    units: Units = {"1": (Fraction(1), Counter())}
+    for names, dimension in _BASE.items():
+        units |= dict.fromkeys(names.split(), (Fraction(1), Counter({dimension: 1})))
+    for names, (number, definition) in _DERIVED.items():
+        factor, powers = _product(_tokens(definition), units)
+        units |= dict.fromkeys(names.split(), (Fraction(number) * factor, powers))
+    return units
+
+
+def _named(name: str, units: Units) -> Exact:
+    """A name, with a prefix, in the plural."""
+    for one in (name, name.removesuffix("s")):
+        plural = one != name
+        for prefix, power in (("", 0), *_PREFIXES.items()):
+            unit = one[len(prefix) :]
+            if not one.startswith(prefix) or unit not in units or (power and unit in ("kg", "kilogram")):
+                continue
+            if plural and not (len(unit) >= _WORD or unit in _PLURALS):
+                continue
+            factor, powers = units[unit]
+            return factor * Fraction(10) ** power, powers
+    raise ValueError(_unknown(name, units))
 
 
 @lru_cache(maxsize=512)
@@ -137,27 +180,29 @@ def parse_unit(unit: str) -> UnitValue:
     ValueError
         If it is no unit, with the nearest known one where there is one.
     """
-    import pint
-
     if len(unit) > _MAX_TEXT:
         raise ValueError("a unit of more than 120 characters")
     if unit.strip() in ("", "1"):
         return UnitValue(1.0, ())
-    registry = _registry()
+    tokens = _tokens(unit)
     try:
-        quantity = registry.parse_expression(_expression(unit))
-        root = registry.Quantity(1.0, "") * quantity
-        root = root.to_root_units()
-    except pint.UndefinedUnitError as error:
-        raise ValueError(_unknown(str(error.unit_names))) from None
-    dimension = tuple(sorted((str(k), int(v)) for k, v in root.dimensionality.items()))
-    return UnitValue(float(root.magnitude), dimension)
+        factor, powers = _product(tokens, _units())
+    except IndexError:
+        raise ValueError(f"{shown(unit)} is not a unit") from None
+    if tokens:
+        raise ValueError(f"{shown(unit)} is not a unit")
+    dimension = tuple(sorted((name, power) for name, power in powers.items() if power))
+    try:
+        size = float(factor)
+    except OverflowError:
+        size = 0.0
+    if size == 0.0:
+        raise ValueError(f"{shown(unit)} is beyond the range of floats")
+    return UnitValue(size, dimension)
 
 
-def _unknown(name: str) -> str:
-    known = [line.split(" = ")[i].strip() for line in _DEFINITIONS.splitlines() if line for i in (0, -1)]
-    name = re.sub(r"[^A-Za-z_µΩ]", "", name.split(",")[0])
-    near = get_close_matches(name, [unit for unit in known if not unit.endswith("-")], 1, 0.5)
+def _unknown(name: str, units: Units) -> str:
+    near = get_close_matches(name, [known for known in units if known != "1"], 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")
 
 

@@ -74,6 +74,7 @@ def design_tree(design: Design) -> dict[str, Any]:
         tree["objects"] = {
             "velocity_gain_factor": design.objects.velocity_gain_factor,
             "values": {item.label: object_entry(item) for item in design.objects.values},
+            **({"family": design.objects.family} if design.objects.family else {}),
         }
     return {key: value for key, value in tree.items() if value not in ({}, [])}
 

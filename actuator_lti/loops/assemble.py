@@ -121,7 +121,7 @@ def _sampled(wired: Drive, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]
         "stages": {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages},
         "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
         "limiters": sampled_limiters(wired) if whole else {},
-        "reference_to_output": sampled.reference_to_output(wired) if whole else None,
+        "plain_response": sampled.reference_to_output(wired) if whole else None,
         "moment_system": partial(sampled.moment_to_output, wired) if whole else None,
         "tick_system": sampled.tick_system(wired) if whole else None,
     }
@@ -138,7 +138,7 @@ def _continuous(wired: Drive, opened: dict[str, tuple[str, ...]], delays: frozen
         },
         "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
         "limiters": continuous_limiters(wired, delays) if whole else {},
-        "reference_to_output": continuous.reference_to_output(wired, delays) if whole else None,
+        "plain_response": continuous.reference_to_output(wired, delays) if whole else None,
         "moment_system": partial(continuous.moment_to_output, wired, delays) if whole else None,
         "tick_system": None,
     }

@@ -94,11 +94,11 @@ def _loop(wired: Drive, loop: DelaySystem, name: str, point: str, signals: tuple
     return Loop(
         name=name,
         break_point=point,
-        open_loop=finished(loop, name=f"{label}_open_loop", inputs=[error], outputs=[measured]),
-        closed_loop=finished(
+        plain_open=finished(loop, name=f"{label}_open_loop", inputs=[error], outputs=[measured]),
+        plain_closed=finished(
             loop.feedback(), name=f"{label}_closed_loop", inputs=["reference"], outputs=[measured]
         ),
-        sensitivity=finished(
+        plain_sensitivity=finished(
             one.feedback(loop), name=f"{label}_sensitivity", inputs=["reference"], outputs=[error]
         ),
         period_s=None,

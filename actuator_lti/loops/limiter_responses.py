@@ -9,7 +9,6 @@ import numpy as np
 from actuator_lti.drive.wiring import Drive
 from actuator_lti.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.blocks import compose
-from actuator_lti.loops.continuous import systems
 from actuator_lti.loops.flow import FlowProgram
 from actuator_lti.loops.tick import TickProgram
 
@@ -47,6 +46,8 @@ def sampled_limiters(wired: Drive) -> dict[str, LimiterPath]:
 
 def continuous_limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:
     """With exact delays, or ideal; the change of the speed command is taken as its derivative."""
+    from actuator_lti.loops.continuous import systems  # with it python-control
+
     flow = FlowProgram(wired, wired.outermost, None, (), delays).flow()
 
     def evaluate(signal: str, every: int, rate: bool) -> Response:

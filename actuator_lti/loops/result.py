@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
+from actuator_lti.plain_system import as_control
+
 Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class Loop:
-    """A loop seen at one place, as python-control systems.
+    """A loop seen at one place: `open_loop`, `closed_loop` and `sensitivity` are python-control systems.
 
     With e the error there, y what comes back: ``y = L e``, ``e = r - y``.
 
@@ -32,9 +34,9 @@ class Loop:
     break_point : str
         Where it is cut: ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``. Cutting a loop at its own error
         gives the same L, as all is in series.
-    open_loop, closed_loop, sensitivity : python-control systems
-        L, T = L/(1 + L) and S = 1/(1 + L). ``control.StateSpace`` (sampled with dt, ideal without) or
-        `actuator_lti.delay_system.DelaySystem` (continuous). T and S do not contain the feed-forward.
+    plain_open, plain_closed, plain_sensitivity : PlainSystem, or python-control systems
+        What `open_loop`, `closed_loop` and `sensitivity` are made of when they are first asked for; all
+        figures take these as well.
     period_s : float or None
         Sampling period of this loop; ``None`` where not sampled.
     unit_in, unit_out : str
@@ -46,13 +48,32 @@ class Loop:
 
     name: str
     break_point: str
-    open_loop: Any
-    closed_loop: Any
-    sensitivity: Any
+    plain_open: Any
+    plain_closed: Any
+    plain_sensitivity: Any
     period_s: float | None
     unit_in: str
     unit_out: str
     periodic: bool = False
+
+    @cached_property
+    def open_loop(self) -> Any:
+        """L as a python-control system.
+
+        ``control.StateSpace`` (sampled with dt, ideal without) or
+        `actuator_lti.delay_system.DelaySystem` (continuous).
+        """
+        return as_control(self.plain_open)
+
+    @cached_property
+    def closed_loop(self) -> Any:
+        """T = L/(1 + L) as a python-control system, without the feed-forward."""
+        return as_control(self.plain_closed)
+
+    @cached_property
+    def sensitivity(self) -> Any:
+        """S = 1/(1 + L) as a python-control system, without the feed-forward."""
+        return as_control(self.plain_sensitivity)
 
     def plot_bode(self, axes: Any = None) -> list[Axes]:
         """Draw the open loop over frequency with every gain and phase margin; gives matplotlib's axes.
@@ -103,9 +124,8 @@ class Loops:
     limiters : mapping of str to LimiterPath
         By the names of `actuator_lti.drive.signals.LIMITERS`, as far as they exist: from the command to what
         each limiter sees.
-    reference_to_output : python-control system or None
-        Command at the output shaft to output angle, feed-forward included; of a speed drive the command to
-        the motor's speed, of a torque drive to its current, of a voltage drive to the motor's speed.
+    plain_response : PlainSystem, python-control system or None
+        What `reference_to_output` is made of when it is first asked for.
     moment_system : callable or None
         Makes `moment_to_output`.
     tick_system : TickSystem or None
@@ -123,10 +143,19 @@ class Loops:
     position: Loop | None
     break_points: Mapping[str, Loop]
     limiters: Mapping[str, LimiterPath]
-    reference_to_output: Any | None
+    plain_response: Any | None
     moment_system: Callable[[], Any] | None
     tick_system: TickSystem | None
     period_s: float | None
+
+    @cached_property
+    def reference_to_output(self) -> Any | None:
+        """Command at the output shaft to output angle, feed-forward included, as a python-control system.
+
+        Of a speed drive the command to the motor's speed, of a torque drive to its current, of a voltage
+        drive to the motor's speed. None with the rotor locked.
+        """
+        return as_control(self.plain_response)
 
     @cached_property
     def moment_to_output(self) -> Any | None:
@@ -136,7 +165,7 @@ class Loops:
         is first asked for: with slow outer stages it has hundreds of states
         (`actuator_lti.loops.compliance` has the same response with few). None with the rotor locked.
         """
-        return None if self.moment_system is None else self.moment_system()
+        return None if self.moment_system is None else as_control(self.moment_system())
 
     @property
     def operating_point(self) -> str:

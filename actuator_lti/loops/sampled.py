@@ -1,8 +1,6 @@
-"""The exact sampled form: every loop as a python-control state space with its own period."""
+"""The exact sampled form: every loop as a state space with its own period."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 from actuator_lti.drive.wiring import COMMANDS, ERRORS, MEASURED, Drive
 from actuator_lti.loops.blocks import Block
@@ -10,19 +8,12 @@ from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
 from actuator_lti.loops.tick import TickProgram
-
-if TYPE_CHECKING:
-    import control
+from actuator_lti.plain_system import PlainSystem
 
 
-def to_control(block: Block, period_s: float, name: str, source: str, signal: str) -> control.StateSpace:
-    """A named python-control system of a block."""
-    import control
-
-    names = {"inputs": [source], "outputs": [signal], "name": name}
-    if block.states:
-        names["states"] = [state.replace(".", "_") for state in block.states]
-    return control.ss(block.A, block.B, block.C, block.D, period_s, remove_useless_states=False, **names)
+def _system(block: Block, period_s: float, name: str, source: str, signal: str) -> PlainSystem:
+    """A block of one design with its period and its names."""
+    return PlainSystem(block.A, block.B, block.C, block.D, period_s, name, source, signal, block.states)
 
 
 def _loop(
@@ -35,9 +26,9 @@ def _loop(
     return Loop(
         name=name,
         break_point=point,
-        open_loop=to_control(block, period, f"{label}_open_loop", error, measured),
-        closed_loop=to_control(block.feedback(), period, f"{label}_closed_loop", "reference", measured),
-        sensitivity=to_control(block.sensitivity(), period, f"{label}_sensitivity", "reference", error),
+        plain_open=_system(block, period, f"{label}_open_loop", error, measured),
+        plain_closed=_system(block.feedback(), period, f"{label}_closed_loop", "reference", measured),
+        plain_sensitivity=_system(block.sensitivity(), period, f"{label}_sensitivity", "reference", error),
         period_s=period,
         unit_in=unit,
         unit_out=unit,
@@ -71,11 +62,11 @@ def point_loop(wired: Drive, point: str) -> Loop:
     )
 
 
-def reference_to_output(wired: Drive) -> control.StateSpace:
+def reference_to_output(wired: Drive) -> PlainSystem:
     """Command to what the outermost stage moves, at its instants (see `Loops.reference_to_output`)."""
     source, signal, every, label = whole_path(wired)
     block = fundamental_path(TickProgram(wired, wired.outermost), every, "ref", signal)
-    return to_control(block.shown(), every * wired.tick_s, "reference_to_output", source, label)
+    return _system(block.shown(), every * wired.tick_s, "reference_to_output", source, label)
 
 
 def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:
@@ -93,7 +84,7 @@ def whole_path(wired: Drive) -> tuple[str, str, int, str]:
     return COMMANDS[stage], signal, wired.interval.get(stage, 1), label
 
 
-def moment_to_output(wired: Drive) -> control.StateSpace:
+def moment_to_output(wired: Drive) -> PlainSystem:
     """Moment on the output shaft, held over every tick, to the output angle: the compliance, all loops
     closed.
 
@@ -101,7 +92,7 @@ def moment_to_output(wired: Drive) -> control.StateSpace:
     fundamental of the periodic loop.
     """
     block = fundamental_path(TickProgram(wired, wired.outermost), 1, "moment", "output_angle")
-    return to_control(block, wired.tick_s, "moment_to_output", "moment", "output_angle")
+    return _system(block, wired.tick_s, "moment_to_output", "moment", "output_angle")
 
 
 def tick_system(wired: Drive) -> TickSystem:

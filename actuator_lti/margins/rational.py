@@ -9,6 +9,7 @@ import numpy as np
 from actuator_lti.margins.assemble import Figures, assembled, delay_margins
 from actuator_lti.margins.crossings import Crossings, find_crossings
 from actuator_lti.margins.extremes import DISK, FAR, MODULUS, Criterion, smallest
+from actuator_lti.margins.factors import zeros
 from actuator_lti.margins.level_crossings import LevelCrossings
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.nyquist import nyquist_count
@@ -22,7 +23,7 @@ _REASON = (
     "poles and Nyquist count agree, the parity of the crossovers is right, no pole lies within its own error "
     "of the border"
 )
-_WIDEST = 1e6  # ratio of the poles up to which one eigenvalue problem holds all crossings
+_WIDEST = 1e6  # ratio of poles and zeros up to which one eigenvalue problem holds all crossings
 _NEAR_ONE = 1e-6
 _BELOW = np.array([0.01, 0.05, 0.2, 0.5])
 _ABOVE = np.array([2.0, 5.0, 20.0, 100.0])
@@ -91,9 +92,11 @@ def _trust(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles) -> None:
     if hardly_placed(loop, poles.values, False) or hardly_placed(loop, closed.values, True):
         raise Doubtful("rounding of the coefficients moves a pole over the border")
     size = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
+    if loop.numerator is not None:
+        size = np.concatenate((size, np.abs(zeros(loop))))
     size = size[size > 0.0]
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
-        raise Doubtful("poles over too many decades")
+        raise Doubtful("poles and zeros over too many decades")
 
 
 def _trust_crossings(loop: RationalLoop, crossings: Crossings, dc: complex, end: complex) -> None:

@@ -238,7 +238,7 @@ def model_signals(
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
     run = go(duration, initial=initial, progress=progress)
-    between = "command linear between samples but for its steps"
+    between = "command smooth between samples but for its steps"
     notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, {between}")
     limits = {name: use.fraction for name, use in run.limits.items()}
     series = _series(model, run)

@@ -127,15 +127,32 @@ def _from(controller: Controller, stage: str) -> Controller:
 def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
     """Times and values of the command at the drive's ticks.
 
-    Linear between the samples; a jump between two stretches that stand still is a step of the command, and
-    comes with the later sample.
+    Through the samples goes a smooth curve (modified Akima: its slope is continuous, and stays within that of
+    the samples around), as a feed-forward takes the slope: straight lines would give it steps at the very
+    instants of the record. A jump between two stretches that stand still is a step of the command, and comes
+    with the later sample.
     """
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
-    values = np.interp(ticks, time_s, driven.values)
-    before = np.clip(np.searchsorted(time_s, ticks + 1e-6 * period, side="right") - 1, 0, len(time_s) - 1)
-    step = steps_of(driven.values)[np.minimum(before, len(time_s) - 2)] & (before < len(time_s) - 1)
-    return ticks, np.asarray(np.where(step, driven.values[before], values), dtype=np.float64)
+    values = np.empty_like(ticks)
+    jumps = np.flatnonzero(steps_of(driven.values))
+    starts, ends = [0, *(jumps + 1)], [*(jumps + 1), len(time_s)]
+    edges = np.searchsorted(ticks, time_s[starts] - 1e-6 * period)
+    edges[0] = 0
+    for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
+        part = slice(start, end)
+        values[first:last] = _smooth(time_s[part], driven.values[part], ticks[first:last])
+    return ticks, values
+
+
+def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
+    """A smooth curve through samples; before the first and after the last it stands still."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    inside = np.clip(at_s, time_s[0], time_s[-1])
+    if len(values) < 3 or np.ptp(values) == 0.0:
+        return np.interp(inside, time_s, values)
+    return np.asarray(Akima1DInterpolator(time_s, values, method="makima")(inside), dtype=np.float64)
 
 
 def steps_of(values: FloatArray) -> NDArray[np.bool_]:

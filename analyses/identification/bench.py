@@ -15,6 +15,7 @@ from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
 from analyses.identification.joint_model import JointModel
 from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
 from analyses.identification.resimulation import Resimulated, resimulate
 from analyses.identification.rows import recipe_for
@@ -117,6 +118,7 @@ def identify_bench(
         start = design_with_estimate(start, electrical_estimate(start, electrical, told))
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
+    model = _unbiased(start, model, used, settings)
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
     items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled)
     try:
@@ -158,6 +160,18 @@ def _fitted(
         return fit.model, fit.laws
     model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
     return model, ()
+
+
+def _unbiased(
+    start: Design, model: JointModel, used: Sequence[Record], settings: BenchSettings
+) -> JointModel:
+    """The model less its own bias, where a design can be made of it and simulated."""
+    try:
+        estimate = joint_estimate(start, model, "", inertia_to=settings.inertia_to)
+        made = design_with_estimate(with_structure(start, model), estimate)
+    except InputError:
+        return model  # said where the design is made
+    return without_bias(start, made, model, used, _recipe(used[0], settings))
 
 
 def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:

@@ -14,6 +14,8 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 MIN_PERIODS = 4
+BESIDE = 6
+"""Places on either side of a line that its noise is taken from; a sharp resonance allows no more."""
 EXCITED = 25.0
 """A line counts as excited where its power is this many times that of its noise."""
 
@@ -28,7 +30,9 @@ class Lines:
     means : array, shape (signals, lines)
         Complex amplitudes, the mean over all periods.
     noise : array, shape (lines, signals, signals)
-        Covariance of these means, from the scatter between periods.
+        Covariance of these means, from the spectrum beside each line.
+    freedom : int
+        Degrees of freedom (complex) of that covariance.
     names : tuple of str
     periods : int
     """
@@ -38,6 +42,7 @@ class Lines:
     noise: ComplexArray
     names: tuple[str, ...]
     periods: int
+    freedom: int
 
 
 def excited_lines(
@@ -50,7 +55,10 @@ def excited_lines(
 ) -> Lines:
     """The lines of a periodic excitation.
 
-    A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first.
+    A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first. The
+    noise of a line is what the spectrum of the whole record holds beside it, where a periodic signal has
+    nothing. (The scatter between periods would be too large: what a motion that is not periodic leaves at the ends of one
+    period comes back at the start of the next with the opposite sign, and goes out of the mean.)
 
     Parameters
     ----------
@@ -81,10 +89,8 @@ def excited_lines(
             where=record.name,
         )
     start = len(record) - periods * samples
-    spectra = np.array([_spectra(record[name][start:], periods, samples) for name in names])
-    means = spectra.mean(axis=1)
-    rest = spectra - means[:, None, :]
-    noise = np.einsum("apk,bpk->kab", rest, rest.conj()) / (periods * (periods - 1))
+    spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
+    means, noise, freedom = _lines(spectra, periods)
     hertz = np.arange(means.shape[1]) / period_s
     limit = 0.4 / record.period_s if top_hz is None else top_hz
     power = np.abs(means[0]) ** 2
@@ -99,15 +105,26 @@ def excited_lines(
         noise=noise[chosen],
         names=names,
         periods=periods,
+        freedom=freedom,
     )
 
 
-def _spectra(values: FloatArray, periods: int, samples: int) -> ComplexArray:
-    """Amplitudes of every line in every period, shape (periods, lines); the mean rate is taken off."""
+def _spectrum(values: FloatArray, periods: int, samples: int) -> ComplexArray:
+    """Amplitudes of the whole record, a line at every ``periods``-th place; the mean rate is taken off."""
     block = values[: periods * samples].reshape(periods, samples)
     rate = (block[-1].mean() - block[0].mean()) / max((periods - 1) * samples, 1)
-    straight = rate * np.arange(periods * samples).reshape(periods, samples)
-    return np.asarray(np.fft.rfft(block - straight, axis=1) * (2.0 / samples))
+    straight = rate * np.arange(periods * samples)
+    return np.asarray(np.fft.rfft(block.ravel() - straight) * (2.0 / (periods * samples)))
+
+
+def _lines(spectra: ComplexArray, periods: int) -> tuple[ComplexArray, ComplexArray, int]:
+    """Lines, their covariance from the nearest places beside each that are no lines, and its freedom."""
+    reach = min(periods - 1, BESIDE)
+    places = np.arange(0, spectra.shape[1] - reach, periods)
+    away = np.array([step for step in range(-reach, reach + 1) if step])
+    beside = spectra[:, np.abs(places[:, None] + away)]
+    noise = np.einsum("akr,bkr->kab", beside, beside.conj()) / len(away)
+    return spectra[:, places], noise, len(away)
 
 
 def response(lines: Lines, output: str, by: str) -> tuple[ComplexArray, FloatArray]:

@@ -21,8 +21,10 @@ from analyses.identification.frequency import (
 )
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
+from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import Estimate, design_with_estimate
 from analyses.identification.two_mass import (
+    FLOORS,
     TwoMass,
     angle_responses,
     fit_two_mass,
@@ -38,6 +40,8 @@ from analyses.records.record import Record
 FloatArray = NDArray[np.float64]
 
 MISFIT_LIMIT = 3.0
+MISFIT_DOUBTED = 1.5
+"""Above this other starts are tried: a valley may be the wrong one."""
 GUARD = 1.5
 COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
 KEYS = {
@@ -48,7 +52,6 @@ KEYS = {
     "viscous": "friction.viscous",
     "load_viscous": "load.friction.viscous",
 }
-NOT_NEGATIVE = ("damping", "viscous", "load_viscous")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +119,7 @@ def identify_frequency(
         names.append("load_angle")
         used["output_angle"] = "load's angle"
     used = {**used, "angle": "motor angle", command: used.get(command, "its period")}
-    lines = _between_ticks(design, excited_lines(with_torque, tuple(names), period))
+    lines = _between_ticks(design, record, excited_lines(with_torque, tuple(names), period))
     held = _held(design, dict(fixed or {}))
     fit = _fitted(lines, reduction, names, held)
     play = None if play_record is None else _play_of(design, play_record, fit)
@@ -141,24 +144,25 @@ def identify_frequency(
     )
 
 
-def _between_ticks(design: Design, lines: Lines) -> Lines:
-    """The lines of the torque that acts, from those of the current sampled at the ticks.
+def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
+    """The lines of the torque that acts, from those of the current sampled at the ticks and of the angle.
 
-    Under a voltage held over a tick T the current goes from sample to sample by
-    ``r(s) = (1 - exp(-a s))/(1 - exp(-a T))``, a = R/L; a line of its samples is then one of the current
-    times ``(1/T) integral (1 - r + r exp(j w T)) exp(-j w s) ds``, which is sinc(w T/2)^2 for small a T.
+    What the voltage drives goes in steps, ``F`` of its samples; what the back-EMF drives, ``i_e = -kE j w
+    th/(R + j w L)``, does not: the torque is ``F (T - kM i_e) + kM i_e``.
     """
-    motor, tick = design.effective_motor, design.controller.period_s
-    if motor.resistance_ohm is None or not motor.inductance_H:
+    held, motor = held_voltage(design, record), design.effective_motor
+    if held is None or motor.torque_constant_Nm_A is None:
         return lines
-    a, omega = motor.resistance_ohm / motor.inductance_H, lines.omega_rad_s
-    hold = -np.expm1(-1j * omega * tick) / (1j * omega * tick)
-    decay = -np.expm1(-(a + 1j * omega) * tick) / ((a + 1j * omega) * tick)
-    rise = (hold - decay) / -np.expm1(-a * tick)
-    factor = np.ones((len(lines.names), len(omega)), dtype=complex)
-    factor[0] = hold + np.expm1(1j * omega * tick) * rise
-    noise = lines.noise * factor.T[:, :, None] * factor.T.conj()[:, None, :]
-    return replace(lines, means=lines.means * factor, noise=noise)
+    s = 1j * lines.omega_rad_s
+    factor = held.mean_over_sample(lines.omega_rad_s)
+    own = -motor.torque_constant_Nm_A * held.back_emf_A_per_rad_s * s / (1.0 + s / held.rate_1_s)
+    mix = np.zeros((len(s), len(lines.names), len(lines.names)), dtype=complex)
+    mix[:] = np.eye(len(lines.names))
+    mix[:, 0, 0] = factor
+    mix[:, 0, lines.names.index("angle")] += (1.0 - factor) * own
+    means = np.einsum("kab,bk->ak", mix, lines.means)
+    noise = np.einsum("kab,kbc,kdc->kad", mix, lines.noise, mix.conj())
+    return replace(lines, means=means, noise=noise)
 
 
 def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]]:
@@ -173,23 +177,29 @@ def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]
 
 
 def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float]) -> TwoMass:
-    """The fit; a damping or friction that comes out no larger than its error twice is held at zero."""
+    """The fit; a damping or friction that comes out negative is held at zero, the errors stay those without.
+
+    One that is merely small against its error stays: held at zero, its part would go into the others, beyond
+    their errors.
+    """
     start = {**start_of(lines, reduction, torque=names[0]), **held}
     load = "load_angle" if "load_angle" in names else None
     fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
-    if fit.misfit > MISFIT_LIMIT:
+    if fit.misfit > MISFIT_DOUBTED:
         for other in other_starts(start, lines, reduction):
             with suppress(NumericalError, np.linalg.LinAlgError):
                 again = {**other, **held}
                 result = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
                 start, fit = (again, result) if result.misfit < fit.misfit else (start, fit)
-            if fit.misfit <= MISFIT_LIMIT:
+            if fit.misfit <= MISFIT_DOUBTED:
                 break
-    weak = [name for name in NOT_NEGATIVE if name in fit.names and not fit[name] > 2.0 * fit.std(name)]
-    if not weak:
+    below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
+    if not below:
         return fit
-    zero = dict.fromkeys(weak, 0.0)
-    return fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
+    zero = dict.fromkeys(below, 0.0)
+    held_at_zero = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
+    rows = [fit.names.index(name) for name in held_at_zero.names]
+    return replace(held_at_zero, covariance=fit.covariance[np.ix_(rows, rows)])
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:

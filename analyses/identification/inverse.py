@@ -30,6 +30,7 @@ def fit_records(
     fixed: Mapping[str, float] | None = None,
     gravity: bool = False,
     knots_rad_s: Sequence[float] | None = None,
+    weights: Sequence[float] | None = None,
 ) -> JointModel:
     """Fit one inverse dynamic model to all records.
 
@@ -50,6 +51,8 @@ def fit_records(
         Whether a moment ``m g l sin(output angle + offset)`` is to be found.
     knots_rad_s : sequence of float, optional
         Speeds (from 0) of a friction map in the place of dry and viscous friction.
+    weights : sequence of float, optional
+        Of the records; by default each counts with the inverse of its own residual.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def fit_records(
             record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots_rad_s)
             for record, moment in zip(records, moments, strict=True)
         ]
-        model = replace(_fitted(design, blocks, form, held), knots_rad_s=_as_knots(knots_rad_s))
+        model = replace(_fitted(design, blocks, form, held, weights), knots_rad_s=_as_knots(knots_rad_s))
         if gravity:
             moments = [
                 model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine for block in blocks
@@ -82,7 +85,11 @@ def _as_knots(knots_rad_s: Sequence[float] | None) -> tuple[float, ...] | None:
 
 
 def _fitted(
-    design: Design, blocks: Sequence[Rows], form: FrictionForm, held: Mapping[str, float]
+    design: Design,
+    blocks: Sequence[Rows],
+    form: FrictionForm,
+    held: Mapping[str, float],
+    given: Sequence[float] | None = None,
 ) -> JointModel:
     names = blocks[0].names
     unknown = sorted(set(held) - set(names))
@@ -97,15 +104,15 @@ def _fitted(
     free = tuple(free[k] for k in kept)
     if not free:
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].record)
-    weights = np.ones(len(blocks))
+    weights = np.ones(len(blocks)) if given is None else np.asarray(given, dtype=float)
     solution = _joint(blocks, free, fixed, weights)
-    for _ in range(3 if len(blocks) > 1 else 0):
+    for _ in range(3 if len(blocks) > 1 and given is None else 0):
         weights = _weights(blocks, solution, weights)
         solution = _joint(blocks, free, fixed, weights)
     negative = _negative(free, solution)
     if negative:
         again = {name: default_value(design, name) for name in negative}
-        model = _fitted(design, blocks, form, {**held, **again})
+        model = _fitted(design, blocks, form, {**held, **again}, given)
         said = {
             name: Fixed(
                 value=again[name], reason="would come out negative: not told, the design's value kept"
@@ -228,6 +235,7 @@ def _model(
         records=tuple(_part(block, rest) for block, rest in zip(blocks, rests, strict=True)),
         recipe=blocks[0].recipe,
         condition=solution.condition,
+        weights=tuple(weights.tolist()),
         singles={name: tuple(one[name][0] if name in one else np.nan for one in singles) for name in free},
     )
 

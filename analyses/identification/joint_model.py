@@ -70,6 +70,10 @@ class JointModel:
         several; ``between`` is that scatter alone, by name, as a standard deviation of one record.
     relative_residual : float
         Norm of the residual over norm of the drive signal, after decimation, all records.
+    weights : tuple of float
+        Of the records.
+    bias : mapping
+        What was taken off each value as the fit's own bias; ``bias_told`` says how, or why not.
     """
 
     form: FrictionForm
@@ -86,6 +90,9 @@ class JointModel:
     condition: float
     singles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     knots_rad_s: tuple[float, ...] | None = None
+    weights: tuple[float, ...] = ()
+    bias: Mapping[str, float] = field(default_factory=dict)
+    bias_told: str = ""
 
     def __getitem__(self, name: str) -> float:
         if name in self.names:

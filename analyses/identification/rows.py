@@ -13,6 +13,8 @@ from actuator_lti.errors import InputError
 from analyses.identification.differentiation import Motion, decimated, filtered_motion
 from analyses.identification.dynamic import NAMES, FrictionForm, Recipe, base_columns
 from analyses.identification.linear_basis import linear_basis
+from analyses.identification.load_side import TwoSides, two_sides
+from analyses.identification.sampled_current import mean_current
 from analyses.records.consistency import place_of
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
@@ -186,25 +188,33 @@ def record_rows(
     drive, driven_by, told, back_emf = drive_of(design, record)
     if driven_by.startswith("voltage") and not is_benchmark(record):
         drive = np.interp(record.time_s - _late_s(design, record), record.time_s, drive)
-    names, columns = _friction_columns(motion, form, knots_rad_s)
     used = {place: "motion", driven_by: f"drive: {told}"}
-    if back_emf:
-        drive = drive - _damping(design) * motion.velocity
-    angle = _output_angle(design, record, motion, recipe)
     free = design.load.path == "back-drivable"
     if gravity and not free:
         raise InputError(
             'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
         )
-    known, source = moment_of(design, record, angle, gravity=not gravity)
+    angle = motion.position / design.total_ratio
+    sides = None
+    if design.coupling is not None:
+        known, _ = moment_of(design, record, np.asarray(angle))
+        sides = two_sides(design, record, place, motion, known, recipe)
+        motion, angle = sides.motor, sides.load.position / design.ratio_behind_coupling
+        told = f"{told}, {sides.told}"
+    if driven_by == "current":
+        constant = design.effective_motor.torque_constant_Nm_A
+        drive = constant * mean_current(design, record, record["current"], motion.acceleration)
+    names, columns = _friction_columns(motion, form, knots_rad_s)
+    if back_emf:
+        drive = drive - _damping(design) * motion.velocity
+    known, source = moment_of(design, record, np.asarray(angle), gravity=not gravity)
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
     if free:
         drive = drive + known / design.total_ratio
-    if design.coupling is not None:
-        reaction = _load_side(design, motion)
-        known = known - design.ratio_behind_coupling * reaction[0]
-        drive = drive - (reaction[1] / design.ratio_to_coupling if free else 0.0)
+    if sides is not None:
+        known = known - design.ratio_behind_coupling * sides.torque
+        drive = drive - (_reaction(design, sides) if free else 0.0)
     sines = np.column_stack([np.sin(angle), np.cos(angle)])
     table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
     moving = ~_at_rest(motion.velocity, period_of(record))
@@ -243,36 +253,11 @@ def _end_skip(motion: Motion, recipe: Recipe) -> int:
     return recipe.skip_end_samples if moving and len(speed) > 4 * recipe.skip_end_samples else 0
 
 
-def _output_angle(design: Design, record: Record, motion: Motion, recipe: Recipe) -> FloatArray:
-    """Angle of the output, on which slope and gravity depend: recorded, or that of the motor over N.
-
-    Behind a coupling the static twist under the design's own moments is taken off a motor's angle; play is
-    not.
-    """
-    rigid = motion.position / design.total_ratio
-    coupling = design.coupling
-    if coupling is None or design.axis == "linear":
-        return np.asarray(rigid)
-    if "output_angle" in record.signals:
-        return _filtered(record["output_angle"], period_of(record), recipe).position
-    moment, _ = moment_of(design, record, rigid)
-    behind = design.ratio_behind_coupling
-    twist = (_load_side(design, motion)[0] - moment / behind) / coupling.stiffness_Nm_rad
-    return np.asarray(rigid - twist / behind)
-
-
-def _load_side(design: Design, motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Torque that the load side takes without a moment, and its friction alone, at the coupling's shaft.
-
-    The coupling's twist is left out; inertia and friction behind it are the design's.
-    """
-    ratio, friction = design.ratio_to_coupling, design.load.friction
-    own = np.zeros_like(motion.velocity)
-    if friction is not None:
-        side = np.sign(motion.velocity)
-        viscous = friction.viscous_Nms_rad / ratio * motion.velocity
-        own = friction.dry_torque_Nm * side + viscous + friction.offset_torque_Nm
-    return design.load_side_inertia_kgm2 / ratio * motion.acceleration + own, own
+def _reaction(design: Design, sides: TwoSides) -> FloatArray:
+    """Torque of the load side at the motor, less its inertia's at the motor's own acceleration."""
+    ratio = design.ratio_to_coupling
+    inertia = design.load_side_inertia_kgm2 / ratio
+    return np.asarray(sides.torque / ratio - inertia * sides.motor.acceleration / ratio)
 
 
 def _damping(design: Design) -> float:

@@ -15,7 +15,8 @@ FloatArray = NDArray[np.float64]
 
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
-FLOORS = {"damping": 1e-6, "viscous": 1e-6, "load_viscous": 1e-6}
+FLOORS = ("damping", "viscous", "load_viscous")
+"""What no drive has negative, but an estimate of it by its error may be."""
 COVERAGE = 1.959963984540054
 
 
@@ -100,8 +101,9 @@ def fit_two_mass(
 ) -> TwoMass:
     """Fit the two-mass drive to the lines, by maximum likelihood with noise on all signals.
 
-    Each line's residual ``th - G torque`` is divided by its own standard deviation, which the scatter between
-    periods gives (errors in variables; Pintelon and Schoukens, System Identification, 2nd ed., section 9.11).
+    Each line's residual ``th - G torque`` is divided by its own standard deviation, which the spectrum
+    beside it gives (errors in variables; Pintelon and Schoukens, System Identification, 2nd ed., section
+    9.11).
 
     Parameters
     ----------
@@ -129,8 +131,8 @@ def fit_two_mass(
     outputs = [(motor, 0)] + ([(load, 1)] if load is not None else [])
 
     def unpacked(q: FloatArray) -> dict[str, float]:
-        own = dict(zip(names, np.abs(q * scale).tolist(), strict=True))
-        return {**held, **own}
+        own = dict(zip(names, (q * scale).tolist(), strict=True))
+        return {**held, **{name: value if name in FLOORS else abs(value) for name, value in own.items()}}
 
     def residual(q: FloatArray) -> FloatArray:
         g = angle_responses(lines.omega_rad_s, unpacked(q), reduction)
@@ -145,10 +147,10 @@ def fit_two_mass(
     if np.any(size == 0.0):
         raise NumericalError(f"the lines do not tell {names[int(np.argmin(size))]}; hold it with --fix")
     freedom = max(len(fit.fun) - len(names), 1)
-    misfit = float(np.sqrt(2.0 * fit.cost / freedom))
+    few, loss = _weighed(lines.freedom, len(outputs))
+    misfit = float(np.sqrt(2.0 * fit.cost / freedom / few))
     inverse = np.linalg.inv((fit.jac / size).T @ (fit.jac / size)) / np.outer(size, size)
-    few = (lines.periods - 1) / max(lines.periods - 1 - len(outputs), 1)
-    covariance = inverse * few * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
+    covariance = inverse * few * loss * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
     own = unpacked(fit.x)
     return TwoMass(
         names=names,
@@ -159,6 +161,17 @@ def fit_two_mass(
         misfit=misfit,
         lines=len(lines.omega_rad_s) * len(outputs),
     )
+
+
+def _weighed(freedom: int, outputs: int) -> tuple[float, float]:
+    """What weights from a few places beside each line do: they are too large, and the estimate scatters more.
+
+    For a complex Wishart matrix X of n degrees of freedom and q outputs, E X^-1 = 1/(n - q) and E X^-2 =
+    n/((n - q)^3 - (n - q)): the information is n/(n - q) times too large, and the variance of a value weighed
+    so is E X^-2/(E X^-1)^2 = n (n - q)/((n - q)^2 - 1) times that with the true weights.
+    """
+    rest = max(freedom - outputs, 1)
+    return freedom / rest, freedom * rest / max(rest**2 - 1.0, 1.0)
 
 
 def _scales(start: Mapping[str, float], names: tuple[str, ...], n: float) -> FloatArray:

@@ -1,5 +1,6 @@
 """Gains from requirements: rules inside out, refined on the exact sampled loops over tolerance corners."""
 
+from analyses.tuning.placing import ELEMENTS
 from analyses.tuning.result import BindingRequirement, GainSetting, TradeOffPoint, TuningResult
 from analyses.tuning.rules import (
     RuleGains,
@@ -12,6 +13,7 @@ from analyses.tuning.rules import (
 from analyses.tuning.run import TuningSettings, tune
 
 __all__ = [
+    "ELEMENTS",
     "BindingRequirement",
     "GainSetting",
     "RuleGains",

@@ -1,20 +1,65 @@
-"""The tuned design in the nonlinear model: small and large steps, nominal and worst corner."""
+"""The tuned design once more: by certified margins, and by steps in the nonlinear model."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.batch import Population
+from actuator_lti.quantities import QUANTITIES
 from analyses.monte_carlo.stepping import StepCheck, step_columns
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import NonlinearCheck
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+    from actuator_lti.design.model import Design, Requirement
+    from analyses.tuning.result import BindingRequirement
+    from analyses.verdicts import RequirementVerdict
 
 _SMALL = 0.05
+
+
+def confirm(
+    tuned: Design, requirements: tuple[Requirement, ...], binding: tuple[BindingRequirement, ...]
+) -> tuple[RequirementVerdict, ...]:
+    """Judge the tuned design, and each requirement's worst corner, by certified margins.
+
+    The search asks the many-designs figures; this asks what ``margins`` asks.
+
+    Parameters
+    ----------
+    tuned : Design
+    requirements : tuple of Requirement
+        On loops.
+    binding : tuple of BindingRequirement
+        The same at their worst corners.
+    """
+    from actuator_lti.design import with_values
+    from actuator_lti.loops import assemble_loops
+    from analyses.loop_figures import all_loop_figures
+    from analyses.verdicts import judged
+
+    timed = any(QUANTITIES[item.quantity].timed for item in requirements)
+    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
+    for item, found in zip(requirements, binding, strict=True):
+        if found.corner:
+            rows.setdefault(tuple(sorted(found.corner.items())), []).append(item)
+    verdicts: list[RequirementVerdict] = []
+    for corner, asked in rows.items():
+        design = with_values(tuned, dict(corner), check=False)
+        figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
+        for requirement in asked:
+            verdicts += [
+                replace(each, id=f"{each.id}, worst corner") if corner else each
+                for each in judged(design, requirement, figures, _nothing)
+            ]
+    return tuple(verdicts)
+
+
+def _nothing(name: str) -> tuple[float | None, str]:
+    return None, f"{name}: not a figure of a loop"
 
 
 def nonlinear_checks(

@@ -14,11 +14,10 @@ if TYPE_CHECKING:
 
 
 def object_of(design: Design, path: str) -> KnownObject | None:
-    """The object that holds a gain; None for a design that is no full cascade."""
+    """The object that holds a gain; None where the drive is not that motion controller."""
     from actuator_lti.design.object_dictionary import OBJECTS
 
-    control = design.controller
-    if design.axis != "rotary" or control.velocity is None or control.current is None:
+    if not design.objects.named:
         return None
     return next((known for known in OBJECTS.values() if path in known.paths), None)
 

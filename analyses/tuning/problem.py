@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
 from analyses.sampling import Factor, correlation_of, semidefinite_root
+from analyses.tuning.placing import Variable, change
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -24,8 +26,11 @@ GAINS = (
     "control.velocity.gain",
     "control.velocity.integral_time",
     "control.position.gain",
+    "control.position.integral_time",
 )
+SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
+MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor for a drive with two masses
 
 
 @dataclass
@@ -37,23 +42,66 @@ class Problem:
     design : Design
     requirements : tuple of Requirement
         Those on loops.
-    paths : tuple of str
-        Gains that are varied.
-    start : ndarray
-        Their start values, SI.
-    lower, upper : ndarray
-        Allowed values, SI.
+    variables : tuple of Variable
+        What is varied.
+    most : int
+        Designs that a search may look at.
     evaluations : int
         Designs looked at so far.
     """
 
     design: Design
     requirements: tuple[Requirement, ...]
-    paths: tuple[str, ...]
-    start: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    variables: tuple[Variable, ...]
+    most: int = MOST_DESIGNS
     evaluations: int = field(default=0)
+
+    @property
+    def spent(self) -> bool:
+        """Whether as many designs were looked at as one search may."""
+        return self.evaluations >= self.most
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Dotted keys of the variables."""
+        return tuple(item.path for item in self.variables)
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """Start values, SI."""
+        return np.clip([item.start for item in self.variables], self.lower, self.upper)
+
+    @cached_property
+    def present(self) -> np.ndarray:
+        """What the design has, where that may be set; an added element starts neutral."""
+        home = [item.start if item.home is None else item.home for item in self.variables]
+        return np.clip(home, self.lower, self.upper)
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """Smallest allowed values, SI."""
+        return np.array([item.low for item in self.variables])
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """Largest allowed values, SI."""
+        return np.array([item.high for item in self.variables])
+
+    @cached_property
+    def _linear(self) -> np.ndarray:
+        return np.array([item.linear for item in self.variables], dtype=bool)
+
+    def coordinates(self, values: np.ndarray) -> np.ndarray:
+        """What the search moves: ln of a value; a share itself."""
+        return np.where(self._linear, values, np.log(np.where(self._linear, 1.0, values)))
+
+    def values(self, coordinates: np.ndarray) -> np.ndarray:
+        """SI values from coordinates."""
+        return np.where(self._linear, coordinates, np.exp(np.where(self._linear, 0.0, coordinates)))
+
+    def change(self, values: np.ndarray) -> np.ndarray:
+        """How far each row is from the design as it came, see `analyses.tuning.placing.change`."""
+        return change(self.variables, values)
 
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
@@ -158,14 +206,32 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     return chosen
 
 
-def problem_of(design: Design, requirements: tuple[Requirement, ...], start: dict[str, float]) -> Problem:
-    """Set the problem up: which gains the design has, where they may lie."""
+def problem_of(
+    design: Design,
+    requirements: tuple[Requirement, ...],
+    start: Mapping[str, float],
+    placed: tuple[Variable, ...] = (),
+    most: int = MOST_DESIGNS,
+) -> Problem:
+    """Set the problem up: which gains the design has, where they may lie.
+
+    Parameters
+    ----------
+    start : mapping of str to float
+        Gains where the search starts (by rules), SI; another gain of the design starts where it is.
+    placed : tuple of Variable
+        Of added elements.
+    most : int
+        Designs that a search may look at.
+    """
+    from actuator_lti.design import parameter_value, paths_of
     from analyses.tuning.objects import allowed_range
 
-    paths = tuple(path for path in GAINS if path in start)
-    values = np.array([start[path] for path in paths])
-    ranges = [allowed_range(design, path) for path in paths]
-    lower = np.maximum(values / 50.0, [low for low, _ in ranges])
-    upper = np.minimum(values * 50.0, [high for _, high in ranges])
-    lower, upper = np.minimum(lower, upper), np.maximum(lower, upper)
-    return Problem(design, requirements, paths, np.clip(values, lower, upper), lower, upper)
+    variables = []
+    for path in (path for path in GAINS if path in set(paths_of(design))):
+        home = parameter_value(design, path)
+        begin = start.get(path, home)
+        low, high = allowed_range(design, path)
+        low, high = max(min(begin, home) / SPAN, low), min(max(begin, home) * SPAN, high)
+        variables.append(Variable(path, begin, min(low, high), max(low, high), home))
+    return Problem(design, requirements, (*variables, *placed), most)

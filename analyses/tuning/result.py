@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from analyses.verdicts import RequirementVerdict
+
+Aim = Literal["least-change", "reserve"]
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,9 @@ class GainSetting:
     Attributes
     ----------
     path, unit : str
-    before, by_rule, tuned : float
+    before, by_rule : float or None
+        SI; None for a value of an added element, and for one that no rule gives.
+    tuned : float
         SI.
     object : str
         Label of the motion controller's object; empty where the design has none.
@@ -57,8 +62,8 @@ class GainSetting:
 
     path: str
     unit: str
-    before: float
-    by_rule: float
+    before: float | None
+    by_rule: float | None
     tuned: float
     object: str
     object_unit: str
@@ -113,6 +118,11 @@ class TuningResult:
     evaluations : int
         Designs looked at.
     notes : tuple of str
+    aim : {"least-change", "reserve"}
+    placed : tuple of str
+        Elements that were added, because gains alone do not meet the requirements.
+    confirmed : tuple of RequirementVerdict
+        The requirements on loops by certified margins: the tuned design, and each worst corner of one.
     """
 
     feasible: bool
@@ -126,6 +136,9 @@ class TuningResult:
     trade_off: tuple[TradeOffPoint, ...]
     evaluations: int
     notes: tuple[str, ...]
+    aim: Aim = "least-change"
+    placed: tuple[str, ...] = ()
+    confirmed: tuple[RequirementVerdict, ...] = ()
 
     def __str__(self) -> str:
         head = "every requirement met" if self.feasible else "REQUIREMENTS CANNOT BE MET"

@@ -131,12 +131,12 @@ def rule_gains(design: Design, separation: float = SEPARATION) -> RuleGains:
         small = _current(design, small, values, steps)
         assert design.effective_motor.torque_constant_Nm_A is not None
         torque = design.effective_motor.torque_constant_Nm_A
-    crossover = 1.0 / (2.0 * small)
     if design.controller.velocity is not None:
         crossover = _velocity(design, small, torque, values, steps)
-        values["control.position.gain"] = crossover / separation
-        steps.append(f"position: velocity crossover {crossover:.4g} rad/s over {separation:g}")
-    else:
+        if design.controller.position is not None:
+            values["control.position.gain"] = crossover / separation
+            steps.append(f"position: velocity crossover {crossover:.4g} rad/s over {separation:g}")
+    elif design.controller.position is not None:
         values["control.position.gain"] = _direct(design, small, torque)
         steps.append("position: no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below")
     return RuleGains(values, tuple(steps))

@@ -9,17 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analyses.monte_carlo.judging import label
-from analyses.tuning.checking import nonlinear_checks
+from analyses.tuning.checking import confirm, nonlinear_checks
+from analyses.tuning.least import least_change
 from analyses.tuning.objects import neighbours, object_of, step_of_gain
-from analyses.tuning.problem import Problem, limit_of, loop_requirements, problem_of, size_of
+from analyses.tuning.placing import Placed, checked, place, subsets
+from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
 from analyses.tuning.program import RESERVE
-from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
+from analyses.tuning.result import Aim, BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import Solution, solve
 from analyses.tuning.trade_off import trade_off
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
+    from analyses.verdicts import RequirementVerdict
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
@@ -34,26 +37,34 @@ class TuningSettings:
     requirements : tuple of Requirement
         In place of those of the design on the same figure of the same loop.
     rounded : bool
-        Round the gains to the steps of the motion controller's objects, where the design has them.
+        Round the gains to the steps of the motion controller's objects, where the drive is that controller.
     curve, check : bool
         Whether the trade-off curve and the nonlinear check are wanted.
+    aim : {"least-change", "reserve"}
+        The least change of the design that meets every requirement, or the largest common distance to all
+        (up to 30 % of each limit).
+    place : tuple of str
+        What may be added where gains alone do not meet the requirements: `ELEMENTS`.
     """
 
     requirements: tuple[Requirement, ...] = ()
     rounded: bool = True
     curve: bool = True
     check: bool = True
+    aim: Aim = "least-change"
+    place: tuple[str, ...] = ()
 
 
 def tune(
     design: Design, settings: TuningSettings | None = None, *, progress: Progress | None = None
 ) -> TuningResult:
-    """Find gains that stay as far as possible from every limit, over all corners of the tolerances.
+    """Find gains that meet the requirements on loops over all corners of the tolerances.
 
-    From the inner loop out by the rules of `rule_gains`, then by optimisation over the exact sampled loops:
-    the smallest distance to a requirement, relative to its limit, is made as large as possible, at every
-    corner of the tolerance box. Where it stays negative the requirements cannot be met together, and the
-    distances say by how much the best compromise misses them.
+    With the aim ``least-change`` those nearest to the design as it is (`analyses.tuning.least`); with
+    ``reserve`` those that stay as far as possible from every limit, relative to the limit. Both search the
+    exact sampled loops. Where gains alone do not do, the elements of ``place`` are tried, one, then two, then
+    all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
+    say by how much it misses. What is returned is judged once more by certified margins.
 
     Parameters
     ----------
@@ -65,68 +76,126 @@ def tune(
     Raises
     ------
     InputError
-        If there is no requirement on a loop.
+        If there is no requirement on a loop, or an element has no place in the drive.
     """
     settings = settings or TuningSettings()
+    wanted = loop_requirements(design, settings.requirements)
+    choices = list(subsets(checked(design, settings.place)))
+    stages = len(choices) + 3
     tell = progress or (lambda done, total: None)
+    tell(0, stages)
     rules = rule_gains(design)
-    problem = problem_of(design, loop_requirements(design, settings.requirements), _present(design, rules))
-    tell(1, 5)
-    solution = solve(problem)
-    tell(2, 5)
-    gains = _rounded(problem, solution) if settings.rounded else solution.gains
-    tell(3, 5)
-    result = problem.distances(gains[None, :], problem.all_corners)[0]
-    tuned = _tuned(problem, gains)
+    searched = 0
+    best: Found | None = None
+    for k, elements in enumerate(choices):
+        placed = place(design, elements)
+        problem = problem_of(
+            placed.design, wanted, rules.values, placed.variables, share_of(searched, len(choices) - k)
+        )
+        solution = _solved(problem, settings.aim, give_up=k + 1 < len(choices))
+        searched += problem.evaluations
+        if best is None or solution.slack > best.solution.slack:
+            best = Found(placed, problem, solution, problem.evaluations)
+        tell(k + 1, stages)
+        if solution.slack >= 0.0:
+            break
+    assert best is not None
+    placed, problem, solution = best.placed, best.problem, best.solution
+    gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
+    found = problem.distances(gains[None, :], problem.all_corners)[0]
+    tuned = replace(_tuned(problem, gains), name=f"{design.name}-tuned")
+    tell(len(choices) + 1, stages)
+    requirements = _binding(problem, gains, found, settings.aim)
+    confirmed = confirm(tuned, wanted, requirements)
+    tell(len(choices) + 2, stages)
+    checks = nonlinear_checks(tuned, problem, gains, found) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
-    tell(4, 5)
-    requirements = _binding(problem, gains, result)
-    checks = nonlinear_checks(tuned, problem, gains, result) if settings.check else ()
-    tell(5, 5)
+    searched += problem.evaluations - best.evaluations
+    tell(stages, stages)
     return TuningResult(
-        bool(result.min() >= 0.0),
+        bool(found.min() >= 0.0) and all(v.passed is True for v in confirmed),
         design,
         tuned,
-        _settings(problem, rules, solution.gains, gains),
+        _settings(problem, design, rules, solution.gains, gains),
         requirements,
         rules.steps,
         len(problem.all_corners),
         checks,
         curve,
-        problem.evaluations,
-        _notes(problem, gains, result),
+        searched,
+        (*_notes(problem, gains, found), *_said(confirmed)),
+        settings.aim,
+        placed.elements,
+        confirmed,
     )
 
 
-def _present(design: Design, rules: RuleGains) -> dict[str, float]:
-    """Rule gains; a P controller keeps having no integral time."""
-    return dict(rules.values)
+def share_of(searched: int, choices: int) -> int:
+    """Designs that the next of some choices may look at: an equal share of what is left, and enough."""
+    return max((MOST_DESIGNS - searched) // choices, MOST_DESIGNS // 5)
 
 
-def _rounded(problem: Problem, solution: Solution) -> np.ndarray:
-    """Of all roundings up and down the one that stays farthest from the limits."""
+@dataclass(frozen=True)
+class Found:
+    """What one choice of elements came to."""
+
+    placed: Placed
+    problem: Problem
+    solution: Solution
+    evaluations: int
+
+
+def _solved(problem: Problem, aim: Aim, *, give_up: bool) -> Solution:
+    return (
+        least_change(problem, give_up=give_up) if aim == "least-change" else solve(problem, give_up=give_up)
+    )
+
+
+def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
+    """Where a certified margin does not bear out what the search found."""
+    return tuple(
+        f"Not confirmed by certified margins: {v.id}: "
+        + (v.reason if v.value is None else f"{v.value:.6g} {v.requirement.unit}")
+        for v in confirmed
+        if v.passed is not True
+    )
+
+
+def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
+    """Of all roundings up and down: the least change that meets all, or else the one farthest from limits."""
     choices = neighbours(problem.design, problem.paths, solution.gains)
     slack = problem.distances(choices, solution.working).min(axis=(1, 2))
-    best = np.argsort(-slack, kind="stable")[:4]
+    order = -slack
+    if aim == "least-change":
+        order = np.where(slack >= 0.0, problem.change(choices) - 1e6, -slack)
+    best = np.argsort(order, kind="stable")[:4]
     whole = problem.distances(choices[best], problem.all_corners).min(axis=(1, 2))
+    if aim == "least-change" and np.any(whole >= 0.0):
+        return choices[best[int(np.argmax(whole >= 0.0))]]
     return choices[best[int(np.argmax(whole))]]
 
 
 def _tuned(problem: Problem, gains: np.ndarray) -> Design:
     from actuator_lti.design import with_values
 
-    changed = with_values(problem.design, dict(zip(problem.paths, map(float, gains), strict=True)))
-    return replace(changed, name=f"{problem.design.name}-tuned")
+    pairs = zip(problem.paths, map(float, gains), problem.variables, strict=True)
+    # what did not move keeps its text and source
+    moved = {path: value for path, value, v in pairs if v.home is None or value != v.home}
+    return with_values(problem.design, moved)
 
 
-def _binding(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[BindingRequirement, ...]:
+def _binding(
+    problem: Problem, gains: np.ndarray, found: np.ndarray, aim: Aim
+) -> tuple[BindingRequirement, ...]:
     """Every requirement at its worst corner."""
-    smallest = float(result.min())
+    smallest = float(found.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
+    if aim == "least-change":  # nothing binds a design that meets all as it came
+        enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
     made = []
     for k, requirement in enumerate(problem.requirements):
-        corner = int(np.argmin(result[:, k]))
-        relative = float(result[corner, k])
+        corner = int(np.argmin(found[:, k]))
+        relative = float(found[corner, k])
         known = -3.0 < relative < 10.0
         distance = relative * size_of(requirement) if known else None
         made.append(
@@ -149,11 +218,12 @@ def _value(requirement: Requirement, distance: float | None) -> float | None:
 
 
 def _settings(
-    problem: Problem, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
+    problem: Problem, before: Design, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
 ) -> tuple[GainSetting, ...]:
-    from actuator_lti.design import parameter_value
+    from actuator_lti.design import parameter_value, paths_of
     from actuator_lti.design.fields import Structure, field_of
 
+    known_before = set(paths_of(before))
     made = []
     for k, path in enumerate(problem.paths):
         known, step, field = (
@@ -164,8 +234,9 @@ def _settings(
         assert field is not None
         made.append(
             GainSetting(
-                path, field.unit(Structure.of(problem.design)), parameter_value(problem.design, path),
-                rules.values[path], float(tuned[k]), "" if known is None else known.label,
+                path, field.unit(Structure.of(problem.design)),
+                parameter_value(before, path) if path in known_before else None,
+                rules.values.get(path), float(tuned[k]), "" if known is None else known.label,
                 "" if known is None else known.unit, None if step is None else round(rounded[k] / step),
                 float(rounded[k]),
             )
@@ -173,7 +244,7 @@ def _settings(
     return tuple(made)
 
 
-def _notes(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[str, ...]:
+def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str, ...]:
     notes = [
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
         "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
@@ -181,10 +252,13 @@ def _notes(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[str
     left = [f.path for f in problem.toleranced if f not in problem.factors]
     if left:
         notes.append(f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}.")
-    if result.min() < 0.0:
-        missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
+    if problem.spent:
+        notes.append(f"The search ended after {problem.evaluations} designs, its bound.")
+    if found.min() < 0.0:
+        missed = [r.id for k, r in enumerate(problem.requirements) if found[:, k].min() < 0.0]
         notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")
     at_end = (gains <= problem.lower * (1 + 1e-9)) | (gains >= problem.upper * (1 - 1e-9))
+    at_end &= gains != problem.present
     ends = [path for path, at in zip(problem.paths, at_end, strict=True) if at]
     if ends:
         notes.append(f"At the end of what may be set, and so binding too: {', '.join(ends)}.")

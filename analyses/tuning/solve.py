@@ -38,21 +38,28 @@ class Solution:
     working: np.ndarray
 
 
-def solve(problem: Problem, starts: np.ndarray | None = None) -> Solution:
-    """Maximise the smallest relative distance to the limits over all corners."""
+def solve(problem: Problem, *, give_up: bool = False) -> Solution:
+    """Maximise the smallest relative distance to the limits over all corners.
+
+    Parameters
+    ----------
+    problem : Problem
+    give_up : bool
+        Whether to stop where already the nominal design misses a limit.
+    """
     corners = problem.all_corners
     working = corners[:1]
-    if starts is None:
-        starts = start_points(problem, working)
+    starts = start_points(problem, working)
     best: Solution | None = None
     for _ in range(ROUNDS):
         gains = _best_of([_climb(problem, start, working) for start in starts], problem, working)
-        result = problem.distances(gains[None, :], corners)[0]
-        slack = float(result.min())
+        found = problem.distances(gains[None, :], corners)[0]
+        slack = float(found.min())
         if best is None or slack > best.slack:
             best = Solution(gains, slack, working)
-        fresh = _violated(result, problem, gains, corners, working)
-        if not len(fresh):
+        fresh = violated(found, problem, gains, corners, working)
+        hopeless = give_up and float(problem.distances(gains[None, :], working).min()) < 0.0
+        if not len(fresh) or hopeless or problem.spent:
             break
         working = np.vstack([working, fresh])
         starts = gains[None, :]
@@ -61,32 +68,33 @@ def solve(problem: Problem, starts: np.ndarray | None = None) -> Solution:
 
 
 def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
-    """The rule gains, those of the design, and the best of a coarse search around the rules."""
+    """The rule gains, those of the design, and the best of a coarse search around both."""
     rng = np.random.default_rng(0)
-    size = len(problem.paths)
-    cloud = problem.start * np.exp(rng.uniform(-2.5, 2.5, (400, size)))
-    cloud = np.clip(np.vstack([problem.start, cloud]), problem.lower, problem.upper)
+    centres = np.vstack([problem.coordinates(problem.start), problem.coordinates(problem.present)])
+    spread = rng.uniform(-2.5, 2.5, (400, centres.shape[1]))
+    rows = np.vstack([centres, centres[np.arange(400) % 2] + spread])
+    cloud = np.clip(problem.values(rows), problem.lower, problem.upper)
     slack = problem.distances(cloud, working).min(axis=(1, 2))
-    order = np.argsort(-slack, kind="stable")[:2]
-    return np.vstack([problem.start, cloud[order]])
+    order = np.argsort(-slack, kind="stable")
+    return np.vstack([cloud[:1], cloud[order[:2]]])
 
 
 def _best_of(candidates: list[np.ndarray], problem: Problem, working: np.ndarray) -> np.ndarray:
     gains = np.array(candidates)
-    away = np.sum(np.log(gains / problem.start) ** 2, axis=1)
+    away = np.sum((problem.coordinates(gains) - problem.coordinates(problem.start)) ** 2, axis=1)
     slack = np.minimum(problem.distances(gains, working).min(axis=(1, 2)), RESERVE) - TIE * away
     return gains[int(np.argmax(slack))]
 
 
-def _violated(
-    result: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
+def violated(
+    found: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
 ) -> np.ndarray:
     """For each requirement its worst corner, where it is worse than in the working set."""
     known = problem.distances(gains[None, :], working)[0].min()
     fresh = []
-    for k in range(result.shape[1]):
-        worst = int(np.argmin(result[:, k]))
-        if result[worst, k] < known - 1e-6 and not _among(corners[worst], working):
+    for k in range(found.shape[1]):
+        worst = int(np.argmin(found[:, k]))
+        if found[worst, k] < known - 1e-6 and not _among(corners[worst], working):
             fresh.append(corners[worst])
     return np.unique(np.array(fresh), axis=0) if fresh else np.empty((0, corners.shape[1]))
 
@@ -99,6 +107,6 @@ def _climb(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarr
     """Maximise t subject to distances >= t, from one start."""
 
     def limits(x: np.ndarray) -> np.ndarray:
-        return problem.distances(np.exp(x), working).reshape(len(x), -1)
+        return problem.distances(problem.values(x), working).reshape(len(x), -1)
 
     return maximise(problem, start, limits)

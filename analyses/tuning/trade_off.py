@@ -69,13 +69,13 @@ def _best(
     """Largest phase margin at a bandwidth or above, other requirements kept."""
 
     def goal(x: np.ndarray) -> np.ndarray:
-        return _margins(problem, np.exp(x), working) / 45.0
+        return _margins(problem, problem.values(x), working) / 45.0
 
     def limits(x: np.ndarray) -> np.ndarray:
-        width = problem.figure("bandwidth", "position", np.exp(x), working)
+        width = problem.figure("bandwidth", "position", problem.values(x), working)
         kept = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
         if others:
-            kept.append(problem.distances(np.exp(x), working)[:, :, others].reshape(len(x), -1))
+            kept.append(problem.distances(problem.values(x), working)[:, :, others].reshape(len(x), -1))
         return np.concatenate(kept, axis=1)
 
     return maximise(problem, start, limits, goal, iterations=30)

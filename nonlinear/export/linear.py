@@ -14,27 +14,16 @@ import math
 
 import numpy as np
 
-from nonlinear._kernels import layout
+from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.tick import tick
-from nonlinear.export.entries import derive, emitted, init, prepare_sizes
+from nonlinear.export.entries import derive, emitted, prepare_sizes
+from nonlinear.export.linear_row import at_rest, linear_row, set_off
 
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
-NO_LOOP, TOO_LONG, PERIODIC, ELASTIC = 0, -1, -2, -3
+NO_LOOP, TOO_LONG, PERIODIC, LOST = 0, -1, -2, -3  # lost: no double holds what a tick gives
 
-CLEARED = np.array([
-    layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.LOAD_COEFFICIENT, layout.OFFSET, layout.LOAD,
-    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
-    layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION,
-    layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED,
-    layout.CURRENT_START, layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START,
-    layout.VELOCITY_INTEGRATOR_START, layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START,
-    layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH, layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
-])  # fmt: skip
-UNLIMITED = np.array(
-    [layout.SPEED_LIMIT, layout.ACCELERATION_LIMIT, layout.CURRENT_LIMIT, layout.VOLTAGE_LIMIT]
-)
 # what the drive remembers, beside chains, delay line and stored angles; the angles first
 REMEMBERED = np.array([
     layout.S_ANGLE, layout.S_TRACKED_ANGLE, layout.S_CURRENT, layout.S_SPEED, layout.S_CURRENT_INTEGRATOR,
@@ -42,34 +31,29 @@ REMEMBERED = np.array([
     layout.S_SPEED_REFERENCE, layout.S_CURRENT_REFERENCE, layout.S_VOLTAGE, layout.S_MEASURED_SPEED,
     layout.S_FILTERED_SPEED, layout.S_TRACKED_SPEED, layout.S_REFERENCE, layout.S_REFERENCE_BEFORE,
     layout.S_ERROR, layout.S_ERROR_RATE, layout.S_TORQUE_FEEDFORWARD,
+    elastic_layout.ES_LOAD_SPEED, elastic_layout.ES_TWIST,
 ])  # fmt: skip
 
 
 @emitted
-def linear_row(p, q):
-    """Copy the parameters of a run, without anything that is not linear; gravity becomes its slope."""
-    for k in range(layout.SIZE):
-        q[k] = p[k]
-    q[layout.LOAD_SLOPE] += p[layout.GRAVITY] * math.cos(p[layout.GRAVITY_ANGLE])
-    for k in range(CLEARED.shape[0]):
-        q[CLEARED[k]] = 0.0
-    for k in range(UNLIMITED.shape[0]):
-        q[UNLIMITED[k]] = math.inf
-    q[layout.VISCOUS_REVERSE] = q[layout.VISCOUS]
-
-
-@emitted
 def without_outer(q, stage):
-    """Take the stages outside of one away; its command is then that of the drive."""
+    """Take the stages outside of one away; its command is then that of the drive.
+
+    A velocity stage whose slower measurement is fed to the voltage stays, its output cut off.
+    """
     if stage == CURRENT or stage == VELOCITY:
         q[layout.HAS_POSITION], q[layout.COMMAND_FILTERS] = 0.0, 0.0
     if stage == CURRENT:
-        q[layout.HAS_VELOCITY], q[layout.RESISTANCE_FEEDFORWARD] = 0.0, 0.0
+        q[layout.RESISTANCE_FEEDFORWARD] = 0.0
+        if repeats(q, stage) == 1:
+            q[layout.HAS_VELOCITY] = 0.0
 
 
 @emitted
-def cut_point(stage):
+def cut_point(q, stage):
     """The probe that cuts the loop, or -1."""
+    if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:
+        return layout.POINT_CURRENT
     if stage == POSITION:
         return layout.POINT_OUTPUT
     if stage == AT_SPEED:
@@ -80,37 +64,45 @@ def cut_point(stage):
 
 
 @emitted
+def feeds_speed(q):
+    """Whether the measured speed is fed forward to the voltage."""
+    return q[layout.HAS_CURRENT] > 0.0 and q[layout.BACK_EMF_FEEDFORWARD] != 0.0
+
+
+@emitted
 def interval(q, stage):
-    """Ticks from one update of a loop to the next; 0 where the drive has no such loop, PERIODIC too."""
-    outer = 1
-    if q[layout.HAS_VELOCITY] > 0.0:
-        outer = int(q[layout.EVERY_VELOCITY])
+    """Ticks from one update of the signal at a cut to the next; 0 where the drive has no such loop."""
+    outer = int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
     slow = int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else outer
-    fed = q[layout.HAS_CURRENT] > 0.0 and q[layout.BACK_EMF_FEEDFORWARD] != 0.0
     if stage == CURRENT:
-        if q[layout.HAS_CURRENT] <= 0.0:
-            return NO_LOOP
-        return PERIODIC if fed and int(q[layout.EVERY_VELOCITY]) > 1 else 1
+        return 1 if q[layout.HAS_CURRENT] > 0.0 else NO_LOOP
     if stage == VELOCITY:
         return outer if q[layout.HAS_VELOCITY] > 0.0 else NO_LOOP
     if stage == POSITION or stage == COMMAND:
         return slow if q[layout.HAS_POSITION] > 0.0 else NO_LOOP
     if stage == AT_SPEED:
         return slow if q[layout.HAS_VELOCITY] > 0.0 and q[layout.HAS_POSITION] > 0.0 else NO_LOOP
-    made = 1  # how often the signal at the break point is made
-    if stage == AT_CURRENT:
-        if q[layout.HAS_CURRENT] <= 0.0 or (q[layout.HAS_VELOCITY] <= 0.0 and q[layout.HAS_POSITION] <= 0.0):
-            return NO_LOOP
-        made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
-    elif q[layout.HAS_CURRENT] <= 0.0:
-        made = outer if q[layout.HAS_VELOCITY] > 0.0 else slow
-    loops = q[layout.HAS_CURRENT] + q[layout.HAS_VELOCITY] + q[layout.HAS_POSITION]
-    if stage == AT_VOLTAGE and loops <= 0.0:
+    if stage == AT_VOLTAGE and q[layout.HAS_CURRENT] > 0.0:
+        return 1
+    if q[layout.HAS_VELOCITY] <= 0.0 and q[layout.HAS_POSITION] <= 0.0:
         return NO_LOOP
-    whole = slow
-    if fed and int(q[layout.EVERY_VELOCITY]) > whole:
-        whole = int(q[layout.EVERY_VELOCITY])
-    return made if whole == made else PERIODIC
+    if stage == AT_CURRENT and q[layout.HAS_CURRENT] <= 0.0:
+        return NO_LOOP
+    return outer if q[layout.HAS_VELOCITY] > 0.0 else slow
+
+
+@emitted
+def repeats(q, stage):
+    """Ticks after which the loop repeats: more than `interval` where it is periodic."""
+    every = interval(q, stage)
+    speed = int(q[layout.EVERY_VELOCITY]) if feeds_speed(q) else 1
+    if stage == CURRENT:
+        return max(every, speed)
+    if stage != AT_CURRENT and stage != AT_VOLTAGE:
+        return every
+    outer = int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
+    slow = int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else outer
+    return max(slow, max(speed, every))
 
 
 @emitted
@@ -169,11 +161,14 @@ def seen_value(q, s, io, stage):
 
 
 @emitted
-def put_inputs(q, io, stage, size):
+def put_inputs(q, s, io, stage, size):
     """Write the inputs of a tick: nothing, or the unit at the place where the loop is cut."""
     for k in range(layout.IN_PROBE + 4):
         io[k] = 0.0
-    if stage == VELOCITY:
+    if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:  # whether the velocity stage runs now or not
+        io[layout.IN_PROBE + layout.POINT_CURRENT] = size
+        s[layout.S_CURRENT_REFERENCE] = size
+    elif stage == VELOCITY:
         io[layout.IN_COMMAND] = size / q[layout.RATIO]
     elif stage == CURRENT or stage == COMMAND:
         io[layout.IN_COMMAND] = size
@@ -193,7 +188,7 @@ def one_column(q, s, io, stage, every, size, places, count, angles, column):
 
     NaN where a tick failed.
     """
-    put_inputs(q, io, stage, size)
+    put_inputs(q, s, io, stage, size)
     value = 0.0
     for k in range(every):
         status = tick(q, s, io)
@@ -251,13 +246,73 @@ def pruned(n, a, b, c, keep):
 
 
 @emitted
-def put_unit(s, places, j, angles):
+def put_unit(q, s, places, j, angles):
     """Put the drive into the j-th unit state: the motor's angle takes the stored ones with it."""
+    at_rest(q, s)
     if j == 0:
         for i in range(angles):
             s[int(places[i])] = 1.0
     else:
         s[int(places[j])] = 1.0
+    set_off(q, s)
+
+
+@emitted
+def until_next(every, ticks):
+    """Ticks until a stage runs next, so many ticks after it ran."""
+    passed = ticks - every * int(ticks / every)
+    return float(every - passed) if passed > 0 else 0.0
+
+
+@emitted
+def put_phase(q, s, ticks):
+    """Let the slower stages be where they are so many ticks after they all ran."""
+    s[layout.S_UNTIL_OUTER] = until_next(int(q[layout.OUTER_EVERY]), ticks)
+    s[layout.S_UNTIL_VELOCITY] = until_next(int(q[layout.EVERY_VELOCITY]), ticks)
+
+
+@emitted
+def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
+    """A, b, c of the loop as run over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
+    for j in range(n + 1):
+        if j < n:
+            put_unit(q, s, places, j, angles)
+        else:
+            at_rest(q, s)
+        put_phase(q, s, first)
+        size = 0.0 if j < n else 1.0
+        value = one_column(q, s, io, stage, every, size, places, n, angles, column)
+        if math.isnan(value):
+            return 0
+        if j < n:
+            c[j] = value
+        for i in range(n):
+            if j < n:
+                a[i * n + j] = column[i]
+            else:
+                b[i] = column[i]
+    return 1
+
+
+@emitted
+def prepared(q, s, stage):
+    """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
+    without_outer(q, stage)
+    point = cut_point(q, stage)
+    if point >= 0:
+        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
+        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
+    prepare_sizes(q)
+    if too_long(q):
+        return 0
+    derive(q, s)
+    return 1
+
+
+@emitted
+def runs_closed(stage):
+    """Whether a loop is run closed, through the command of its own stage."""
+    return stage == CURRENT or stage == VELOCITY
 
 
 @emitted
@@ -267,40 +322,21 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
     """
-    if p[layout.ELASTIC_DRIVE] > 0.0:  # its contact is not linear
-        return ELASTIC
     linear_row(p, q)
     every = interval(q, stage)
     if every <= 0:
-        return every
-    without_outer(q, stage)
-    point = cut_point(stage)
-    if point >= 0:
-        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
-        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
-    prepare_sizes(q)
-    if too_long(q):
+        return NO_LOOP
+    if repeats(q, stage) > every:
+        return PERIODIC
+    if prepared(q, s, stage) == 0:
         return TOO_LONG
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
-    derive(q, s)
-    for j in range(n):
-        init(q, s)
-        put_unit(s, places, j, angles)
-        value = one_column(q, s, io, stage, every, 0.0, places, n, angles, column)
-        if math.isnan(value):
-            return TOO_LONG
-        c[j] = value
-        for i in range(n):
-            a[i * n + j] = column[i]
-    init(q, s)
-    value = one_column(q, s, io, stage, every, 1.0, places, n, angles, column)
-    if math.isnan(value):
-        return TOO_LONG
-    for i in range(n):
-        b[i] = column[i]
-    if stage == CURRENT or stage == VELOCITY:  # these were run closed
+    done = block(q, s, io, stage, 0, every, places, n, angles, a, b, c, column)
+    if done == 0:
+        return LOST
+    if runs_closed(stage):
         for i in range(n):
             for j in range(n):
                 a[i * n + j] += b[i] * c[j]
@@ -310,6 +346,8 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
 @emitted
 def lead_of(p):
     """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
+    if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
+        return math.nan  # the loop feeds back another angle than the output's
     if p[layout.POSITION_INTEGRAL] != 0.0 or p[layout.DERIVATIVE] != 0.0:
         return math.nan
     if p[layout.ACCELERATION_FEEDFORWARD] != 0.0 or p[layout.COMMAND_FILTERS] > 0.0:

@@ -12,22 +12,22 @@ import math
 from actuator_lti.batch._complex import over
 from nonlinear._kernels import layout
 from nonlinear._kernels.tick import tick
-from nonlinear.export.entries import derive, emitted, init, prepare_sizes
+from nonlinear.export.entries import derive, emitted, prepare_sizes
 from nonlinear.export.linear import (
     COMMAND,
     CURRENT,
-    ELASTIC,
+    LOST,
     MOST,
     PERIODIC,
     TOO_LONG,
     VELOCITY,
-    linear_row,
     listed,
     pruned,
     put_inputs,
     put_unit,
     too_long,
 )
+from nonlinear.export.linear_row import at_rest, linear_row
 
 MOST_TICKS = 16  # between two commands
 SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
@@ -37,7 +37,7 @@ SEEN = 3
 @emitted
 def noted_column(q, s, io, stage, every, size, places, count, angles, column, seen, j):
     """As `one_column`, with what stands in front of each limiter at every tick put down as column j."""
-    put_inputs(q, io, stage, size)
+    put_inputs(q, s, io, stage, size)
     for k in range(every):
         status = tick(q, s, io)
         if status != layout.OK:
@@ -76,8 +76,6 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
 
     The number of states, or what stands in the way.
     """
-    if p[layout.ELASTIC_DRIVE] > 0.0:
-        return ELASTIC
     linear_row(p, q)
     stage, every = outer_stage(q), outer_interval(q)
     if every > MOST_TICKS:
@@ -90,14 +88,14 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
         return TOO_LONG
     derive(q, s)
     for j in range(n + 1):
-        init(q, s)
+        at_rest(q, s)
         if j < n:
-            put_unit(s, places, j, angles)
+            put_unit(q, s, places, j, angles)
         size = 0.0 if j < n else 1.0
         to = j if j < n else MOST
         done = noted_column(q, s, io, stage, every, size, places, n, angles, column, seen, to)
         if done == 0:
-            return TOO_LONG
+            return LOST
         for i in range(n):
             if j < n:
                 a[i * n + j] = column[i]

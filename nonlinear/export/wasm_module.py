@@ -1,7 +1,8 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
 The module is a wasi reactor without imports: the tick of the drive, its loops found by running that tick
-(`nonlinear.export.linear`), and the figures of a loop by the kernels of `actuator_lti.batch`.  Rows lie in
+(`nonlinear.export.linear`, `linear_periodic`), and the figures of a loop by the kernels of
+`actuator_lti.batch`.  Rows lie in
 its memory; functions that end in ``_at`` say where.  A host writes the row of a run
 (`nonlinear.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs and
 outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
@@ -23,7 +24,7 @@ from typing import Any
 from actuator_lti.batch import _figures, _quoted, _response, _run
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import Kind
-from nonlinear.export import linear, linear_figures, linear_limiters
+from nonlinear.export import linear, linear_figures, linear_limiters, linear_periodic, linear_trust
 from nonlinear.export.build import compile_files
 from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
@@ -36,6 +37,8 @@ _ROW: Kind = "row"
 _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 5),
     linear.interval: (_ROW, "int"),
+    linear.repeats: (_ROW, "int"),
+    linear_periodic.periodic_assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 7),
     linear.lead_of: (_ROW,),
     linear_figures.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
     linear_figures.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
@@ -43,10 +46,15 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear_limiters.limiter_sizes: ("int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
     linear_limiters.outer_interval: (_ROW,),
     linear_figures.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
+    linear_trust.rounding_decides: ("int", *(_ROW,) * 9),
     _quoted.quoted: (_ROW, "float", _ROW),
 }
 _SIZES = {
     "MOST": linear.MOST,
+    "MOST_STATES": linear_periodic.MOST_STATES,
+    "MOST_PHASES": linear_periodic.MOST_PHASES,
+    "BLOCK": linear_periodic.BLOCK,
+    "PERIODIC": linear.PERIODIC,
     "MOST_TICKS": linear_limiters.MOST_TICKS,
     "SEEN": linear_limiters.SEEN,
     "STAGES": linear.AT_VOLTAGE + 1,

@@ -39,8 +39,8 @@ def corners(
 ) -> None:
     """Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
 
-    Resistance and torque constant follow [temperature] of the design, or copper and NdFeB. The exit status is
-    1 where a requirement is not met, or a loop not stable, at any corner. In the report: --also corners.
+    Resistance and torque constant follow \\[temperature] of the design, or copper and NdFeB. The exit status
+    is 1 where a requirement is not met, or a loop not stable, at any corner. In the report: --also corners.
     """
     from analyses.corners import Asked
     from analyses.corners import corners as analyse

@@ -13,6 +13,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
+    from reports.document_schema import Section
 
 KEYS = (
     "unit",
@@ -89,7 +90,7 @@ def correlate(
     where a loop sets the voltage itself.
 
     A CSV, Parquet or MATLAB file with columns such as time_s, reference_deg,
-    Output angle [deg], motor_speed_rpm, current_A, load_Nm is read as it is,
+    Output angle \\[deg], motor_speed_rpm, current_A, load_Nm is read as it is,
     with commas, semicolons or tabs; so is what simulate writes, and the EMPS
     benchmark's file. Any other layout is told by a
     record file in TOML, a line for each: file = "log.csv", separator = ";",
@@ -138,7 +139,7 @@ def correlate(
     leave_with(verdict is not False)
 
 
-def _show(sections: list[dict[str, Any]], verdict: bool | None) -> None:
+def _show(sections: list[Section], verdict: bool | None) -> None:
     from reports.terminal import print_section
 
     for k, made in enumerate(sections):

@@ -46,8 +46,8 @@ def duty(
 ) -> None:
     """Hold a duty cycle against continuous current, overload protection (I2t) and winding temperature.
 
-    The duty is a sine under a load, for a share of the time; what is not given comes from [duty]. The
-    temperature needs thermal_resistance and thermal_time in [temperature], the protection limits.peak_time.
+    The duty is a sine under a load, for a share of the time; what is not given comes from \\[duty]. The
+    temperature needs thermal_resistance and thermal_time in \\[temperature], the protection limits.peak_time.
     The exit status is 1 where the drive cannot do the duty for ever. In the report: --also duty.
     """
     from analyses.duty import Asked

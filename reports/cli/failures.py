@@ -52,7 +52,7 @@ def failures(
 
     Prints for each failure the time to a stated deflection and to the mechanical stop, the deflection until
     the failure is detected, the largest current and the largest moment in the train. What is not given comes
-    from [failure] of the design. In the report: actuator-lti report DESIGN --also failures.
+    from \\[failure] of the design. In the report: actuator-lti report DESIGN --also failures.
     """
     from analyses.failures import Asked
     from analyses.failures import failures as analyse

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.identification.verdict import Item
+    from reports.document_schema import Section
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +57,7 @@ def fixed_values(design: Design, texts: Sequence[str]) -> dict[str, float]:
 
 
 def finish(
-    common: Common, base: Design, made: Design, text: str, section: dict[str, Any], items: Sequence[Item]
+    common: Common, base: Design, made: Design, text: str, section: Section, items: Sequence[Item]
 ) -> Path | None:
     """Write the pages, and the design where all checks pass or it was accepted; the design's path.
 
@@ -88,7 +89,7 @@ def finish(
     return path
 
 
-def say(common: Common, section: dict[str, Any], written: Path | None, items: Sequence[Item]) -> None:
+def say(common: Common, section: Section, written: Path | None, items: Sequence[Item]) -> None:
     """Print the verdict, the section, and what was written or why nothing was."""
     from analyses.identification.verdict import passed
     from reports.cli.output import print_line

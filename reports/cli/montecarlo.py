@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -134,6 +134,7 @@ def _written(
     """Write page and JSON, print the verdicts; give whether they pass."""
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
+    from reports.document import with_columns
     from reports.sections.monte_carlo import section
     from reports.study_pages import study_document, write_pages
     from reports.terminal import print_blocks, print_verdict
@@ -147,12 +148,8 @@ def _written(
         print_json(made)
     else:
         print_verdict(made["verdict"]["passed"], part["result"])
-        print_blocks([_short(b) for b in part["blocks"] if b["kind"] == "table"][:1], list(result.notes))
+        kept = ("label", "probability", "low", "nominal", "worst", "unit")
+        tables = [with_columns(block, kept) for block in part["blocks"] if block["kind"] == "table"]
+        print_blocks(tables[:1], list(result.notes))
         print_line(f"{page}\nsamples and worst designs: {result.folder}")
     return bool(made["verdict"]["passed"])
-
-
-def _short(table: dict[str, Any]) -> dict[str, Any]:
-    """Keep the columns of a table that fit on a terminal."""
-    kept = ("label", "probability", "low", "nominal", "worst", "unit")
-    return {**table, "columns": [column for column in table["columns"] if column["key"] in kept]}

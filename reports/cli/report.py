@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,6 +19,7 @@ from reports.cli.options import (
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from reports.document_schema import Document, Section
 
 IncludeOption = Annotated[
     list[Path] | None,
@@ -91,7 +92,7 @@ def report(
     leave_with(passed)
 
 
-def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
+def _validated(drive: Design, quiet: bool) -> list[Section]:
     """Put the linear predictions to the simulator, and give the sections about it."""
     from reports.build import validation_sections
     from reports.cli.progress import progress
@@ -100,8 +101,6 @@ def _validated(drive: Design, quiet: bool) -> list[dict[str, Any]]:
         return validation_sections(drive, validating, timing=False)
 
 
-def _unstable(made: dict[str, object]) -> bool:
+def _unstable(made: Document) -> bool:
     """Whether a section reports a failure that no requirement states, such as an unstable loop."""
-    sections = made["sections"]
-    assert isinstance(sections, list)
-    return any(part["status"] == "fail" for part in sections)
+    return any(part["status"] == "fail" for part in made["sections"])

@@ -15,6 +15,7 @@ from reports.cli.targets import folder_for_results
 if TYPE_CHECKING:
     from analyses.isolation import Missing
     from analyses.validation import Validation
+    from reports.document_schema import Block, Document
 
 FolderOption = Annotated[
     Path | None,
@@ -62,7 +63,7 @@ def validate(
     leave_with(result.passed and made["verdict"]["passed"])
 
 
-def _document(validation: Validation, missing: Sequence[Missing]) -> dict[str, Any]:
+def _document(validation: Validation, missing: Sequence[Missing]) -> Document:
     """The validation as a document of its own."""
     from actuator_lti.design import design_hash
     from reports import document as doc
@@ -81,7 +82,7 @@ def _document(validation: Validation, missing: Sequence[Missing]) -> dict[str, A
     )
 
 
-def _write(made: dict[str, Any], folder: Path, quiet: bool) -> tuple[Path, ...]:
+def _write(made: Document, folder: Path, quiet: bool) -> tuple[Path, ...]:
     """Write the page and its JSON; both or neither."""
     from actuator_lti.atomic import write_together
     from reports.cli.progress import progress
@@ -96,14 +97,14 @@ def _write(made: dict[str, Any], folder: Path, quiet: bool) -> tuple[Path, ...]:
     return paths
 
 
-def _print_json(made: dict[str, Any]) -> None:
+def _print_json(made: Document) -> None:
     from reports.cli.output import print_line
     from reports.document import dumps
 
     print_line(dumps(made).rstrip("\n"))
 
 
-def _print_tables(validation: Validation, made: dict[str, Any], paths: tuple[Path, ...]) -> None:
+def _print_tables(validation: Validation, made: Document, paths: tuple[Path, ...]) -> None:
     """Print the ledger, the conditional stability, and the verdict."""
     from reports.cli.output import print_line
     from reports.sections.validation import by_loop, loop_name
@@ -125,10 +126,11 @@ def _print_tables(validation: Validation, made: dict[str, Any], paths: tuple[Pat
     print_line(f"{sum(validation.seconds.values()):.1f} s")
 
 
-def _ledger(rows: Any, caption: str) -> dict[str, Any]:
+def _ledger(rows: Any, caption: str) -> Block:
     """The ledger of one loop for a terminal: fewer columns, verdicts in colour."""
     from reports import document as doc
-    from reports.sections.validation import STATUS, row_of
+    from reports.document_schema import Mark
+    from reports.sections.validation import STATUS, WORD, row_of
 
     columns = [
         doc.column("quantity", "Prediction"),
@@ -144,7 +146,7 @@ def _ledger(rows: Any, caption: str) -> dict[str, Any]:
     for row in rows:
         shown = row_of(row)
         small = row.passed is not None
-        shown["verdict"] = {"text": shown["verdict"], "status": STATUS[row.passed]}
+        shown["verdict"] = Mark(text=WORD[row.passed], status=STATUS[row.passed])
         shown["why"] = row.reason if small else f"{row.condition}: {row.reason}"
         lines.append(shown)
     return doc.table(caption, columns, lines)

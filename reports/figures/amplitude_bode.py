@@ -1,21 +1,50 @@
-"""Closed-loop response at several amplitudes, and the bandwidths against amplitude.
-
-Data: ``frequency_hz``; ``series`` of ``label``, ``gain_db``, ``phase_deg``; ``linear`` (``gain_db``,
-``phase_deg``); ``against``: ``amplitude``, ``minus3db_hz``, ``minus90deg_hz``, ``linear_minus3db_hz``,
-``linear_minus90deg_hz``, ``unit``, ``full``.
-"""
+"""Closed-loop response at several amplitudes, and the bandwidths against amplitude."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 MARKERS = "os^Dv<>"
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Response(TypedDict):
+    """One amplitude, or the linear one."""
+
+    gain_db: Values
+    phase_deg: Values
+
+
+class Series(Response):
+    """A response with its name."""
+
+    label: str
+
+
+class Against(TypedDict):
+    """Bandwidth against amplitude."""
+
+    amplitude: list[float]
+    minus3db_hz: Values
+    minus90deg_hz: Values
+    linear_minus3db_hz: float | None
+    linear_minus90deg_hz: float | None
+    unit: str
+    full: float
+
+
+class Data(TypedDict):
+    """Responses over frequency."""
+
+    frequency_hz: list[float]
+    series: list[Series]
+    linear: Response
+    against: Against
+
+
+def draw(data: Data) -> Chart:
     """Draw gain and phase on the left, bandwidth against amplitude on the right."""
     chart = Chart(width=style.WIDE, height=440.0)
     gain, phase = chart.column(1.0, 1.0, width=1.45, title="Output over command")
@@ -32,7 +61,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _responses(panel: Panel, data: dict[str, Any], key: str) -> None:
+def _responses(panel: Panel, data: Data, key: Literal["gain_db", "phase_deg"]) -> None:
     """Draw one quantity at all amplitudes over the linear one."""
     linear = {"colour": style.MUTED, "width": 4.2, "opacity": 0.45}
     panel.curve(data["frequency_hz"], data["linear"][key], "linear", **linear)
@@ -41,12 +70,14 @@ def _responses(panel: Panel, data: dict[str, Any], key: str) -> None:
         panel.curve(data["frequency_hz"], series[key], series["label"], **look)
 
 
-def _bandwidths(panel: Panel, data: dict[str, Any]) -> None:
+def _bandwidths(panel: Panel, data: Against) -> None:
     """Draw both bandwidths against amplitude, with the linear ones as levels."""
-    pairs = (("minus3db_hz", "−3 dB", style.GREEN, "o", 0), ("minus90deg_hz", "−90°", style.PURPLE, "D", 1))
-    for key, label, colour, marker, dash in pairs:
-        panel.curve(data["amplitude"], data[key], label, colour=colour, marker=marker, size=5.0, dash=dash)
-        level = data["linear_" + key]
+    pairs = (
+        (data["minus3db_hz"], data["linear_minus3db_hz"], "−3 dB", style.GREEN, "o", 0),
+        (data["minus90deg_hz"], data["linear_minus90deg_hz"], "−90°", style.PURPLE, "D", 1),
+    )
+    for values, level, label, colour, marker, dash in pairs:
+        panel.curve(data["amplitude"], values, label, colour=colour, marker=marker, size=5.0, dash=dash)
         if level is not None:
             panel.y.see([level])
             panel.rule_y(level, f"linear {style.hertz(level)}", colour=colour, dash=2)

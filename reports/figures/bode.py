@@ -1,22 +1,57 @@
-"""Open-loop Bode figure: magnitude and phase of one or several curves, every margin drawn where it is.
-
-Data: ``frequency_hz``; ``series`` of ``label``, ``magnitude_db``, ``phase_deg``; optional ``gain_margins``
-(``frequency_hz``, ``db``), ``phase_margins`` (``frequency_hz``, ``deg``), ``nyquist_hz``.
-"""
+"""Open-loop Bode figure: magnitude and phase of one or several curves, every margin drawn where it is."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 LABELLED = 3
 RED, GREEN = style.RED, style.GREEN
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """One curve."""
+
+    label: str
+    magnitude_db: Values
+    phase_deg: Values
+
+
+class GainMargin(TypedDict):
+    """At its phase crossover."""
+
+    frequency_hz: float
+    db: float
+
+
+class PhaseMargin(TypedDict):
+    """At its gain crossover."""
+
+    frequency_hz: float
+    deg: float
+
+
+class Curves(TypedDict):
+    """Magnitude and phase over frequency."""
+
+    frequency_hz: list[float]
+    series: list[Series]
+    nyquist_hz: NotRequired[float | None]
+
+
+class Data(Curves):
+    """Curves with their margins; ``small`` on the first screen."""
+
+    gain_margins: NotRequired[list[GainMargin]]
+    phase_margins: NotRequired[list[PhaseMargin]]
+    loop: NotRequired[str]
+    small: NotRequired[bool]
+
+
+def draw(data: Data) -> Chart:
     """Draw the two panels and the margins."""
     small = bool(data.get("small"))
     chart = Chart(
@@ -34,7 +69,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def curves(data: dict[str, Any], top: Panel, bottom: Panel) -> None:
+def curves(data: Curves, top: Panel, bottom: Panel) -> None:
     """Draw magnitude and phase of every series, with axes and the Nyquist line."""
     f = data["frequency_hz"]
     for k, series in enumerate(data["series"]):
@@ -43,12 +78,13 @@ def curves(data: dict[str, Any], top: Panel, bottom: Panel) -> None:
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     style.frequency(bottom, f)
     style.phase_axis(bottom, [y for s in data["series"] for y in s["phase_deg"]])
-    if data.get("nyquist_hz"):
+    nyquist_hz = data.get("nyquist_hz")
+    if nyquist_hz:
         for panel in (top, bottom):
-            panel.rule_x(data["nyquist_hz"], dash=2)
+            panel.rule_x(nyquist_hz, dash=2)
 
 
-def _gain_margins(data: dict[str, Any], top: Panel, shown: int) -> None:
+def _gain_margins(data: Data, top: Panel, shown: int) -> None:
     """Draw each gain margin as the distance to 0 dB at its phase crossover."""
     low, high = top.y.span()
     for k, margin in enumerate(data.get("gain_margins", ())):
@@ -63,7 +99,7 @@ def _gain_margins(data: dict[str, Any], top: Panel, shown: int) -> None:
             top.note(f"GM {_signed(db)} dB{off}\n{style.hertz(f)}", (f, seen))
 
 
-def _phase_margins(data: dict[str, Any], top: Panel, bottom: Panel, shown: int) -> None:
+def _phase_margins(data: Data, top: Panel, bottom: Panel, shown: int) -> None:
     """Draw each phase margin as the distance to the odd multiple of 180 deg at its gain crossover."""
     (top_low, _), (low, high) = top.y.span(), bottom.y.span()
     for level in range(math.ceil((low / 180.0 - 1) / 2), math.floor((high / 180.0 - 1) / 2) + 1):
@@ -84,11 +120,11 @@ def _phase_margins(data: dict[str, Any], top: Panel, bottom: Panel, shown: int) 
             bottom.note(f"PM {_signed(deg)}°\n{style.hertz(f)}", (f, border + deg / 2))
 
 
-def _inside(frequency_hz: float, data: dict[str, Any]) -> bool:
+def _inside(frequency_hz: float, data: Data) -> bool:
     return bool(data["frequency_hz"][0] <= frequency_hz <= data["frequency_hz"][-1] * 1.001)
 
 
-def _at(x: float, xs: list[float], ys: list[float | None]) -> float:
+def _at(x: float, xs: list[float], ys: Values) -> float:
     """Read a curve at a frequency, linear in its logarithm."""
     for k in range(1, len(xs)):
         a, b = ys[k - 1], ys[k]

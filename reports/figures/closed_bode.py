@@ -1,19 +1,33 @@
-"""Closed-loop Bode figure with both bandwidths and the resonance.
-
-Data: as `reports.figures.bode`, with ``bandwidth``: ``minus3db_hz``, ``minus90deg_hz``, ``resonance_hz``,
-``resonance_db``, ``level_db`` (the -3 dB line), each number or null.
-"""
+"""Closed-loop Bode figure with both bandwidths and the resonance."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.bode import curves
+from reports.figures.bode import Curves, curves
 from reports.figures.style import Chart, Panel
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Bandwidth(TypedDict):
+    """What is marked; null where it is not known. ``level_db`` is the -3 dB line."""
+
+    minus3db_hz: float | None
+    minus90deg_hz: float | None
+    resonance_hz: float | None
+    resonance_db: float | None
+    level_db: float | None
+    dc_db: NotRequired[float | None]
+
+
+class Data(Curves):
+    """Curves of `reports.figures.bode`, with the bandwidths."""
+
+    bandwidth: Bandwidth
+    loop: NotRequired[str]
+
+
+def draw(data: Data) -> Chart:
     """Draw the two panels and mark the bandwidths."""
     chart = Chart(width=style.HALF, height=410.0, loop=data.get("loop", ""))
     top, bottom = chart.column(1.0, 1.0)

@@ -1,20 +1,40 @@
-"""How well margins are met in time, and how they move with amplitude and dry friction.
-
-Data: ``margins``, each ``label``, ``difference`` (relative, magnitude); ``tolerance``; ``released``, each
-``label``, ``sizes`` (names), ``with_friction`` and ``without`` (border over linear border, null: none found).
-"""
+"""How well margins are met in time, and how they move with amplitude and dry friction."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 LEAST = 1e-9
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Margin(TypedDict):
+    """How far a margin is met, relative magnitude."""
+
+    label: str
+    difference: float
+
+
+class Released(TypedDict):
+    """Border over linear border by size of the deviation; null: none found."""
+
+    label: str
+    sizes: list[str]
+    with_friction: Values
+    without: Values
+
+
+class Data(TypedDict):
+    """Every margin, and the borders by amplitude."""
+
+    margins: list[Margin]
+    tolerance: float
+    released: list[Released]
+
+
+def draw(data: Data) -> Chart:
     """Draw the differences on the left, the borders by amplitude on the right."""
     chart = Chart(width=style.WIDE, height=max(330.0, 70.0 + 19.0 * len(data["margins"])))
     _differences(chart.panel(), data)
@@ -23,7 +43,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _differences(panel: Panel, data: dict[str, Any]) -> None:
+def _differences(panel: Panel, data: Data) -> None:
     """One dot a margin."""
     labels = [item["label"] for item in data["margins"]]
     values = [max(item["difference"], LEAST) for item in data["margins"]]
@@ -39,7 +59,7 @@ def _differences(panel: Panel, data: dict[str, Any]) -> None:
     panel.title = "At constant speed, no limit acting"
 
 
-def _released(panel: Panel, data: dict[str, Any]) -> None:
+def _released(panel: Panel, data: Data) -> None:
     """Border over linear border for small, medium and large deviations."""
     for k, item in enumerate(data["released"]):
         x = [j + 0.06 * (k - len(data["released"]) / 2) for j in range(len(item["sizes"]))]

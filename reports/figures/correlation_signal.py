@@ -1,17 +1,25 @@
-"""A signal measured and modelled, and the difference below.
-
-Data: ``time_s``, ``measured``, ``modelled``, ``difference``; ``label`` (with unit), ``difference_label``.
-"""
+"""A signal measured and modelled, and the difference below."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Data(TypedDict):
+    """A signal, its model and the difference; labels with units."""
+
+    time_s: list[float]
+    measured: Values
+    modelled: Values
+    difference: Values
+    label: str
+    difference_label: str
+
+
+def draw(data: Data) -> Chart:
     """Draw both, and the difference."""
     chart = Chart(width=style.WIDE, height=380.0)
     upper, lower = chart.column(2.2, 1.0)

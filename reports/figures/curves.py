@@ -1,18 +1,42 @@
-"""Curves over a common kind of x: the plain figure for whatever has no form of its own.
-
-Data: ``series`` of ``label``, ``x``, ``y`` (``style``: "line" or "points"); ``x_label``, ``y_label``;
-optional ``x_log``, ``y_log``, ``levels`` (``y``, ``label``).
-"""
+"""Curves over a common kind of x: the plain figure for whatever has no form of its own."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """``style``: "line" (default) or "points"."""
+
+    label: str
+    x: Sequence[float | None]
+    y: Sequence[float | None]
+    style: NotRequired[str]
+
+
+class Level(TypedDict):
+    """A level to be kept."""
+
+    y: float
+    label: str
+
+
+class Data(TypedDict):
+    """Curves over a common kind of x."""
+
+    series: list[Series]
+    x_label: str
+    y_label: str
+    x_log: NotRequired[bool]
+    y_log: NotRequired[bool]
+    levels: NotRequired[list[Level]]
+
+
+def draw(data: Data) -> Chart:
     """Draw the curves."""
     chart = Chart(width=style.WIDE, height=320.0)
     panel = chart.panel()

@@ -1,18 +1,35 @@
-"""Where the phase at each crossover goes: one stacked bar a loop.
-
-Data: ``bars`` of ``label`` and ``parts`` (``name``, ``deg``, all counted as lag); ``margins`` (deg) per bar.
-"""
+"""Where the phase at each crossover goes: one stacked bar a loop."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.charts.paint import HATCHES
 from reports.figures import style
 from reports.figures.style import Chart, Panel
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Part(TypedDict):
+    """Part of the phase, counted as lag."""
+
+    name: str
+    deg: float
+
+
+class Bar(TypedDict):
+    """One loop."""
+
+    label: str
+    parts: list[Part]
+
+
+class Data(TypedDict):
+    """One bar a loop."""
+
+    bars: list[Bar]
+
+
+def draw(data: Data) -> Chart:
     """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
     bars = data["bars"]
     chart = Chart(width=style.WIDE, height=70.0 + 48.0 * len(bars), legend=True)
@@ -33,7 +50,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _bar(panel: Panel, row: int, parts: list[dict[str, Any]], names: list[str]) -> None:
+def _bar(panel: Panel, row: int, parts: list[Part], names: list[str]) -> None:
     """Draw the parts of one loop and their sum."""
     ends = {1: 0.0, -1: 0.0}
     for part in parts:

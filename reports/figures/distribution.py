@@ -1,18 +1,33 @@
-"""Distributions of figures with their limits, the nominal design and the worst case.
-
-Data: ``panels``, at most three, each ``label``, ``unit``, ``edges``, ``counts``, ``nominal``, ``worst``,
-``minimum``, ``maximum`` (numbers or null).
-"""
+"""Distributions of figures with their limits, the nominal design and the worst case."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Histogram(TypedDict):
+    """One figure of merit with its limits."""
+
+    label: str
+    unit: str
+    edges: list[float]
+    counts: list[int]
+    nominal: float | None
+    worst: float | None
+    minimum: float | None
+    maximum: float | None
+
+
+class Data(TypedDict):
+    """At most three."""
+
+    panels: list[Histogram]
+
+
+def draw(data: Data) -> Chart:
     """Draw one histogram a panel."""
     chart = Chart(width=style.WIDE * len(data["panels"]) / 3.0, height=250.0, legend=True)
     for part in data["panels"]:
@@ -24,7 +39,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _histogram(panel: Panel, data: dict[str, Any]) -> None:
+def _histogram(panel: Panel, data: Histogram) -> None:
     """Fill the counts under a line."""
     edges, counts = data["edges"], data["counts"]
     if counts:
@@ -35,19 +50,18 @@ def _histogram(panel: Panel, data: dict[str, Any]) -> None:
         panel.y.limits(0.0, 1.35 * max(counts))
 
 
-def _marks(panel: Panel, data: dict[str, Any]) -> None:
+def _marks(panel: Panel, data: Histogram) -> None:
     """Mark limits, the nominal design and the worst case, each with its own dash."""
     known = style.known((data["nominal"], data["worst"]))
     low, high = min([*data["edges"], *known], default=0.0), max([*data["edges"], *known], default=1.0)
     width = max(high - low, 1e-3 * max(abs(high), 1e-9))
     lines = (
-        ("nominal", style.INK, 0),
-        ("worst", style.ORANGE, 1),
-        ("minimum", style.RED, 2),
-        ("maximum", style.RED, 2),
+        ("nominal", data["nominal"], style.INK, 0),
+        ("worst", data["worst"], style.ORANGE, 1),
+        ("minimum", data["minimum"], style.RED, 2),
+        ("maximum", data["maximum"], style.RED, 2),
     )
-    for name, colour, dash in lines:
-        value = data[name]
+    for name, value, colour, dash in lines:
         if value is None:
             continue
         if name in ("minimum", "maximum") and not low - 2 * width <= value <= high + 2 * width:

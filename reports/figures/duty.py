@@ -1,18 +1,32 @@
-"""Current of a duty over one period, and the winding's temperature.
-
-Data: ``time_s``, ``current``, ``rms``, ``continuous`` (or null); ``heating``: null, or ``time_s``,
-``temperature``, ``limit`` (or null).
-"""
+"""Current of a duty over one period, and the winding's temperature."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Heating(TypedDict):
+    """Rise of the winding from ambient."""
+
+    time_s: list[float]
+    temperature: Values
+    limit: float | None
+
+
+class Data(TypedDict):
+    """One period of the motion."""
+
+    time_s: list[float]
+    current: Values
+    rms: float
+    continuous: float | None
+    heating: Heating | None
+
+
+def draw(data: Data) -> Chart:
     """Draw one panel, or two side by side."""
     chart = Chart(width=style.WIDE, height=320.0)
     panel = chart.panel(title="One period of the motion")
@@ -31,7 +45,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _winding(panel: Panel, data: dict[str, Any]) -> None:
+def _winding(panel: Panel, data: Heating) -> None:
     """Draw the rise from ambient."""
     scale = style.time_axis(panel, data["time_s"][-1])
     panel.curve([t * scale for t in data["time_s"]], data["temperature"], "winding", **style.series(1))

@@ -1,18 +1,33 @@
-"""Deflection and moment over time after each failure.
-
-Data: ``series`` of ``label``, ``time_s``, ``deflection``, ``moment``; ``unit``, ``load``; ``stop``;
-``detection_s``.
-"""
+"""Deflection and moment over time after each failure."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """After one failure."""
+
+    label: str
+    time_s: list[float]
+    deflection: Values
+    moment: Values
+
+
+class Data(TypedDict):
+    """Every failure on one time axis."""
+
+    series: list[Series]
+    unit: str
+    load: str
+    stop: float
+    detection_s: float
+
+
+def draw(data: Data) -> Chart:
     """Draw the two panels on one time axis."""
     chart = Chart(width=style.WIDE, height=460.0, legend=True)
     top, bottom = chart.column(1.2, 1.0)

@@ -1,18 +1,27 @@
-"""Open-loop Bode figures of several loops side by side, each in several forms.
-
-Data: ``panels`` of ``title`` and the data of `reports.figures.bode` without margins.
-"""
+"""Open-loop Bode figures of several loops side by side, each in several forms."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.bode import curves
+from reports.figures.bode import Curves, curves
 from reports.figures.style import Chart
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Panel(Curves):
+    """One loop in several forms; see `reports.figures.bode`."""
+
+    title: str
+
+
+class Data(TypedDict):
+    """One panel a loop."""
+
+    panels: list[Panel]
+
+
+def draw(data: Data) -> Chart:
     """Draw a column a loop."""
     chart = Chart(width=style.WIDE, height=400.0)
     for panel in data["panels"]:

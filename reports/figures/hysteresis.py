@@ -1,18 +1,41 @@
-"""Lost motion by dry friction, and how long a step below the threshold waits.
-
-Data: ``loops`` of ``label``, ``command``, ``error``; ``waits`` of ``label``, ``amplitude``,
-``predicted_ms``, ``simulated_ms`` (may be empty); ``unit``, ``error_unit``, ``wait_unit``.
-"""
+"""Lost motion by dry friction, and how long a step below the threshold waits."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Loop(TypedDict):
+    """Error over a slow triangle of the command."""
+
+    label: str
+    command: list[float]
+    error: list[float]
+
+
+class Wait(TypedDict):
+    """Time to the first motion."""
+
+    label: str
+    amplitude: list[float]
+    predicted_ms: Values
+    simulated_ms: Values
+
+
+class Data(TypedDict):
+    """Loops, and waits where there are any."""
+
+    loops: list[Loop]
+    waits: list[Wait]
+    unit: str
+    error_unit: str
+    wait_unit: str
+
+
+def draw(data: Data) -> Chart:
     """Draw the loops, and the waiting times where there are any."""
     chart = Chart(width=style.WIDE, height=330.0)
     panel = chart.panel(title="Position error over a slow triangle of the command")
@@ -27,7 +50,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _waits(panel: Panel, data: dict[str, Any]) -> None:
+def _waits(panel: Panel, data: Data) -> None:
     """Draw the time until the output moves against the size of the step."""
     for k, wait in enumerate(data["waits"]):
         panel.curve(wait["amplitude"], wait["predicted_ms"], f"{wait['label']}: predicted", **style.series(k))

@@ -1,18 +1,37 @@
-"""Confidence regions of pairs of coefficients, in percent of their values.
-
-Data: ``pairs`` of ``x_label``, ``y_label``, ``whole`` and ``random`` (each ``x``, ``y``), ``interval``
-[half width x, half width y].
-"""
+"""Confidence regions of pairs of coefficients, in percent of their values."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Outline(TypedDict):
+    """A closed curve."""
+
+    x: list[float]
+    y: list[float]
+
+
+class Pair(TypedDict):
+    """Two coefficients; ``interval``: half widths."""
+
+    x_label: str
+    y_label: str
+    whole: Outline
+    random: Outline
+    interval: list[float]
+
+
+class Data(TypedDict):
+    """In percent of the values."""
+
+    pairs: list[Pair]
+
+
+def draw(data: Data) -> Chart:
     """Draw the pairs side by side."""
     chart = Chart(width=style.WIDE, height=300.0)
     for pair in data["pairs"]:

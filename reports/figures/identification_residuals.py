@@ -1,17 +1,25 @@
-"""Residuals of the surface against speed and load, in units of N m and of their standard deviation.
-
-Data: ``speed_rad_s``, ``load_Nm``, ``residual_uNm``, ``std_uNm``, ``outlier`` (true or false), ``run``.
-"""
+"""Residuals of the surface against speed and load, in units of N m and of their standard deviation."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Literal, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Data(TypedDict):
+    """One entry a run."""
+
+    speed_rad_s: list[float]
+    load_Nm: list[float]
+    residual_uNm: list[float]
+    std_uNm: list[float]
+    outlier: list[bool]
+    run: list[str]
+
+
+def draw(data: Data) -> Chart:
     """Draw both views side by side."""
     chart = Chart(width=style.WIDE, height=310.0)
     _view(chart.panel(), data, "speed_rad_s", "motor speed, rad/s")
@@ -19,7 +27,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _view(panel: Panel, data: dict[str, Any], key: str, label: str) -> None:
+def _view(panel: Panel, data: Data, key: Literal["speed_rad_s", "load_Nm"], label: str) -> None:
     panel.rule_y(0.0)
     for x, y, std in zip(data[key], data["residual_uNm"], data["std_uNm"], strict=True):
         ends = [y - 2.0 * std, y + 2.0 * std]

@@ -1,18 +1,39 @@
-"""Friction torque against speed: the runs and the fitted surface, one line for each load.
-
-Data: ``levels`` of ``label``, ``speed_rad_s``, ``torque_mNm``, ``line_speed_rad_s``, ``line_torque_mNm``;
-``outliers`` of ``run``, ``speed_rad_s``, ``torque_mNm``.
-"""
+"""Friction torque against speed: the runs and the fitted surface, one line for each load."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Level(TypedDict):
+    """Runs of one load, and the fitted line."""
+
+    label: str
+    speed_rad_s: Values
+    torque_mNm: Values
+    line_speed_rad_s: Values
+    line_torque_mNm: Values
+
+
+class Outlier(TypedDict):
+    """A run that was left out."""
+
+    run: str
+    speed_rad_s: float
+    torque_mNm: float
+
+
+class Data(TypedDict):
+    """Friction torque against speed."""
+
+    levels: list[Level]
+    outliers: list[Outlier]
+
+
+def draw(data: Data) -> Chart:
     """Draw points and lines."""
     chart = Chart(width=style.WIDE, height=380.0, legend=True)
     panel = chart.panel()

@@ -1,17 +1,29 @@
-"""One run of a campaign with its steady part marked.
-
-Data: ``time_s``; ``panels`` of ``label``, ``values``; ``window`` [start, stop] in s.
-"""
+"""One run of a campaign with its steady part marked."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Signal(TypedDict):
+    """One signal."""
+
+    label: str
+    values: Values
+
+
+class Data(TypedDict):
+    """One run; ``window``: start and stop of its steady part, s."""
+
+    time_s: list[float]
+    panels: list[Signal]
+    window: list[float]
+
+
+def draw(data: Data) -> Chart:
     """Draw each signal in a panel of its own, the steady part shaded."""
     parts = data["panels"]
     chart = Chart(width=style.WIDE, height=60.0 + 120.0 * len(parts))

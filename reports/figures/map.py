@@ -1,21 +1,15 @@
-"""Amplitude over frequency: which limit acts, what the output looks like, and the linear onset lines.
-
-Data: ``frequency_hz`` (of the points), ``amplitude`` (of the points, in ``unit``), ``causes`` and
-``waveforms`` (names), ``cause`` and ``waveform`` (rows of indices, one row an amplitude), ``onset`` of
-``name``, ``label``, ``amplitude``; ``points`` of ``frequency_hz``, ``amplitude``, ``label``; ``unit``;
-``marks`` of ``amplitude``, ``label``.
-"""
+"""Amplitude over frequency: which limit acts, what the output looks like, and the linear onset lines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 COLOURS = {
     "friction": style.BROWN,
@@ -53,7 +47,45 @@ GLYPHS: dict[str, dict[str, Any]] = {
 EVERY = 2  # a glyph in every second column
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Onset(TypedDict):
+    """Where a limit is first reached, linear loop."""
+
+    name: str
+    label: str
+    amplitude: Values
+
+
+class Points(TypedDict):
+    """Points of their own."""
+
+    frequency_hz: Values
+    amplitude: Values
+    label: str
+
+
+class Mark(TypedDict):
+    """A level of amplitude."""
+
+    amplitude: float
+    label: str
+
+
+class Data(TypedDict):
+    """Indices of causes and waveforms, one row an amplitude."""
+
+    frequency_hz: list[float]
+    amplitude: list[float]
+    unit: str
+    causes: list[str]
+    waveforms: list[str]
+    cause: list[list[int]]
+    waveform: list[list[int]]
+    onset: list[Onset]
+    points: list[Points]
+    marks: list[Mark]
+
+
+def draw(data: Data) -> Chart:
     """Draw regions, glyphs and lines."""
     chart = Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
@@ -114,7 +146,7 @@ def _glyphs(panel: Panel, names: list[str], waveform: np.ndarray, x: np.ndarray,
             panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
 
 
-def _lines(panel: Panel, data: dict[str, Any]) -> None:
+def _lines(panel: Panel, data: Data) -> None:
     """Draw A_k(w) of every limiter, and the amplitudes at which the simulator first limits."""
     for line in data["onset"]:
         look: dict[str, Any] = {"colour": COLOURS[line["name"]], "dash": LINES[line["name"]], "width": 2.3}

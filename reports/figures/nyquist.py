@@ -1,19 +1,29 @@
-"""Nyquist figure around the critical point, with the modulus circle and every crossing.
-
-Data: ``real``, ``imag`` (null where the curve leaves the frame); ``modulus`` (distance) and
-``modulus_point`` [re, im] or null; ``gain_points`` (real coordinates), ``phase_points`` [re, im]; ``frame``.
-"""
+"""Nyquist figure around the critical point, with the modulus circle and every crossing."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Data(TypedDict):
+    """The curve (null where it leaves the frame), its distance to -1, its crossings as [re, im]."""
+
+    real: Values
+    imag: Values
+    frequency_hz: NotRequired[Values]
+    modulus: NotRequired[float | None]
+    modulus_point: NotRequired[list[float] | None]
+    gain_points: NotRequired[list[float]]
+    phase_points: NotRequired[list[list[float]]]
+    frame: NotRequired[float]
+    loop: NotRequired[str]
+
+
+def draw(data: Data) -> Chart:
     """Draw the curve, its mirror image and the circles."""
     chart = Chart(width=style.HALF, height=430.0, loop=data.get("loop", ""))
     panel = chart.panel()
@@ -47,7 +57,7 @@ def _circle(centre: tuple[float, float], radius: float) -> tuple[list[float], li
     ]
 
 
-def _modulus(data: dict[str, Any], panel: Panel) -> None:
+def _modulus(data: Data, panel: Panel) -> None:
     """Draw the circle about -1 that the curve just touches."""
     distance, point = data.get("modulus"), data.get("modulus_point")
     if distance is None or distance <= 0:

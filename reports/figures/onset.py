@@ -1,17 +1,30 @@
-"""Command amplitude at which each limiter is reached, over frequency: the border of linear validity.
-
-Data: ``frequency_hz``; ``series`` of ``label``, ``amplitude``; ``unit``; ``full_deflection`` or null.
-"""
+"""Command amplitude at which each limiter is reached, over frequency: the border of linear validity."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """One limiter."""
+
+    label: str
+    amplitude: Values
+
+
+class Data(TypedDict):
+    """Command amplitude at which each limiter is reached."""
+
+    frequency_hz: list[float]
+    series: list[Series]
+    unit: str
+    full_deflection: NotRequired[float | None]
+
+
+def draw(data: Data) -> Chart:
     """Draw every limiter's line; below the lowest the linear model holds."""
     chart = Chart(width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude")
     panel = chart.panel()

@@ -1,27 +1,45 @@
-"""Linear and measured frequency response of a loop over one another, with their differences.
-
-Data: ``frequency_hz``, ``valid_to_hz``; ``panels``, each ``title`` with ``linear_db``, ``linear_deg``,
-``measured_db``, ``measured_deg``, ``error_db``, ``error_deg`` (magnitudes); ``tolerance_db``,
-``tolerance_deg``; ``title``.
-"""
+"""Linear and measured frequency response of a loop over one another, with their differences."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 LEAST = 1e-12  # errors below this are drawn there
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Response(TypedDict):
+    """One response; the errors are magnitudes."""
+
+    title: str
+    linear_db: Values
+    linear_deg: Values
+    measured_db: Values
+    measured_deg: Values
+    error_db: Values
+    error_deg: Values
+
+
+class Data(TypedDict):
+    """One column a response."""
+
+    frequency_hz: list[float]
+    valid_to_hz: float
+    panels: list[Response]
+    tolerance_db: float
+    tolerance_deg: float
+    title: NotRequired[str]
+
+
+def draw(data: Data) -> Chart:
     """Draw one column a response: magnitude, phase, differences."""
     chart = Chart(width=style.WIDE, height=520.0)
     for part in data["panels"]:
         panels = chart.column(3, 3, 2, title=part["title"])
-        _overlay(panels[0], data, part, "db")
-        _overlay(panels[1], data, part, "deg")
+        _overlay(panels[0], data, part["linear_db"], part["measured_db"])
+        _overlay(panels[1], data, part["linear_deg"], part["measured_deg"])
         _errors(panels[2], data, part)
         style.bound(panels[0], part["linear_db"], span=90.0, top_room=0.1)
         style.phase_axis(panels[1], part["linear_deg"])
@@ -34,22 +52,24 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _overlay(panel: Panel, data: dict[str, Any], part: dict[str, Any], unit: str) -> None:
+def _overlay(panel: Panel, data: Data, linear: Values, measured: Values) -> None:
     """Draw the linear line and the measured points."""
     f = data["frequency_hz"]
-    panel.curve(f, part[f"linear_{unit}"], "linear loop", colour=style.BLUE)
+    panel.curve(f, linear, "linear loop", colour=style.BLUE)
     look: dict[str, Any] = {"size": 5.0, "hollow": True, "colour": style.ORANGE}
-    panel.points(f, part[f"measured_{unit}"], "measured by injection", **look)
+    panel.points(f, measured, "measured by injection", **look)
 
 
-def _errors(panel: Panel, data: dict[str, Any], part: dict[str, Any]) -> None:
+def _errors(panel: Panel, data: Data, part: Response) -> None:
     """Draw the magnitudes of the differences and their tolerances on a logarithmic scale."""
     f = data["frequency_hz"]
-    for unit, colour, dash in (("dB", style.PURPLE, 0), ("deg", style.GREEN, 1)):
-        key = unit.lower()
-        values = [None if x is None else max(x, LEAST) for x in part[f"error_{key}"]]
+    both = (
+        ("dB", part["error_db"], data["tolerance_db"], style.PURPLE, 0),
+        ("deg", part["error_deg"], data["tolerance_deg"], style.GREEN, 1),
+    )
+    for unit, errors, allowed, colour, dash in both:
+        values = [None if x is None else max(x, LEAST) for x in errors]
         panel.curve(f, values, f"difference, {unit}", colour=colour, dash=dash, width=1.5)
-        allowed = data[f"tolerance_{key}"]
         panel.rule_y(allowed, label=f"allowed: {allowed:g} {unit}", colour=colour, dash=4, width=1.3)
     panel.y.log = True
     panel.y.limits(1e-12, 10.0)

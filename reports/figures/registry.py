@@ -5,6 +5,7 @@ A figure module has ``draw(data) -> Chart``, a chart as data; how it is written 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -58,7 +59,9 @@ def figure_module(name: str) -> ModuleType:
     return import_module(MODULES[name])
 
 
-def draw_svg(name: str, data: dict[str, Any], *, prefix: str = "f", page: bool = True, alt: str = "") -> str:
+def draw_svg(
+    name: str, data: Mapping[str, Any], *, prefix: str = "f", page: bool = True, alt: str = ""
+) -> str:
     """Draw a figure as SVG.
 
     Parameters

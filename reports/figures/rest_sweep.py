@@ -1,17 +1,30 @@
-"""Command to output from rest: measured, the sliding loop, and the describing function of dry friction.
-
-Data: ``frequency_hz``; ``series``, each ``label``, ``magnitude_db``, ``phase_deg``, ``points`` (bool).
-"""
+"""Command to output from rest: measured, the sliding loop, and the describing function of dry friction."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """Measured ``points``, or a line."""
+
+    label: str
+    magnitude_db: Values
+    phase_deg: Values
+    points: bool
+
+
+class Data(TypedDict):
+    """Command to output from rest."""
+
+    frequency_hz: list[float]
+    series: list[Series]
+
+
+def draw(data: Data) -> Chart:
     """Draw magnitude, phase, and how far each line lies from the measurement."""
     chart = Chart(width=style.WIDE, height=500.0)
     top, bottom, off = chart.column(3, 3, 2)
@@ -28,7 +41,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _differences(panel: Panel, data: dict[str, Any]) -> None:
+def _differences(panel: Panel, data: Data) -> None:
     """Draw each line less the measurement, in dB."""
     measured = next(series for series in data["series"] if series["points"])
     for k, series in enumerate(data["series"]):

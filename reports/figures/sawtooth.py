@@ -1,18 +1,36 @@
-"""The sawtooth: position, speed and current of a sine that is faster than the speed limit, a column a load.
-
-Data: ``columns`` of ``title``, ``time_s``, ``reference``, ``output``, ``rate``, ``command_rate``,
-``current`` (or null), ``note``; ``rate_limit``; ``unit``, ``rate_unit``.
-"""
+"""The sawtooth: position, speed and current of a sine that is faster than the speed limit."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Load(TypedDict):
+    """Motion under one load; ``current`` is null for a source of torque."""
+
+    title: str
+    time_s: list[float]
+    reference: list[float]
+    output: Values
+    rate: Values
+    command_rate: Values
+    current: Values | None
+    note: str
+
+
+class Data(TypedDict):
+    """A column a load."""
+
+    columns: list[Load]
+    rate_limit: float
+    unit: str
+    rate_unit: str
+
+
+def draw(data: Data) -> Chart:
     """Draw the columns on common scales."""
     columns = data["columns"]
     rows = 3 if columns[0]["current"] is not None else 2
@@ -31,7 +49,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _column(panels: list[Panel], column: dict[str, Any], data: dict[str, Any], *, named: bool) -> None:
+def _column(panels: list[Panel], column: Load, data: Data, *, named: bool) -> None:
     """Draw one load."""
     time = column["time_s"]
     panels[0].curve(time, column["reference"], "command", colour=style.MUTED, dash=1)
@@ -45,7 +63,7 @@ def _column(panels: list[Panel], column: dict[str, Any], data: dict[str, Any], *
         words = "rate limit" if sign < 0 and named else ""
         panels[1].rule_y(sign * data["rate_limit"], words, colour=style.RED, width=1.1, dash=1)
     if len(panels) > 2:
-        panels[2].curve(time, column["current"], "motor current", colour=style.ORANGE)
+        panels[2].curve(time, column["current"] or (), "motor current", colour=style.ORANGE)
         panels[2].y.label = "motor current, A"
     panels[-1].x.label = "time, s"
     panels[-1].x.limits(time[0], time[-1])

@@ -1,38 +1,56 @@
-"""Magnitudes of S and T with their peaks.
-
-Data: ``frequency_hz``, ``s_db``, ``t_db``; ``s_peak`` and ``t_peak`` (``frequency_hz``, ``db``) or null;
-``limit_db`` (a requirement on the peak of S) or null; ``nyquist_hz`` or null.
-"""
+"""Magnitudes of S and T with their peaks."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Peak(TypedDict):
+    """Highest point."""
+
+    frequency_hz: float | None
+    db: float
+
+
+class Data(TypedDict):
+    """Magnitudes, their peaks, and a requirement on the peak of S."""
+
+    frequency_hz: list[float]
+    s_db: Values
+    t_db: Values
+    s_peak: NotRequired[Peak | None]
+    t_peak: NotRequired[Peak | None]
+    limit_db: NotRequired[float | None]
+    loop: NotRequired[str]
+    nyquist_hz: NotRequired[float | None]
+
+
+def draw(data: Data) -> Chart:
     """Draw both magnitudes, the peaks and the limit."""
     chart = Chart(width=style.HALF, height=225.0, loop=data.get("loop", ""))
     panel = chart.panel()
     f = data["frequency_hz"]
-    for k, (name, values, peak) in enumerate((("S", "s_db", "s_peak"), ("T", "t_db", "t_peak"))):
+    both = (("S", data["s_db"], data.get("s_peak")), ("T", data["t_db"], data.get("t_peak")))
+    for k, (name, values, peak) in enumerate(both):
         colour = (style.ORANGE, style.BLUE)[k]
-        panel.curve(f, data[values], _words(name, data.get(peak)), colour=colour, dash=k)
-        at = (data.get(peak) or {}).get("frequency_hz")
-        if at and f[0] <= at <= f[-1] * 1.001:
-            panel.points([at], [data[peak]["db"]], marker="^", colour=colour, size=7.0, read=False)
+        panel.curve(f, values, _words(name, peak), colour=colour, dash=k)
+        at = peak["frequency_hz"] if peak else None
+        if peak and at and f[0] <= at <= f[-1] * 1.001:
+            panel.points([at], [peak["db"]], marker="^", colour=colour, size=7.0, read=False)
     panel.rule_y(0.0, colour=style.INK)
     style.frequency(panel, f)
     panel.y.label = "magnitude, dB"
     style.bound(panel, [*data["s_db"], *data["t_db"]], span=45.0, top_room=0.12)
-    if data.get("limit_db") is not None:
-        _limit(panel, data["limit_db"])
+    limit_db = data.get("limit_db")
+    if limit_db is not None:
+        _limit(panel, limit_db)
     return chart
 
 
-def _words(name: str, peak: dict[str, Any] | None) -> str:
+def _words(name: str, peak: Peak | None) -> str:
     """Name a curve, with its peak where it has one."""
     if not peak or not peak["frequency_hz"] or peak["db"] < 0.005:
         return f"|{name}|, no peak"

@@ -1,19 +1,38 @@
-"""Step response with rise time, overshoot and settling time.
-
-Data: ``time_s``, ``series`` of ``label``, ``response``; ``final``; ``rise`` [t10, t90] or null;
-``settling_s``, ``overshoot_percent``, ``peak_time_s`` or null; ``held`` (drawn as stairs).
-"""
+"""Step response with rise time, overshoot and settling time."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 from reports.numbers import seconds
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """A response, on a time axis of its own where it has one."""
+
+    label: str
+    response: Values
+    time_s: NotRequired[list[float]]
+
+
+class Data(TypedDict):
+    """Responses with the figures of the first; ``held``: drawn as stairs."""
+
+    time_s: list[float]
+    series: list[Series]
+    final: NotRequired[float | None]
+    rise: NotRequired[list[float] | None]
+    settling_s: NotRequired[float | None]
+    overshoot_percent: NotRequired[float | None]
+    peak_time_s: NotRequired[float | None]
+    held: NotRequired[bool]
+    loop: NotRequired[str]
+    small: NotRequired[bool]
+
+
+def draw(data: Data) -> Chart:
     """Draw the responses and the figures read from the first."""
     small = bool(data.get("small"))
     chart = Chart(
@@ -31,27 +50,29 @@ def draw(data: dict[str, Any]) -> Chart:
     panel.x.limits(0.0, data["time_s"][-1] * scale)
     values = style.known(y for s in data["series"] for y in s["response"])
     panel.y.limits(low=min(0.0, 1.05 * min(values, default=0.0)))
-    if data.get("final") is not None:
-        _band(data, panel, scale)
+    final = data.get("final")
+    if final is not None:
+        _band(data, final, panel, scale)
     return chart
 
 
-def _band(data: dict[str, Any], panel: Panel, scale: float) -> None:
+def _band(data: Data, final: float, panel: Panel, scale: float) -> None:
     """Draw the 2 % band, the 10-90 % rise and the settling time."""
-    final, last = data["final"], data["time_s"][-1]
+    last, rise, settling = data["time_s"][-1], data.get("rise"), data.get("settling_s")
     panel.band_y(0.98 * final, 1.02 * final, colour=style.GREEN)
     panel.rule_y(final)
     words = []
-    if data.get("rise"):
-        for t, level in zip(data["rise"], (0.1 * final, 0.9 * final), strict=True):
+    if rise:
+        for t, level in zip(rise, (0.1 * final, 0.9 * final), strict=True):
             if t <= last:
                 panel.points([t * scale], [level], colour=style.GREEN, size=6.0, read=False)
-        words.append(f"rise 10–90 %: {seconds(data['rise'][1] - data['rise'][0])}")
-    if data.get("overshoot_percent") is not None:
-        words.append(f"overshoot: {data['overshoot_percent']:.1f} %")
-    if data.get("settling_s") is not None:
-        if data["settling_s"] <= last:
-            panel.rule_x(data["settling_s"] * scale, colour=style.PURPLE, width=1.3, dash=1)
-        words.append(f"settled to 2 %: {seconds(data['settling_s'])}")
+        words.append(f"rise 10–90 %: {seconds(rise[1] - rise[0])}")
+    overshoot = data.get("overshoot_percent")
+    if overshoot is not None:
+        words.append(f"overshoot: {overshoot:.1f} %")
+    if settling is not None:
+        if settling <= last:
+            panel.rule_x(settling * scale, colour=style.PURPLE, width=1.3, dash=1)
+        words.append(f"settled to 2 %: {seconds(settling)}")
     if words:
         panel.note("\n".join(words), corner="bottom right")

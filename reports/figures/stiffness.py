@@ -1,17 +1,30 @@
-"""Dynamic stiffness over frequency: magnitude and phase in every state of the drive.
-
-Data: ``frequency_hz``; ``series`` of ``label``, ``size``, ``phase_deg``; ``unit``.
-"""
+"""Dynamic stiffness over frequency: magnitude and phase in every state of the drive."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart
+from reports.figures.style import Chart, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Series(TypedDict):
+    """One state of the drive."""
+
+    label: str
+    size: Values
+    phase_deg: Values
+
+
+class Data(TypedDict):
+    """Dynamic stiffness over frequency."""
+
+    frequency_hz: list[float]
+    series: list[Series]
+    unit: str
+
+
+def draw(data: Data) -> Chart:
     """Draw the two panels."""
     chart = Chart(width=style.WIDE, height=420.0)
     top, bottom = chart.column(1.2, 1.0)

@@ -14,11 +14,36 @@ from reports.numbers import hertz, time_unit, to_minus
 
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
 __all__ = [
-    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "SMALL",
+    "BLUE",
+    "BROWN",
+    "GREEN",
+    "HALF",
+    "INK",
+    "MUTED",
+    "ORANGE",
+    "PURPLE",
+    "RED",
+    "SERIES",
+    "SKY",
+    "SMALL",
     "WIDE",
-    "Chart", "Panel", "bound", "differences", "frequency", "hertz", "known", "phase_axis", "powers", "series",
-    "time_axis", "time_unit", "to_minus",
+    "Chart",
+    "Panel",
+    "Values",
+    "bound",
+    "differences",
+    "frequency",
+    "hertz",
+    "known",
+    "phase_axis",
+    "powers",
+    "series",
+    "time_axis",
+    "time_unit",
+    "to_minus",
 ]  # fmt: skip
+
+Values = Sequence[float | None]  # of a curve; null is a gap
 
 
 def known(values: Iterable[float | None]) -> list[float]:

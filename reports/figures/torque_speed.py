@@ -1,16 +1,14 @@
 """The torque-speed plane of the motor: bounds, what steady motion needs, and paths of manoeuvres.
 
-Data: ``title``; ``bounds``, ``demands``, ``paths`` of ``label``, ``speed``, ``torque``; ``speed_label``,
-``torque_label``; ``top`` (torque up to which the frame reaches), ``fast`` (speed likewise).
 Motion backwards is turned by half a turn, so that torque below zero brakes.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 BOUND_COLOURS = {
     "voltage limit": style.RED,
@@ -21,7 +19,36 @@ BOUND_COLOURS = {
 }
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Line(TypedDict):
+    """A bound or a demand."""
+
+    label: str
+    speed: list[float]
+    torque: list[float]
+
+
+class Path(TypedDict):
+    """Of a manoeuvre; a gap where it reverses."""
+
+    label: str
+    speed: list[float]
+    torque: Values
+
+
+class Data(TypedDict):
+    """``fast`` and ``top``: speed and torque that the frame must show."""
+
+    title: str
+    bounds: list[Line]
+    demands: list[Line]
+    paths: list[Path]
+    speed_label: str
+    torque_label: str
+    top: float
+    fast: float
+
+
+def draw(data: Data) -> Chart:
     """Draw bounds with their names on them, then demands and paths."""
     chart = Chart(width=style.WIDE, height=400.0, title=data["title"], legend=True)
     panel = chart.panel()
@@ -43,7 +70,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _bound(panel: Panel, bound: dict[str, Any], data: dict[str, Any]) -> None:
+def _bound(panel: Panel, bound: Line, data: Data) -> None:
     """Draw one bound in both halves, named once."""
     colour, speed, torque = BOUND_COLOURS.get(bound["label"], style.INK), bound["speed"], bound["torque"]
     upright = speed[0] == speed[-1]

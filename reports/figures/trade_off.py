@@ -1,18 +1,32 @@
-"""Bandwidth against phase margin: what tuning can trade.
-
-Data: ``points`` of ``bandwidth_hz``, ``phase_margin_deg``, ``feasible``; ``chosen`` (a point or null);
-``bandwidth_min_hz``, ``phase_margin_min_deg`` (numbers or null); ``title``.
-"""
+"""Bandwidth against phase margin: what tuning can trade."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Point(TypedDict):
+    """One tuning."""
+
+    bandwidth_hz: float
+    phase_margin_deg: float
+    feasible: bool
+
+
+class Data(TypedDict):
+    """The curve, the required corner and the chosen point."""
+
+    points: list[Point]
+    chosen: NotRequired[Point | None]
+    bandwidth_min_hz: NotRequired[float | None]
+    phase_margin_min_deg: NotRequired[float | None]
+    title: str
+
+
+def draw(data: Data) -> Chart:
     """Draw the curve, the required corner and the chosen point."""
     chart = Chart(width=style.WIDE, height=350.0, title=data["title"])
     panel = chart.panel()
@@ -29,14 +43,14 @@ def draw(data: dict[str, Any]) -> Chart:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
     required: dict[str, Any] = {"label": "required", "colour": style.RED, "width": 1.2, "dash": 1}
-    if data.get("bandwidth_min_hz") is not None:
-        panel.x.see([data["bandwidth_min_hz"]])
-        panel.rule_x(data["bandwidth_min_hz"], **required)
-    if data.get("phase_margin_min_deg") is not None:
-        panel.y.see([data["phase_margin_min_deg"]])
-        panel.rule_y(data["phase_margin_min_deg"], **required)
-    if data.get("chosen"):
-        at = data["chosen"]
+    band, margin, at = data.get("bandwidth_min_hz"), data.get("phase_margin_min_deg"), data.get("chosen")
+    if band is not None:
+        panel.x.see([band])
+        panel.rule_x(band, **required)
+    if margin is not None:
+        panel.y.see([margin])
+        panel.rule_y(margin, **required)
+    if at is not None:
         look: dict[str, Any] = {"marker": "D", "size": 9.0, "colour": style.ORANGE}
         panel.points([at["bandwidth_hz"]], [at["phase_margin_deg"]], "tuned", **look)
     panel.x.label = "bandwidth of the position loop, Hz"

@@ -1,18 +1,38 @@
-"""A simulated motion: position, speed, current and voltage, limits drawn and shaded where active.
-
-Data: ``time_s``; ``panels``, each with ``label``, ``series`` of ``label``, ``values``; ``limit`` (or null),
-``limit_label``; ``active`` [[from_s, to_s], ...] where the limiter acts.
-"""
+"""A simulated motion: position, speed, current and voltage, limits drawn and shaded where active."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 from reports.figures import style
-from reports.figures.style import Chart, Panel
+from reports.figures.style import Chart, Panel, Values
 
 
-def draw(data: dict[str, Any]) -> Chart:
+class Signal(TypedDict):
+    """One signal."""
+
+    label: str
+    values: Values
+
+
+class Part(TypedDict):
+    """Signals on one axis; ``active``: from when to when the limiter acts, s."""
+
+    label: str
+    series: list[Signal]
+    limit: float | None
+    limit_label: str
+    active: list[list[float]]
+
+
+class Data(TypedDict):
+    """Panels on one time axis."""
+
+    time_s: list[float]
+    panels: list[Part]
+
+
+def draw(data: Data) -> Chart:
     """Draw the panels one below the other on one time axis."""
     scale, _ = style.time_unit(data["time_s"][-1])
     chart = Chart(width=style.WIDE, height=60.0 + 150.0 * len(data["panels"]), legend=True)
@@ -25,7 +45,7 @@ def draw(data: dict[str, Any]) -> Chart:
     return chart
 
 
-def _panel(panel: Panel, data: dict[str, Any], time: list[float], scale: float) -> None:
+def _panel(panel: Panel, data: Part, time: list[float], scale: float) -> None:
     """Draw the signals of one panel, its limit and the spans in which the limit acts."""
     for start, stop in data["active"]:
         words = f"{data['limit_label']} limit acts"
@@ -37,7 +57,7 @@ def _panel(panel: Panel, data: dict[str, Any], time: list[float], scale: float) 
     panel.y.label = data["label"]
 
 
-def _limit(panel: Panel, data: dict[str, Any]) -> None:
+def _limit(panel: Panel, data: Part) -> None:
     """Draw both signs of the limit where it lies within reach of the signals."""
     if data["limit"] is None:
         return

@@ -17,10 +17,11 @@ from nonlinear.export.page import changes_row, row_statements
 
 SLIDER_FACTOR = 5.0  # a slider goes from a fifth of the value to five times it
 UNUSED = "has no influence on the loops or the run that this page follows"
-WHOLE = "a whole number: change it in the design file"
 ZERO = "0 in this design: change it in the design file"
 UNFOLLOWED = "enters through a function that this page does not have: change it in the design file"
 LONGEST = 20.0  # control periods: the range of a time that is 0
+WIDEST = {"rad": 0.01, "m": 1e-4}  # the range of a play that is 0
+COUNTED = 10.0  # a whole number has at least this range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,11 +59,8 @@ def followed(design: Design) -> Followed:
 
 def _reason(design: Design, path: str) -> str:
     """Say why a key has no slider; empty where it has one."""
-    field, _ = located(design, path)
-    if field.kind == "integer":
-        return WHOLE
     value = parameter_value(design, path)
-    if value < 0.0 or (value == 0.0 and not _top(design, path)):
+    if value == 0.0 and not _top(design, path):
         return ZERO
     changes = changes_row(design, path)
     if changes is None:
@@ -71,9 +69,11 @@ def _reason(design: Design, path: str) -> str:
 
 
 def _top(design: Design, path: str) -> float:
-    """Give the upper end of the slider of a key that is 0: a share, or a time; 0 for anything else."""
+    """Give the upper end of the slider of a key that is 0: a share, a time, a play; 0 for anything else."""
     field, _ = located(design, path)
     unit = field.unit(Structure.of(design))
+    if path == "coupling.play":
+        return WIDEST[unit]
     if field.low < 0.0 or unit not in ("1", "s"):
         return 0.0
     return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
@@ -91,6 +91,7 @@ def _named(design: Design, path: str) -> dict[str, Any]:
         "value": value,
         "unit": "" if shown == "1" else shown,
         "factor": factor,
+        "whole": field.kind == "integer",
     }
 
 
@@ -119,9 +120,23 @@ def _slider(design: Design, path: str) -> dict[str, Any]:
     return {
         **made,
         "low": max(low, field.low),
-        "high": high,
+        "high": min(high, field.high),
         "band": None if known is None or known.tolerance is None else _band(value, known.tolerance),
     }
+
+
+def _range(design: Design, path: str, value: float) -> tuple[float, float]:
+    """Give the ends of a slider: both signs of a value below 0, whole numbers from 1."""
+    field, _ = located(design, path)
+    if field.kind == "integer":
+        return max(1.0, math.ceil(value / SLIDER_FACTOR)), max(COUNTED, value * SLIDER_FACTOR)
+    if value == 0.0:
+        return 0.0, _top(design, path)
+    return (
+        (value * SLIDER_FACTOR, -value * SLIDER_FACTOR)
+        if value < 0.0
+        else (value / SLIDER_FACTOR, value * SLIDER_FACTOR)
+    )
 
 
 def _band(value: float, tolerance: Tolerance) -> list[float] | None:

@@ -13,7 +13,8 @@ from nonlinear.export.c_files import exported
 from reports.live.keys import followed
 from reports.live.text import patches
 
-ELASTIC = "The drive train is elastic, or its friction is a map; the sliders follow rigid drives only."
+CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
+MAP = "The friction of the loops has the slope of the first piece of its map."
 OPEN = "The drive has no loop."
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
@@ -24,10 +25,8 @@ def live_model(design: Design) -> dict[str, Any]:
         return {"refused": OPEN}
     try:
         row = exported(design).row
-    except InputError:
-        return {"refused": ELASTIC}
-    if page.is_elastic(row):
-        return {"refused": ELASTIC}
+    except InputError as refused:
+        return {"refused": f"{refused}."}
     result = followed(design)
     text, places = patches(design, result.free)
     return {
@@ -44,6 +43,8 @@ def live_model(design: Design) -> dict[str, Any]:
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
+        "point": _point(design),
+        "multiples": [list(pair) for pair in _multiples(design)],
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "requirements": _requirements(design),
@@ -53,6 +54,20 @@ def live_model(design: Design) -> dict[str, Any]:
         "text": text,
         "patches": places,
     }
+
+
+def _point(design: Design) -> str:
+    """Say at which operating point the loops of the page are linear, where there is a choice."""
+    words = [CONTACT] if design.coupling is not None else []
+    return " ".join([*words, MAP] if design.friction.points else words)
+
+
+def _multiples(design: Design) -> list[tuple[str, str]]:
+    """Give the keys that must stay multiples of another."""
+    control = design.controller
+    if control.position is None or control.velocity is None:
+        return []
+    return [("control.position.every", "control.velocity.every")]
 
 
 def _requirements(design: Design) -> list[dict[str, Any]]:

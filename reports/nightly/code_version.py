@@ -15,7 +15,7 @@ from reports.nightly.job import canonical
 from reports.nightly.text import one_line, sha256
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
-LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "pint", "jinja2", "typst")
+LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2", "typst")
 _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 _GIT_TIME_LIMIT_S = 10.0
 # A work tree is data: nothing that its own configuration names is started.

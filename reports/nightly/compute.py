@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
+from reports.document_schema import Document, Section
 from reports.nightly.figures import digest
 
 if TYPE_CHECKING:
@@ -57,13 +58,13 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
     return meta, files
 
 
-def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
+def design_document(payload: Mapping[str, Any]) -> Document:
     """Compute the report of a design, with validation and Monte Carlo where the settings ask for them."""
     from reports.build import design_report, validation_sections
 
     design = _design(payload)
     settings: Mapping[str, Any] = payload.get("settings", {})
-    sections: list[dict[str, Any]] = []
+    sections: list[Section] = []
     if settings.get("validation"):
         sections += validation_sections(design)
     if settings.get("monte_carlo"):
@@ -71,7 +72,7 @@ def design_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     return design_report(design, validation=sections)
 
 
-def _tolerances(design: Design, plan: Mapping[str, int]) -> list[dict[str, Any]]:
+def _tolerances(design: Design, plan: Mapping[str, int]) -> list[Section]:
     """Sample the tolerances of a design; nothing where none of its values has one."""
     from analyses.engine import Engine
     from analyses.monte_carlo import MonteCarloSettings, monte_carlo
@@ -84,7 +85,7 @@ def _tolerances(design: Design, plan: Mapping[str, int]) -> list[dict[str, Any]]
         return [section(monte_carlo(design, Path(folder), settings, engine=Engine(threads=1)))]
 
 
-def comparison_document(payload: Mapping[str, Any]) -> dict[str, Any]:
+def comparison_document(payload: Mapping[str, Any]) -> Document:
     """Compare all designs of a study on one page."""
     from analyses.slugs import slug
     from analyses.study import Study, Variant

@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from reports.document_schema import Row
 from reports.html import asset, environment, security_policy
 from reports.nightly.course import Course, course_of
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
@@ -115,7 +116,7 @@ def _nights(
     outcomes = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
     gaps = {night.runs[i].id: count for i, count in night.missing}
     first = past[0].run if past else 0
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     for run in reversed(night.runs):
         if run.id < first or len(rows) >= MAX_NIGHTS:
             break

@@ -7,6 +7,7 @@ from typing import Any
 
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
+from reports.document_schema import Block, GlanceBlock, GlanceFigure, GlanceLoop, Section, Weakest
 from reports.findings import Finding, gathered, plain
 from reports.numbers import short
 from reports.sections import loop as loop_section
@@ -28,10 +29,10 @@ def section(
     figures: Mapping[str, LoopFigures],
     items: Sequence[Mapping[str, Any]],
     sections: Sequence[Mapping[str, Any]],
-) -> dict[str, Any]:
+) -> Section:
     """Make the first screen from the loops, the verdicts on the requirements and all other sections."""
     result = gathered(sections)
-    glance = {
+    glance: GlanceBlock = {
         "kind": "glance",
         "loops": [_loop(name, one, items) for name, one in figures.items()],
         "weakest": weakest(items),
@@ -44,24 +45,30 @@ def section(
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
 
 
-def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -> GlanceLoop:
     """Give the five figures of a loop, each with the requirement that is nearest to it."""
-    row = {**margin_row(figures), **response_row(figures)}
-    cells = []
+    margins = margin_row(figures)
+    row: dict[str, Any] = {**margins, **response_row(figures)}
+    cells: list[GlanceFigure] = []
     for key, quantity, label, unit, form in FIGURES:
         own = [item for item in items if item.get("quantity") == quantity and item.get("loop") == name]
         nearest = min(own, key=_nearness, default=None)
-        cells.append({"label": label, "value": row[key], "unit": unit, "format": form, **_limit(nearest)})
-    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": row["stable"], "figures": cells}
+        cells.append(
+            {
+                "label": label,
+                "value": row[key],
+                "unit": unit,
+                "format": form,
+                "limit": nearest["limit"] if nearest else None,
+                "comparison": nearest["comparison"] if nearest else "",
+                "distance": nearest["distance"] if nearest else None,
+                "passed": nearest["passed"] if nearest else None,
+            }
+        )
+    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": margins["stable"], "figures": cells}
 
 
-def _limit(item: Mapping[str, Any] | None) -> dict[str, Any]:
-    if item is None:
-        return {"limit": None, "comparison": "", "distance": None, "passed": None}
-    return {key: item[key] for key in ("limit", "comparison", "distance", "passed")}
-
-
-def weakest(items: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+def weakest(items: Sequence[Mapping[str, Any]]) -> Weakest | None:
     """Give the requirement that is nearest to its limit, or furthest beyond it, as part of the limit."""
     ranked = [item for item in items if item.get("distance") is not None and item.get("limit")]
     item = min(ranked, key=_nearness, default=None)
@@ -82,7 +89,7 @@ def _nearness(item: Mapping[str, Any]) -> float:
     return float(item["distance"]) / abs(float(item["limit"]))
 
 
-def _pictures(figures: Mapping[str, LoopFigures]) -> list[dict[str, Any]]:
+def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
     """Make one Bode and one step figure, of the outermost loop."""
     from analyses.responses import frequency_grid
 
@@ -91,7 +98,8 @@ def _pictures(figures: Mapping[str, LoopFigures]) -> list[dict[str, Any]]:
     if result.step is not None:
         blocks.append(loop_section.step(LOOPS[name], result, None, name=name))
     for block in blocks:
-        block["data"]["small"] = True
+        if block["kind"] == "figure":
+            block["data"]["small"] = True
     return blocks
 
 

@@ -8,7 +8,16 @@ from typing import Any
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import BreakPoint
 from reports import document as doc
-from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, finite, margin_row, times, worst_status
+from reports.document_schema import Row, Section
+from reports.sections.margins import (
+    MARGIN_COLUMNS,
+    cells,
+    evidence_notes,
+    finite,
+    margin_row,
+    times,
+    worst_status,
+)
 from reports.sections.names import POINTS
 
 COLUMNS = [
@@ -24,9 +33,9 @@ EXACT_COLUMNS = [
 ]
 
 
-def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures]) -> dict[str, Any]:
+def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures]) -> Section:
     """Make the section; ``stages`` are the loops with the outer ones open."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     reasons: list[str] = []
     for name, point in points.items():
         own = [result for result in stages.values() if result.loop.break_point == name]
@@ -73,13 +82,13 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _row(name: str, others: str, figures: LoopFigures | None) -> dict[str, Any]:
+def _row(name: str, others: str, figures: LoopFigures | None) -> Row:
     if figures is None:
         return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
-    return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
+    return {"point": POINTS.get(name, name), "others": others, **cells(margin_row(figures))}
 
 
-def _exact_row(name: str, point: BreakPoint) -> dict[str, Any]:
+def _exact_row(name: str, point: BreakPoint) -> Row:
     exact = point.exact
     assert exact is not None
     return {

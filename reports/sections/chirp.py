@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Section
 from reports.sections.correlation import signal_figure
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from analyses.correlation.voltage_motor import VoltageMotor
 
 
-def section(motor: VoltageMotor, chirp_prediction: ChirpPrediction, record: str) -> dict[str, Any]:
+def section(motor: VoltageMotor, chirp_prediction: ChirpPrediction, record: str) -> Section:
     """Make the section of one prediction."""
     speeds = ", ".join(f"{speed / (2.0 * pi):.3f} turns/s" for speed in motor.steady_speeds_rad_s)
     intro = (

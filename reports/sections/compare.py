@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import significant
 from reports.sections import compare_best, compare_figures, compare_ledger
 from reports.sections.compare_best import limit_words, number
@@ -24,7 +25,7 @@ _MOST_MOVERS = 3
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
-def sections(comparison: Comparison) -> list[dict[str, Any]]:
+def sections(comparison: Comparison) -> list[Section]:
     """Make all sections of a comparison."""
     made = [
         compare_best.section(comparison),
@@ -37,10 +38,10 @@ def sections(comparison: Comparison) -> list[dict[str, Any]]:
     return made
 
 
-def verdicts(comparison: Comparison) -> dict[str, Any]:
+def verdicts(comparison: Comparison) -> Section:
     """Verdicts of every design: a row a requirement, a column a design."""
     wanted = comparison.base.verdicts
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     if wanted:
         note = "In brackets the difference from the base, in the unit of the requirement."
         for k, designs in enumerate(batches(comparison)):
@@ -62,7 +63,7 @@ def verdicts(comparison: Comparison) -> dict[str, Any]:
     failed = sum(v.passed is False for one in comparison.all for v in one.verdicts)
     count = sum(len(one.verdicts) for one in comparison.all)
     result = f"{failed} of {count} verdicts fail." if failed else f"All {count} verdicts pass."
-    status = "fail" if failed or comparison.refused else "pass"
+    status: Status = "fail" if failed or comparison.refused else "pass"
     return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
 
 
@@ -73,12 +74,12 @@ def batches(comparison: Comparison, designs: Sequence[Compared] | None = None) -
     return [[comparison.base, *stretch] for stretch in stretches]
 
 
-def design_columns(designs: Sequence[Compared]) -> list[dict[str, Any]]:
+def design_columns(designs: Sequence[Compared]) -> list[Column]:
     """Make a column a design."""
     return [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(designs)]
 
 
-def overview(comparison: Comparison) -> dict[str, Any]:
+def overview(comparison: Comparison) -> Block:
     """One line a design: how many requirements it meets, and which it misses."""
     columns = [doc.column("design", "Design"), doc.column("met", "Met"), doc.column("missed", "Missed")]
     rows = []
@@ -92,17 +93,17 @@ def overview(comparison: Comparison) -> dict[str, Any]:
     return doc.table("Requirements", columns, rows)
 
 
-def _named(one: Compared, verdict: RequirementVerdict) -> dict[str, Any]:
+def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:
     made = item(verdict)
     return {**made, "id": f"{one.variant.slug}/{made['id']}"}
 
 
-def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> dict[str, Any]:
-    row: dict[str, Any] = {"what": label(wanted), "limit": limit_words(wanted)}
+def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> Row:
+    row: Row = {"what": label(wanted), "limit": limit_words(wanted)}
     for k, one in enumerate(designs):
         verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
         if verdict is None or verdict.value is None:
-            status = "fail" if verdict and verdict.passed is False else "info"
+            status: Status = "fail" if verdict and verdict.passed is False else "info"
             row[f"d{k}"] = {"text": "none", "status": status}
             continue
         words = number(verdict.value) or ""
@@ -113,7 +114,7 @@ def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> dic
     return row
 
 
-def figures(comparison: Comparison) -> dict[str, Any]:
+def figures(comparison: Comparison) -> Section:
     """Every figure of every design, a table a group; best and worst marked."""
     blocks = []
     for group, title in GROUPS.items():
@@ -129,12 +130,12 @@ def figures(comparison: Comparison) -> dict[str, Any]:
 
 def _group_table(
     title: str, names: Sequence[FigureName], comparison: Comparison, designs: Sequence[Compared]
-) -> dict[str, Any]:
+) -> Block:
     columns = [doc.column("figure", "Figure"), doc.column("unit", "Unit"), *design_columns(designs)]
     rows = []
     for name in names:
         unit = "ms" if name.unit == "s" else name.unit.replace("^2", "²")
-        row: dict[str, Any] = {"figure": _title(name.label), "unit": unit}
+        row: Row = {"figure": _title(name.label), "unit": unit}
         rows.append(row | {f"d{k}": _cell(one, name, comparison) for k, one in enumerate(designs)})
     return doc.table(title, columns, rows)
 
@@ -157,9 +158,9 @@ def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None
     return words
 
 
-def differences(comparison: Comparison) -> dict[str, Any]:
+def differences(comparison: Comparison) -> Section:
     """What changed in each variant, and which key moved which figure."""
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     for one in comparison.variants:
         if not one.changed and not one.differences:
             blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
@@ -176,7 +177,7 @@ def differences(comparison: Comparison) -> dict[str, Any]:
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
-def _moved_table(one: Compared, comparison: Comparison) -> dict[str, Any]:
+def _moved_table(one: Compared, comparison: Comparison) -> Block:
     columns = [
         doc.column("figure", "Figure"),
         doc.column("unit", "Unit"),

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Block, Section
 from reports.numbers import significant
 from reports.sections.requirements import label
 
@@ -19,7 +20,7 @@ _MOST = 3
 Changes = list[tuple[str, float]]
 
 
-def section(comparison: Comparison) -> dict[str, Any]:
+def section(comparison: Comparison) -> Section:
     """Make the section: the best design of each requirement, and each variant's gains and losses."""
     wanted = comparison.base.verdicts
     if not wanted:
@@ -68,7 +69,7 @@ def _weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
     return min(known, key=lambda pair: pair[0], default=(math.inf, None))
 
 
-def _designs(comparison: Comparison) -> dict[str, Any]:
+def _designs(comparison: Comparison) -> Block:
     """One row a design: what it meets, its weakest point, what it gains and gives up against the base."""
     columns = [
         doc.column("design", "Design"),
@@ -120,7 +121,7 @@ def _percent(part: float, *, signed: bool = False) -> str:
     return f"{sign}{significant(100.0 * part, 2)} %"
 
 
-def _best(comparison: Comparison) -> dict[str, Any]:
+def _best(comparison: Comparison) -> Block:
     """One row a requirement: the design with the most room, beside the base."""
     columns = [
         doc.column("what", "Requirement"),

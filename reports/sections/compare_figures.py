@@ -8,31 +8,34 @@ import numpy as np
 
 from actuator_lti.quantities import ANALYSIS_QUANTITIES, drive_cases
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Section
 from reports.sections.names import LOOPS
 
 if TYPE_CHECKING:
     from analyses.sensitivity import Sensitivity
     from analyses.variants import Compared, Comparison
+    from reports.figures import overlay as overlay_figure
+    from reports.figures import tornado as tornado_figure
 
 MOST_CURVES = 7
 MOST_BARS = 10
 MOST_CHARTS = 8
 
 
-def sections(comparison: Comparison) -> list[dict[str, Any]]:
+def sections(comparison: Comparison) -> list[Section]:
     """Make the sections with overlaid responses and tornado charts."""
     return [overlays(comparison), tornadoes(comparison)]
 
 
-def overlays(comparison: Comparison) -> dict[str, Any]:
+def overlays(comparison: Comparison) -> Section:
     """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
     drawn = comparison.all[:MOST_CURVES]
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     for name, title in LOOPS.items():
         if name not in comparison.base.loops:
             continue
-        blocks += [_bode(name, title, drawn, closed) for closed in (False, True)]
+        blocks += _bode(name, title, drawn, closed=False) + _bode(name, title, drawn, closed=True)
         blocks += _step(name, title, drawn)
     left_out = len(comparison.all) - len(drawn)
     intro = f"{left_out} more designs are in the tables only." if left_out else ""
@@ -42,10 +45,10 @@ def overlays(comparison: Comparison) -> dict[str, Any]:
     )
 
 
-def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> dict[str, Any]:
+def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
     from analyses.responses import curve, frequency_grid
 
-    series = []
+    series: list[overlay_figure.Bode] = []
     for one in drawn:
         result = one.loops.get(name)
         if result is None or (closed and not result.stable):
@@ -53,18 +56,19 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> d
         grid = frequency_grid(result, 140)
         made = curve(result.response if closed else result.loop.open_loop, grid)
         series.append({
-            "label": one.variant.name[:60], "frequency_hz": rounded(made.frequency_hz),
+            "label": one.variant.name[:60], "frequency_hz": abscissa(made.frequency_hz),
             "magnitude_db": rounded(made.magnitude_db - (_dc_db(result) if closed else 0.0)),
             "phase_deg": rounded(made.phase_deg),
         })  # fmt: skip
     if not series:
-        return {}
+        return []
     which = "closed loop" if closed else "open loop"
-    return doc.figure(
-        "overlay", {"kind": "bode", "series": series, "title": f"{title}, {which}"},
+    data: overlay_figure.BodeData = {"kind": "bode", "series": series, "title": f"{title}, {which}"}
+    return [doc.figure(
+        "overlay", data,
         caption=f"{title}, {which}: the base and its variants.",
         alt=f"Bode diagram of the {which} of the {name} loop of {len(series)} designs.",
-    )  # fmt: skip
+    )]  # fmt: skip
 
 
 def _dc_db(result: Any) -> float:
@@ -74,8 +78,8 @@ def _dc_db(result: Any) -> float:
     return float(20.0 * np.log10(abs(result.bandwidth.dc_gain)))
 
 
-def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[dict[str, Any]]:
-    series = []
+def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
+    series: list[overlay_figure.Step] = []
     for one in drawn:
         step = one.loops[name].step if name in one.loops else None
         if step is None:
@@ -83,22 +87,23 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[dict[str, 
         keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
         response = np.asarray(step.response)[keep] / step.final_value
         series.append({
-            "label": one.variant.name[:60], "time_s": rounded(np.asarray(step.time_s)[keep]),
+            "label": one.variant.name[:60], "time_s": abscissa(np.asarray(step.time_s)[keep]),
             "response": rounded(response),
         })  # fmt: skip
     if not series:
         return []
+    data: overlay_figure.StepData = {"kind": "step", "series": series, "title": f"{title}, step"}
     return [doc.figure(
-        "overlay", {"kind": "step", "series": series, "title": f"{title}, step"},
+        "overlay", data,
         caption=f"{title}, unit step: the base and its variants.",
         alt=f"Step responses of the {name} loop of {len(series)} designs.",
     )]  # fmt: skip
 
 
-def tornadoes(comparison: Comparison) -> dict[str, Any]:
+def tornadoes(comparison: Comparison) -> Section:
     """Tornado charts of the figures that the requirements look at, then every slope in a table."""
     wanted = _wanted(comparison)
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     for key, limit in wanted.items():
         bars = comparison.sensitivities.tornado(key)
         if bars:
@@ -144,9 +149,7 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
     return {key: result[key] for key in order}
 
 
-def _tornado(
-    comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], limit: float | None
-) -> dict[str, Any]:
+def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], limit: float | None) -> Block:
     name = next((n for n in comparison.names if n.key == key), None)
     words = f"{LOOPS.get(key.partition('.')[0], 'Drive')}: {name.label if name else key}"
     base = comparison.sensitivities.base[key]
@@ -154,7 +157,7 @@ def _tornado(
     near = limit is not None and min(ends) - 3 * abs(base - min(ends)) <= limit <= max(ends) + 3 * abs(
         max(ends) - base
     )
-    data = {
+    data: tornado_figure.Data = {
         "label": words, "unit": name.unit if name else "", "base": base, "limit": limit if near else None,
         "low_label": "parameter low", "high_label": "parameter high",
         "bars": [{"label": _bar_label(bar), "low": bar.low, "high": bar.high} for bar in bars],
@@ -171,7 +174,7 @@ def _bar_label(bar: Sensitivity) -> str:
     return f"{bar.path} ±{width:.3g} %"
 
 
-def _slopes(comparison: Comparison) -> dict[str, Any]:
+def _slopes(comparison: Comparison) -> Block:
     """Slopes of the strongest figures, one row a parameter and figure."""
     columns = [
         doc.column("figure", "Figure"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import significant
 from reports.sections.names import LOOPS, QUANTITIES
 
@@ -17,14 +18,14 @@ Key = tuple[str, str, str]
 COLUMNS = 5  # designs in one table: what reads on one screen
 
 
-def sections(comparison: Comparison) -> list[dict[str, Any]]:
+def sections(comparison: Comparison) -> list[Section]:
     """Make the section; nothing where no design was validated."""
     tested = [one for one in comparison.all if one.ledger or one.untested]
     if not tested:
         return []
     keys = dict.fromkeys(_key(entry) for one in tested for entry in one.ledger)
     conditions = dict.fromkeys((loop, condition) for loop, _, condition in keys)
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     for loop, condition in conditions:
         wanted = [key for key in keys if key[0] == loop and key[2] == condition]
         batches = (tested[k : k + COLUMNS] for k in range(0, len(tested), COLUMNS))
@@ -38,7 +39,7 @@ def sections(comparison: Comparison) -> list[dict[str, Any]]:
         "tolerance, "
         "outside, or not judged because the prediction need not hold there."
     )
-    status = "fail" if failed else "pass"
+    status: Status = "fail" if failed else "pass"
     return [
         doc.section("ledger", "Predictions and simulation", blocks, result=result, intro=intro, status=status)
     ]
@@ -48,7 +49,7 @@ def _key(entry: Entry) -> Key:
     return (entry.loop, entry.quantity, entry.condition)
 
 
-def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -> dict[str, Any]:
+def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -> Block:
     units = {_key(entry): entry.unit for one in tested for entry in one.ledger}
     columns = [doc.column("what", "Prediction"), doc.column("unit", "Unit")]
     columns += [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(tested)]
@@ -56,7 +57,7 @@ def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -
     rows = []
     for key in keys:
         unit = units.get(key, "")
-        row: dict[str, Any] = {
+        row: Row = {
             "what": _title(QUANTITIES.get(key[1], key[1])),
             "unit": "" if unit == "1" else unit,
         }

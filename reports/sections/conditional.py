@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from analyses.validation.conditional import Conditional, Prediction
 from reports import document as doc
+from reports.document_schema import Block, Section, Status
 from reports.findings import Finding
 from reports.sections.names import POINTS
 
 
-def section(conditional: Conditional, axis: str = "rotary") -> dict[str, Any]:
+def section(conditional: Conditional, axis: str = "rotary") -> Section:
     """Make the section: what the describing functions say, and what steps of growing size do."""
     scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
     result, *more = _words(conditional, scale, unit)
@@ -23,7 +23,7 @@ def section(conditional: Conditional, axis: str = "rotary") -> dict[str, Any]:
         "large "
         "commands, although every linear margin is sufficient."
     )
-    status = "fail" if conditional.diverges else "pass"
+    status: Status = "fail" if conditional.diverges else "pass"
     findings = [Finding(severity="fail", text=result, where="conditional")] if conditional.diverges else []
     return doc.section(
         "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
@@ -63,6 +63,7 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     return made
 
 
+<<<<<<< HEAD
 def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     """Say what the smallest step that does not settle ends in, and which limit acts."""
     swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
@@ -78,6 +79,9 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
 
 
 def _facts(conditional: Conditional, scale: float, unit: str) -> dict[str, Any]:
+=======
+def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
+>>>>>>> main
     threshold = conditional.threshold_rad
     items = [
         doc.fact("Largest step that settles", (threshold or conditional.full_deflection_rad) * scale, unit),
@@ -90,7 +94,7 @@ def _facts(conditional: Conditional, scale: float, unit: str) -> dict[str, Any]:
     return doc.facts(items)
 
 
-def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> dict[str, Any]:
+def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> Block:
     columns = [
         doc.column("limiter", "Limit"),
         doc.column("point", "In front of it"),

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from analyses.validation.confirm import Confirmation
 from analyses.validation.release import AmplitudeMargin
 from analyses.validation.result import Validation
 from analyses.validation.tolerance import allowed
 from reports import document as doc
+from reports.document_schema import Block, Row, Section, Status
 from reports.findings import Finding
 from reports.numbers import significant
+
+if TYPE_CHECKING:
+    from reports.figures import confirmation as confirmation_figure
 
 SHORT = {
     "gain up": "gain up",
@@ -22,7 +26,7 @@ SHORT = {
 }
 
 
-def sections(validation: Validation) -> list[dict[str, Any]]:
+def sections(validation: Validation) -> list[Section]:
     """Make the section, if anything was confirmed."""
     items = [item for loop in validation.loops.values() for item in loop.confirmed]
     items += [item for point in validation.points.values() for item in point.confirmed]
@@ -46,7 +50,7 @@ def sections(validation: Validation) -> list[dict[str, Any]]:
         f"{significant(100.0 * worst, 2)} % "
         "of the linear ones."
     )
-    status = "pass" if good == len(items) else "fail"
+    status: Status = "pass" if good == len(items) else "fail"
     outcome = [
         Finding(severity="warn", text=words, where="confirmation")
         for words in _remarks(validation.amplitude_margins)
@@ -59,8 +63,8 @@ def sections(validation: Validation) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) -> dict[str, Any]:
-    data = {
+def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) -> Block:
+    data: confirmation_figure.Data = {
         "margins": [
             {"label": f"{item.loop}: {SHORT[item.kind]}", "difference": abs(item.difference)}
             for item in items
@@ -113,23 +117,26 @@ def _remark(item: AmplitudeMargin) -> str:
     )
 
 
-def _series(released: Sequence[AmplitudeMargin]) -> list[dict[str, Any]]:
+def _series(released: Sequence[AmplitudeMargin]) -> list[confirmation_figure.Released]:
     """Borders over linear borders, by loop and kind."""
-    result: dict[str, dict[str, Any]] = {}
+    result: dict[str, tuple[list[str], list[float | None], list[float | None]]] = {}
     for item in released:
         label = f"{item.loop}: {SHORT[item.kind]}"
-        one = result.setdefault(label, {"label": label, "sizes": [], "with_friction": [], "without": []})
-        if item.size not in one["sizes"]:
-            one["sizes"].append(item.size)
-            one["with_friction"].append(None)
-            one["without"].append(None)
-        k = one["sizes"].index(item.size)
-        key = "with_friction" if item.friction_on else "without"
-        one[key][k] = None if item.border.value is None else item.border.value / item.linear
-    return list(result.values())
+        sizes, with_friction, without = result.setdefault(label, ([], [], []))
+        if item.size not in sizes:
+            sizes.append(item.size)
+            with_friction.append(None)
+            without.append(None)
+        values = with_friction if item.friction_on else without
+        value = item.border.value
+        values[sizes.index(item.size)] = None if value is None else value / item.linear
+    return [
+        {"label": label, "sizes": sizes, "with_friction": with_friction, "without": without}
+        for label, (sizes, with_friction, without) in result.items()
+    ]
 
 
-def _table(items: Sequence[Confirmation]) -> dict[str, Any]:
+def _table(items: Sequence[Confirmation]) -> Block:
     columns = [
         doc.column("where", "Loop or break point"),
         doc.column("kind", "Varied"),
@@ -152,7 +159,7 @@ def _table(items: Sequence[Confirmation]) -> dict[str, Any]:
     )
 
 
-def _row(item: Confirmation) -> dict[str, Any]:
+def _row(item: Confirmation) -> Row:
     delay = "delay" in item.kind
     values = [item.predicted, item.border.value]
     if delay:
@@ -173,7 +180,7 @@ def _row(item: Confirmation) -> dict[str, Any]:
     }
 
 
-def _released(items: Sequence[AmplitudeMargin]) -> dict[str, Any]:
+def _released(items: Sequence[AmplitudeMargin]) -> Block:
     columns = [
         doc.column("loop", "Loop"),
         doc.column("kind", "Varied"),
@@ -191,7 +198,7 @@ def _released(items: Sequence[AmplitudeMargin]) -> dict[str, Any]:
     )
 
 
-def _released_row(item: AmplitudeMargin) -> dict[str, Any]:
+def _released_row(item: AmplitudeMargin) -> Row:
     value, delay = item.border.value, item.kind == "delay"
     remark = ""
     if value is None:

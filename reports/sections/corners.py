@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from reports import document as doc
+from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.names import LOOPS
 
@@ -14,14 +15,14 @@ if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
 
 
-def of_design(design: Design) -> dict[str, Any]:
+def of_design(design: Design) -> Section:
     """Make the section of a report."""
     from analyses.corners import corners
 
     return section(corners(design))
 
 
-def section(result: Corners) -> dict[str, Any]:
+def section(result: Corners) -> Section:
     """Make the section from `analyses.corners.corners`."""
     intro = (
         "Each corner is a design of its own, put through the same sampled loops and the same requirements. "
@@ -66,7 +67,7 @@ def least(corner: Corner, attribute: str) -> tuple[float, str] | None:
     return min(result, default=None)
 
 
-def _summary_table(result: Corners) -> dict[str, Any]:
+def _summary_table(result: Corners) -> Block:
     columns = [
         doc.column("corner", "Corner"),
         doc.column("gain", "Least gain margin", "dB", format="fix:1"),
@@ -93,7 +94,7 @@ def _summary_table(result: Corners) -> dict[str, Any]:
     return doc.table("Corners", columns, rows, note)
 
 
-def _loop_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _loop_table(rows: list[Row]) -> Block:
     columns = [
         doc.column("corner", "Corner"),
         doc.column("loop", "Loop"),
@@ -105,7 +106,7 @@ def _loop_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return doc.table("Loops at the corners", columns, rows)
 
 
-def _row(corner: Corner, name: str, one: LoopFigures) -> dict[str, Any]:
+def _row(corner: Corner, name: str, one: LoopFigures) -> Row:
     return {
         "corner": corner.name,
         "loop": LOOPS[name],

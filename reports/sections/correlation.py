@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from analyses.correlation.summary import summarise, worst_of
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import finding_table, result_input_table
 from reports.sections.thinning import kept_rows
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
     from analyses.correlation.compare import SignalComparison
     from analyses.correlation.summary import SignalSummary
+    from reports.figures import correlation_signal as correlation_signal_figure
 
 NAMES = {
     "angle": "Motor angle",
@@ -29,9 +31,7 @@ NAMES = {
 }
 
 
-def section(
-    result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
-) -> dict[str, Any]:
+def section(result: CorrelationResult, number: int = 1, *, error_limit: float | None = None) -> Section:
     """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
     figures = [signal_figure(signal) for signal in result.signals]
     active = {name: share for name, share in result.limits.items() if share > 0.0}
@@ -89,9 +89,7 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     return " ".join(parts)
 
 
-def summary_section(
-    results: Sequence[CorrelationResult], *, error_limit: float | None = None
-) -> dict[str, Any]:
+def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> Section:
     """Make the section of all records together: a table with a row for all, and the worst one's figure."""
     columns = [
         doc.column("name", "Signal"),
@@ -109,19 +107,18 @@ def summary_section(
             rows += [_summary_row(label, result.record, s) for s in result.signals if s.name == one.name]
         rows.append(_summary_row(label, f"all {one.records}; worst: {one.worst}", one) | {"_status": "info"})
     result, signal = worst_of(results)
-    figure = signal_figure(signal)
-    figure["caption"] = f"The worst record, {result.record}. {figure['caption']}"
+    figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
     table = doc.table("All records", columns, rows)
     judged = verdict(results, error_limit)
-    status = "info" if judged is None else "pass" if judged else "fail"
+    status: Status = "info" if judged is None else "pass" if judged else "fail"
     return doc.section(
         "correlation", "All records", [table, figure],
         result=words(results, error_limit), intro=intro, status=status,
     )  # fmt: skip
 
 
-def _summary_row(label: str, record: str, signal: SignalComparison | SignalSummary) -> dict[str, Any]:
+def _summary_row(label: str, record: str, signal: SignalComparison | SignalSummary) -> Row:
     return {
         "name": label,
         "record": record,
@@ -133,7 +130,7 @@ def _summary_row(label: str, record: str, signal: SignalComparison | SignalSumma
     }
 
 
-def comparison_table(result: CorrelationResult) -> dict[str, Any]:
+def comparison_table(result: CorrelationResult) -> Block:
     """One row a signal."""
     columns = [
         doc.column("name", "Signal"),
@@ -167,19 +164,19 @@ def comparison_table(result: CorrelationResult) -> dict[str, Any]:
     return doc.table(f"{result.design} against {result.record}", columns, rows, note)
 
 
-def signal_figure(signal: SignalComparison) -> dict[str, Any]:
+def signal_figure(signal: SignalComparison, first: str = "") -> Block:
     """Both signals and their difference."""
     difference = signal.modelled - signal.measured
     rows = kept_rows([signal.measured, signal.modelled, difference])
     name = NAMES.get(signal.name, signal.name)
-    data = {
-        "time_s": rounded(signal.time_s[rows], 6),
+    data: correlation_signal_figure.Data = {
+        "time_s": abscissa(signal.time_s[rows], 6),
         "measured": rounded(signal.measured[rows]),
         "modelled": rounded(signal.modelled[rows]),
         "difference": rounded(difference[rows], 4),
         "label": f"{name.lower()}, {signal.unit}",
         "difference_label": f"difference, {signal.unit}",
     }
-    caption = f"{name}: measured and model, relative error {100.0 * signal.relative_error:.3g} %"
+    caption = f"{first}{name}: measured and model, relative error {100.0 * signal.relative_error:.3g} %"
     alt = f"{name} over time, measured and from the model, and the difference of the two"
     return doc.figure("correlation_signal", data, caption=caption, alt=alt)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
+from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
@@ -19,14 +20,14 @@ CAUSES = {
 }
 
 
-def of_design(design: Design) -> dict[str, Any]:
+def of_design(design: Design) -> Section:
     """Make the section of a report."""
     from analyses.limit_cycles import limit_cycles
 
     return section(limit_cycles(design))
 
 
-def section(result: LimitCycles) -> dict[str, Any]:
+def section(result: LimitCycles) -> Section:
     """Make the section from `analyses.limit_cycles.limit_cycles`."""
     scale, unit = output_unit(result.design)
     fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
@@ -36,7 +37,7 @@ def section(result: LimitCycles) -> dict[str, Any]:
         "size, then the simulator is started in its shape at many sizes. Cycles of dry friction alone stand "
         "under Dry friction at small signals."
     )
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Block] = []
     if result.confirmations:
         blocks.append(_foreseen(result, fine, small))
     else:
@@ -68,7 +69,7 @@ def summary(result: LimitCycles) -> str:
     return f"The drive as it is does not come to rest: {size} under {at}{tail}."
 
 
-def _foreseen(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
+def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
     columns = [
         doc.column("cause", "Cause"),
         doc.column("friction", "Dry friction"),
@@ -87,7 +88,7 @@ def _foreseen(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
     return doc.table("Foreseen limit cycles, at the output", columns, rows, note)
 
 
-def _row(one: Confirmation, fine: float) -> dict[str, Any]:
+def _row(one: Confirmation, fine: float) -> Row:
     cycle = one.cycle
     return {
         "cause": CAUSES[cycle.cause],
@@ -101,7 +102,7 @@ def _row(one: Confirmation, fine: float) -> dict[str, Any]:
     }
 
 
-def _rests(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
+def _rests(result: LimitCycles, fine: float, small: str) -> Block:
     columns = [
         doc.column("load", "Load", load_unit(result.design), format="short:4"),
         doc.column("step", "Step", small, format="sig:3"),
@@ -114,9 +115,15 @@ def _rests(result: LimitCycles, fine: float, small: str) -> dict[str, Any]:
     return doc.table("What steps end in", columns, rows, note)
 
 
-def _rest_row(rest: Rest, fine: float) -> dict[str, Any]:
+def _rest_row(rest: Rest, fine: float) -> Row:
     one = rest.settling
     swing = None if one.hunting_rad is None else fine * one.hunting_rad
     end = "at rest" if not one.hunting else "in a cycle of its limits" if one.limited else "in a cycle"
-    row = {"load": rest.load_Nm, "step": fine * one.amplitude_rad, "end": end, "size": swing}
-    return {**row, "hz": one.hunting_hz, "_status": "warn" if one.hunting else None}
+    return {
+        "load": rest.load_Nm,
+        "step": fine * one.amplitude_rad,
+        "end": end,
+        "size": swing,
+        "hz": one.hunting_hz,
+        "_status": "warn" if one.hunting else None,
+    }

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from actuator_lti.delay_budget import DelayBudget
 from reports import document as doc
+from reports.document_schema import Row, Section
 from reports.sections.names import LOOPS, hertz
+
+if TYPE_CHECKING:
+    from reports.figures import delay_budget as delay_budget_figure
 
 PARTS = {
     "controller": "controller",
@@ -19,7 +23,7 @@ PARTS = {
 }
 
 
-def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
+def section(budgets: Mapping[str, DelayBudget]) -> Section:
     """Make the section from the budget of each loop."""
     parts = _parts(budgets)
     columns = [
@@ -30,14 +34,14 @@ def section(budgets: Mapping[str, DelayBudget]) -> dict[str, Any]:
         doc.column("margin", "Left to −180°", "deg", format="fix:2"),
         doc.column("one_more", "One more sample", "deg", format="fix:2"),
     ]
-    nothing = dict.fromkeys(parts, 0.0)
+    nothing: Row = dict.fromkeys(parts, 0.0)
     rows = [nothing | _row(name, budget) for name, budget in budgets.items()]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
         "One more "
         "sample: cost of one more period of computing delay, not included in the total."
     )
-    bars = [
+    bars: list[delay_budget_figure.Bar] = [
         {
             "label": name,
             "parts": [
@@ -77,7 +81,7 @@ def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
     return parts | {name: name for name in filters} | after
 
 
-def _row(name: str, budget: DelayBudget) -> dict[str, Any]:
+def _row(name: str, budget: DelayBudget) -> Row:
     return {
         "loop": LOOPS[name],
         "crossover_hz": hertz(budget.frequency_rad_s),

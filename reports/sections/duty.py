@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.duty import Duty, Heating
+    from reports.figures import duty as duty_figure
 
 _SHOWN = 400
 
 
-def of_design(design: Design) -> dict[str, Any]:
+def of_design(design: Design) -> Section:
     """Make the section of a report."""
     from analyses.duty import duty
 
     return section(duty(design))
 
 
-def section(result: Duty) -> dict[str, Any]:
+def section(result: Duty) -> Section:
     """Make the section from `analyses.duty.duty`."""
     intro = (
         "The motion is simulated until it is steady, friction, play and limits at work, the overload "
@@ -80,10 +82,10 @@ def _note(result: Duty) -> str:
     return " ".join(words)
 
 
-def _rows(result: Duty) -> list[dict[str, Any]]:
+def _rows(result: Duty) -> list[Row]:
     over, heat = result.overload, result.heating
     peak = result.design.limits.peak_current_A
-    rows: list[dict[str, Any]] = [
+    rows: list[Row] = [
         _row("current, rms", result.rms_A, result.continuous_A, "A"),
         _row("current in motion, rms", result.moving_rms_A, math.inf, "A"),
     ]
@@ -99,15 +101,15 @@ def _rows(result: Duty) -> list[dict[str, Any]]:
 
 def _row(
     what: str, value: float, limit: float, unit: str, when: float | None = None, *, judged: bool = True
-) -> dict[str, Any]:
+) -> Row:
     status = "fail" if judged and value > limit else None
     return {"what": what, "value": value, "limit": limit, "unit": unit, "when": when, "_status": status}
 
 
-def _figure(result: Duty) -> dict[str, Any]:
+def _figure(result: Duty) -> Block:
     every = max(1, len(result.time_s) // _SHOWN)
-    data = {
-        "time_s": rounded(result.time_s[::every]),
+    data: duty_figure.Data = {
+        "time_s": abscissa(result.time_s[::every]),
         "current": rounded(result.current_A[::every]),
         "rms": result.rms_A,
         "continuous": result.continuous_A,
@@ -119,11 +121,11 @@ def _figure(result: Duty) -> dict[str, Any]:
     return doc.figure("duty", data, caption=caption, alt=caption)
 
 
-def _heating(heat: Heating | None) -> dict[str, Any] | None:
+def _heating(heat: Heating | None) -> duty_figure.Heating | None:
     if heat is None:
         return None
     return {
-        "time_s": rounded(heat.time_s),
+        "time_s": abscissa(heat.time_s),
         "temperature": rounded(heat.temperature_degC),
         "limit": heat.limit_degC,
     }

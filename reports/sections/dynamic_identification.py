@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
+from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import (
     finding_table,
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
     from analyses.identification.electrical import ElectricalFit
     from analyses.identification.joint_model import JointModel
+    from reports.figures import curves as curves_figure
 
 LABELS = {
     "inertia": ("Inertia, all at the motor", "kg m²", "Mass", "kg"),
@@ -36,7 +38,7 @@ LABELS = {
 }
 
 
-def section(result: BenchResult, axis: str) -> dict[str, Any]:
+def section(result: BenchResult, axis: str) -> Section:
     """Make the section of an identification."""
     blocks = [verdict_block(result.items), parameter_table(result, axis)]
     if result.refined is not None:
@@ -56,7 +58,7 @@ def section(result: BenchResult, axis: str) -> dict[str, Any]:
         ]
     blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
     blocks.append(_figure(result.model, axis))
-    status = "pass" if result.passed else "fail"
+    status: Status = "pass" if result.passed else "fail"
     return doc.section(
         "dynamic-identification", "Dynamic identification", blocks,
         result=_result(result, axis), intro=_intro(result), status=status,
@@ -104,7 +106,7 @@ def _label(name: str, axis: str) -> tuple[str, str]:
     return label, unit
 
 
-def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
+def parameter_table(result: BenchResult, axis: str) -> Block:
     """Values, their standard errors as published recipes give them, and as the record really tells."""
     model = result.model
     columns = [
@@ -114,7 +116,7 @@ def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
         doc.column("std", "Standard error", format="sig:3"),
         doc.column("unit", "Unit"),
     ]
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     for k, name in enumerate(model.names):
         label, unit = _label(name, axis)
         rows.append(
@@ -134,7 +136,7 @@ def parameter_table(result: BenchResult, axis: str) -> dict[str, Any]:
     return doc.table("Identified parameters", columns, rows, note)
 
 
-def refined_table(result: BenchResult) -> dict[str, Any]:
+def refined_table(result: BenchResult) -> Block:
     """The values refined by simulation, which are those of the design."""
     refined = result.refined
     assert refined is not None
@@ -155,7 +157,7 @@ def refined_table(result: BenchResult) -> dict[str, Any]:
     return doc.table("Refined by simulation", columns, rows, note)
 
 
-def electrical_table(fit: ElectricalFit) -> dict[str, Any]:
+def electrical_table(fit: ElectricalFit) -> Block:
     """R, kE and, where it is shown, L."""
     labels = {
         "resistance": ("Resistance R", "ohm"),
@@ -178,7 +180,7 @@ def electrical_table(fit: ElectricalFit) -> dict[str, Any]:
     return doc.table("Voltage equation", columns, rows, note)
 
 
-def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
+def law_table(result: BenchResult, axis: str) -> Block:
     """The friction laws that were tried, by the Bayesian criterion."""
     unit = "m/s" if axis == "linear" else "rad/s"
     columns = [
@@ -207,7 +209,7 @@ def law_table(result: BenchResult, axis: str) -> dict[str, Any]:
     return doc.table("Friction laws", columns, rows, note)
 
 
-def fixed_blocks(model: JointModel, axis: str) -> list[dict[str, Any]]:
+def fixed_blocks(model: JointModel, axis: str) -> list[Block]:
     """What was not fitted, and why."""
     if not model.fixed:
         return []
@@ -224,7 +226,7 @@ def fixed_blocks(model: JointModel, axis: str) -> list[dict[str, Any]]:
     return [doc.table("Fixed parameters", columns, rows)]
 
 
-def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
+def scatter_table(model: JointModel, axis: str) -> Block:
     """Each record alone, and the scatter between them."""
     columns = [doc.column("name", "Parameter")]
     count = max((len(values) for values in model.singles.values()), default=0)
@@ -245,13 +247,20 @@ def scatter_table(model: JointModel, axis: str) -> dict[str, Any]:
     return doc.table("Fits of single records", columns, rows, note)
 
 
-def _figure(model: JointModel, axis: str) -> dict[str, Any]:
+def _figure(model: JointModel, axis: str) -> Block:
     unit = "N" if axis == "linear" else "N m"
     rows = np.arange(len(model.residual), dtype=float)
-    series = [{"label": "residual", "x": rounded(rows), "y": rounded(model.residual, 4)}]
+    series: list[curves_figure.Series] = [
+        {"label": "residual", "x": rounded(rows), "y": rounded(model.residual, 4)}
+    ]
+    data: curves_figure.Data = {
+        "series": series,
+        "x_label": "row after decimation",
+        "y_label": f"residual, {unit}",
+    }
     return doc.figure(
         "curves",
-        {"series": series, "x_label": "row after decimation", "y_label": f"residual, {unit}"},
+        data,
         caption="Residual of the inverse dynamic model",
         alt="Residual of the drive force over the record",
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.numbers import short
 from reports.sections.large_signal import load_unit, output_unit
@@ -15,6 +16,7 @@ from reports.sections.large_signal import load_unit, output_unit
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.failures import FailureCase, Failures
+    from reports.figures import failures as failures_figure
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -28,14 +30,14 @@ NAMES = {
 _SHOWN = 400
 
 
-def of_design(design: Design) -> dict[str, Any]:
+def of_design(design: Design) -> Section:
     """Make the section of a report."""
     from analyses.failures import failures
 
     return section(failures(design))
 
 
-def section(result: Failures) -> dict[str, Any]:
+def section(result: Failures) -> Section:
     """Make the section from `analyses.failures.failures`."""
     scale, unit = output_unit(result.design)
     load, asked = load_unit(result.design), result.asked
@@ -66,7 +68,7 @@ def summary(result: Failures) -> str:
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
 
 
-def _table(result: Failures, scale: float, unit: str, near: str) -> dict[str, Any]:
+def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
     columns = [
         doc.column("case", "Failure"),
         doc.column("near", f"To {near}", format="ms:3"),
@@ -82,7 +84,7 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> dict[str, An
     return doc.table("Failure cases", columns, rows, note)
 
 
-def _row(case: FailureCase, scale: float, has_current: bool) -> dict[str, Any]:
+def _row(case: FailureCase, scale: float, has_current: bool) -> Row:
     return {
         "case": NAMES[case.name],
         "words": case.words,
@@ -95,8 +97,9 @@ def _row(case: FailureCase, scale: float, has_current: bool) -> dict[str, Any]:
     }
 
 
-def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, Any]:
-    series, asked = [], result.asked
+def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
+    series: list[failures_figure.Series] = []
+    asked = result.asked
     stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
     last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
     for case in result.cases:
@@ -107,12 +110,12 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> dict[str, A
         series.append(
             {
                 "label": NAMES[case.name],
-                "time_s": rounded(case.time_s[keep]),
+                "time_s": abscissa(case.time_s[keep]),
                 "deflection": rounded(scale * case.deflection_rad[keep]),
                 "moment": rounded(case.moment_Nm[keep]),
             }
         )
-    data = {
+    data: failures_figure.Data = {
         "series": series,
         "unit": unit,
         "load": load,

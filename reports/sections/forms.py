@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analyses.loop_figures import LoopFigures
 from analyses.responses import curve, frequency_grid
 from reports import document as doc
+from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
 from reports.sections.loop import bode_data, nyquist_hz
-from reports.sections.margins import evidence_notes, margin_row, response_row
+from reports.sections.margins import cells, evidence_notes, margin_row, response_row
 from reports.sections.names import FORMS, LOOPS
+
+if TYPE_CHECKING:
+    from reports.figures import forms as forms_figure
 
 COLUMNS = [
     doc.column("loop", "Loop"),
@@ -27,7 +31,7 @@ COLUMNS = [
 ]
 
 
-def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> dict[str, Any]:
+def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> Section:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
         _row(name, form, result[name], forms["ideal"].get(name))
@@ -64,19 +68,19 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> dict[str, Any]:
+def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> Row:
     """Give one line, with the phase margin lost against the ideal form."""
     margins, response = margin_row(figures), response_row(figures)
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {**margins, **response, "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
+    row = {**cells(margins, response), "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({"_status": "fail"} if figures.margins.stable is False else {})
 
 
-def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> dict[str, Any]:
+def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
     """Make the overlaid open-loop Bode figures of all loops."""
-    panels = []
+    panels: list[forms_figure.Panel] = []
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
         series = [

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
 from reports.document import rounded
+from reports.document_schema import Block, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import (
     finding_table,
@@ -29,7 +30,7 @@ LABELS = {
 }
 
 
-def section(result: FrequencyResult) -> dict[str, Any]:
+def section(result: FrequencyResult) -> Section:
     """Make the section of a frequency response's identification."""
     blocks = [verdict_block(result.items), parameter_table(result), *response_figures(result)]
     blocks += [input_table(result.record, result.used)]
@@ -40,7 +41,7 @@ def section(result: FrequencyResult) -> dict[str, Any]:
         "two-mass drive by maximum likelihood with the noise of every line from the scatter between periods. "
         f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
     )
-    status = "pass" if result.passed else "fail"
+    status: Status = "pass" if result.passed else "fail"
     words = _result(result)
     return doc.section(
         "frequency-identification", "Two-mass drive", blocks, result=words, intro=intro, status=status
@@ -57,7 +58,7 @@ def _result(result: FrequencyResult) -> str:
     return verdict_words(result.items, f"{words}.")
 
 
-def parameter_table(result: FrequencyResult) -> dict[str, Any]:
+def parameter_table(result: FrequencyResult) -> Block:
     """Values with 95 % intervals; resonance, antiresonance and play among them."""
     columns = [
         doc.column("name", "Parameter"),
@@ -93,7 +94,7 @@ def values_of(result: FrequencyResult) -> list[tuple[str, str, float, float]]:
     return rows
 
 
-def response_figures(result: FrequencyResult) -> list[dict[str, Any]]:
+def response_figures(result: FrequencyResult) -> list[Block]:
     """Motor angle (and load angle) over motor torque: measured lines and the model."""
     from analyses.identification.frequency import response
     from analyses.identification.two_mass import NAMES, angle_responses

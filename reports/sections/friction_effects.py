@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa
+from reports.document_schema import Block, Row, Section, VerdictItem
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
@@ -13,9 +14,10 @@ if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
+    from reports.figures import hysteresis as hysteresis_figure
 
 
-def section(result: FrictionEffects) -> dict[str, Any]:
+def section(result: FrictionEffects) -> Section:
     """Make the section from `analyses.friction_effects.friction_effects`."""
     title = "Dry friction at small signals"
     if not result.points:
@@ -40,7 +42,7 @@ def section(result: FrictionEffects) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> dict[str, Any]:
+def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
     """Say whether friction keeps the drive hunting, and whether that was foreseen."""
     cycles, swing = point.cycles, point.cycles.hunting
     foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
@@ -93,7 +95,7 @@ def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
     return f"stick-slip analysis: ±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
 
 
-def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
+def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
     """List thresholds and lost motion by load."""
     columns = [
         doc.column("load", "Load", load, format="short:4"),
@@ -118,8 +120,8 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     return doc.table("Threshold of motion and lost motion", columns, rows, note)
 
 
-def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> dict[str, Any]:
-    row: dict[str, Any] = {"load": point.load_Nm, "dry": torque_scale * point.dry_torque_Nm}
+def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> Row:
+    row: Row = {"load": point.load_Nm, "dry": torque_scale * point.dry_torque_Nm}
     result, loop = point.threshold, point.hysteresis
     if result is not None:
         row["threshold"] = fine * result.static.forward_rad
@@ -134,7 +136,7 @@ def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> di
     return row
 
 
-def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any]:
+def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
     """List the steady-state error after steps."""
     columns = [
         doc.column("load", "Load", load, format="short:4"),
@@ -171,21 +173,22 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
     return doc.table("Steady-state error after a step", columns, rows, note)
 
 
-def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict[str, Any] | None:
+def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Block | None:
     """Make the loops and the waiting times."""
-    loops, waits = [], []
+    loops: list[hysteresis_figure.Loop] = []
+    waits: list[hysteresis_figure.Wait] = []
     for point in result.points:
         label, loop, threshold = f"load {point.load_Nm:g} {load}", point.hysteresis, point.threshold
         if loop is not None:
             error = fine * (loop.output_rad - loop.command_rad)
-            command = rounded(fine * loop.command_rad)
-            loops.append({"label": label, "command": command, "error": rounded(error)})
+            command = abscissa(fine * loop.command_rad)
+            loops.append({"label": label, "command": command, "error": abscissa(error)})
         if threshold is not None and threshold.waiting:
             waits.append(
                 {
                     "label": label,
-                    "amplitude": rounded([fine * w.amplitude_rad for w in threshold.waiting]),
-                    "predicted_ms": rounded([1e3 * w.predicted_s for w in threshold.waiting]),
+                    "amplitude": abscissa([fine * w.amplitude_rad for w in threshold.waiting]),
+                    "predicted_ms": abscissa([1e3 * w.predicted_s for w in threshold.waiting]),
                     "simulated_ms": [
                         None if w.simulated_s is None else 1e3 * w.simulated_s for w in threshold.waiting
                     ],
@@ -193,7 +196,13 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> dict
             )
     if not loops:
         return None
-    data = {"loops": loops, "waits": waits, "unit": small, "error_unit": small, "wait_unit": small}
+    data: hysteresis_figure.Data = {
+        "loops": loops,
+        "waits": waits,
+        "unit": small,
+        "error_unit": small,
+        "wait_unit": small,
+    }
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
+from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
 from reports.sections.identification_figures import (
     NAMES,
@@ -39,7 +40,7 @@ def section(
     *,
     load_Nm: float,
     speed_rad_s: float,
-) -> dict[str, Any]:
+) -> Section:
     """Make the section of a campaign's result."""
     fit = result.fit
     blocks = [
@@ -58,7 +59,7 @@ def section(
         blocks += suggestion_blocks(suggestion)
     blocks += [*account_blocks(result), campaign_table(result)]
     blocks.append(doc.details("Every run", [run_table(result)]))
-    status = "fail" if any(item.passed is False for item in items) else "info"
+    status: Status = "fail" if any(item.passed is False for item in items) else "info"
     words = verdict_words(items, _result(fit))
     return doc.section(
         "identification", "Identified friction", blocks, result=words, intro=_intro(result), status=status
@@ -87,7 +88,7 @@ def _intro(result: CampaignResult) -> str:
     )
 
 
-def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
+def coefficient_table(fit: SurfaceFit) -> Block:
     """Values, standard errors and 95 % intervals."""
     columns = [
         doc.column("name", "Coefficient"),
@@ -104,7 +105,7 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
     whole = np.diag(fit.covariance)
     random = np.diag(fit.random_covariance) / np.where(whole > 0.0, whole, 1.0)
     for k, (unit, scale) in enumerate(SHOWN):
-        row: dict[str, Any] = {
+        row: Row = {
             "name": f"{NAMES[k]}, {MEANING[k]}",
             "value": fit.values[k] * scale,
             "std": fit.standard_errors[k] * scale,
@@ -115,7 +116,7 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
         }
         if NAMES[k] in fit.held:
             row |= {"std": None, "low": None, "high": None, "scatter": None}
-            row["name"] += ", not fitted"
+            row["name"] = f"{row['name']}, not fitted"
         row |= {
             key: fit.correlation[k, j]
             for j, key in enumerate(("c0", "cv"))
@@ -130,7 +131,7 @@ def coefficient_table(fit: SurfaceFit) -> dict[str, Any]:
     return doc.table("Friction coefficients", columns, rows, note)
 
 
-def contribution_table(shares: Sequence[Contribution], load_Nm: float, speed_rad_s: float) -> dict[str, Any]:
+def contribution_table(shares: Sequence[Contribution], load_Nm: float, speed_rad_s: float) -> Block:
     """Table 1 of the paper."""
     columns = [
         doc.column("name", "Term"),
@@ -146,7 +147,7 @@ def contribution_table(shares: Sequence[Contribution], load_Nm: float, speed_rad
     return doc.table(f"Contributions at {load_Nm:g} N m and {speed_rad_s:g} rad/s", columns, rows)
 
 
-def shared_table(fit: SurfaceFit) -> dict[str, Any]:
+def shared_table(fit: SurfaceFit) -> Block:
     """What the bound of each shared error does to each coefficient."""
     columns = [doc.column("name", "Systematic error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
@@ -161,7 +162,7 @@ def shared_table(fit: SurfaceFit) -> dict[str, Any]:
     return doc.table("Systematic errors", columns, rows, note)
 
 
-def law_table(laws: RicherLaws) -> dict[str, Any]:
+def law_table(laws: RicherLaws) -> Block:
     """Richer laws by cross-validation."""
     columns = [
         doc.column("name", "Law"),
@@ -174,7 +175,7 @@ def law_table(laws: RicherLaws) -> dict[str, Any]:
     rows = []
     for score in laws.scores:
         verdict = "–" if score.name == "plain" else "yes" if score.warranted else score.reason or "no"
-        row: dict[str, Any] = {"name": score.name, "formula": score.formula, "verdict": verdict}
+        row: Row = {"name": score.name, "formula": score.formula, "verdict": verdict}
         if score.possible:
             row |= {
                 "error": 1e6 * score.error_Nm,
@@ -190,7 +191,7 @@ def law_table(laws: RicherLaws) -> dict[str, Any]:
     return doc.table("Is a richer law warranted?", columns, rows, note)
 
 
-def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
+def suggestion_blocks(suggestion: CampaignSuggestion) -> list[Block]:
     """What to measure next, and for which margins."""
     columns = [
         doc.column("order", "Run"),
@@ -225,9 +226,9 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
     ]
 
 
-def _grouped(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
+def _grouped(suggestion: CampaignSuggestion) -> list[Row]:
     """Suggested runs, the same point several times in one row."""
-    rows: list[dict[str, Any]] = []
+    rows: list[Row] = []
     for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
         same = list(runs)
         first, last = same[0].order, same[-1].order
@@ -238,7 +239,7 @@ def _grouped(suggestion: CampaignSuggestion) -> list[dict[str, Any]]:
     return rows
 
 
-def account_blocks(result: CampaignResult) -> list[dict[str, Any]]:
+def account_blocks(result: CampaignResult) -> list[Block]:
     """Outliers and runs set aside, by name."""
     blocks = []
     if result.fit.outliers:
@@ -269,7 +270,7 @@ def account_blocks(result: CampaignResult) -> list[dict[str, Any]]:
     return blocks
 
 
-def run_table(result: CampaignResult) -> dict[str, Any]:
+def run_table(result: CampaignResult) -> Block:
     """One row a run: means, window, rows, clock."""
     columns = [
         doc.column("run", "Run"),

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
     from analyses.identification.campaign import CampaignResult
     from analyses.identification.surface_fit import SurfaceFit
+    from reports.figures import identification_region as identification_region_figure
+    from reports.figures import identification_residuals as identification_residuals_figure
+    from reports.figures import identification_surface as identification_surface_figure
+    from reports.figures import identification_window as identification_window_figure
 
 NAMES = ("C0", "Cv", "CM")
 
 
-def surface_figure(fit: SurfaceFit) -> dict[str, Any]:
+def surface_figure(fit: SurfaceFit) -> Block:
     """Runs and fitted lines over speed."""
     loads = np.array([p.load_Nm for p in fit.points])
-    levels = []
+    levels: list[identification_surface_figure.Level] = []
     for centre in _levels(loads):
         here = [p for p in fit.points if abs(p.load_Nm - centre) <= 0.25]
         mean = float(np.mean([p.load_Nm for p in here]))
@@ -58,14 +63,14 @@ def _levels(loads: np.ndarray) -> list[float]:
     return result[:10]
 
 
-def residual_figure(fit: SurfaceFit) -> dict[str, Any]:
+def residual_figure(fit: SurfaceFit) -> Block:
     """Residuals over speed and load."""
     named = {o.run for o in fit.outliers}
-    data = {
-        "speed_rad_s": rounded([p.speed_rad_s for p in fit.points]),
-        "load_Nm": rounded([p.load_Nm for p in fit.points]),
-        "residual_uNm": rounded(1e6 * fit.own_residuals_Nm),
-        "std_uNm": rounded(1e6 * fit.residual_stds_Nm),
+    data: identification_residuals_figure.Data = {
+        "speed_rad_s": abscissa([p.speed_rad_s for p in fit.points]),
+        "load_Nm": abscissa([p.load_Nm for p in fit.points]),
+        "residual_uNm": abscissa(1e6 * fit.own_residuals_Nm),
+        "std_uNm": abscissa(1e6 * fit.residual_stds_Nm),
         "outlier": [p.run in named for p in fit.points],
         "run": [p.run for p in fit.points],
     }
@@ -77,12 +82,12 @@ def residual_figure(fit: SurfaceFit) -> dict[str, Any]:
     )
 
 
-def region_figure(fit: SurfaceFit) -> dict[str, Any]:
+def region_figure(fit: SurfaceFit) -> Block:
     """Joint 95 % regions of pairs of coefficients."""
     from scipy.stats import chi2
 
     radius = float(np.sqrt(chi2.ppf(0.95, 2)))
-    pairs = []
+    pairs: list[identification_region_figure.Pair] = []
     for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]
         pairs.append(
@@ -91,7 +96,7 @@ def region_figure(fit: SurfaceFit) -> dict[str, Any]:
                 "y_label": f"{NAMES[j]}, %",
                 "whole": _ellipse(fit.covariance, i, j, scale, radius),
                 "random": _ellipse(fit.random_covariance, i, j, scale, radius),
-                "interval": rounded(fit.half_widths[[i, j]] * scale),
+                "interval": abscissa(fit.half_widths[[i, j]] * scale),
             }
         )
     return doc.figure(
@@ -102,16 +107,18 @@ def region_figure(fit: SurfaceFit) -> dict[str, Any]:
     )
 
 
-def _ellipse(covariance: np.ndarray, i: int, j: int, scale: np.ndarray, radius: float) -> dict[str, Any]:
+def _ellipse(
+    covariance: np.ndarray, i: int, j: int, scale: np.ndarray, radius: float
+) -> identification_region_figure.Outline:
     part = covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(part)
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
     circle = np.vstack([np.cos(turn), np.sin(turn)])
     x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
-    return {"x": rounded(x, 4), "y": rounded(y, 4)}
+    return {"x": abscissa(x, 4), "y": abscissa(y, 4)}
 
 
-def window_figures(result: CampaignResult) -> list[dict[str, Any]]:
+def window_figures(result: CampaignResult) -> list[Block]:
     """The first, the middle and the last run with their steady part marked; the others on demand."""
     runs = {run.id: run for run in result.imported.runs}
     points = result.fit.points
@@ -122,10 +129,10 @@ def window_figures(result: CampaignResult) -> list[dict[str, Any]]:
         shown = [name for name in ("speed", "current", "torque") if name in record.signals]
         rows = kept_rows([record[name] for name in shown])
         labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
-        data = {
-            "time_s": rounded(record.time_s[rows], 6),
+        data: identification_window_figure.Data = {
+            "time_s": abscissa(record.time_s[rows], 6),
             "panels": [{"label": labels[name], "values": rounded(record[name][rows])} for name in shown],
-            "window": rounded([window.start_s, window.stop_s], 6),
+            "window": abscissa([window.start_s, window.stop_s], 6),
         }
         caption = (
             f"Run {points[k].run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"

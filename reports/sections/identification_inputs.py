@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analyses.records.naming import MEANINGS
 from reports import document as doc
+from reports.document_schema import Block, Cell, Column, Row
 
 if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
@@ -21,11 +22,11 @@ if TYPE_CHECKING:
 NOT_USED = "not needed for this"
 
 
-def input_rows(record: Record, used: Mapping[str, str]) -> list[dict[str, Any]]:
+def input_rows(record: Record, used: Mapping[str, str]) -> list[Row]:
     """One row a column of the file: meaning, unit, range in SI, whether it is used and why not."""
     rows = []
     for one in record.inputs:
-        row: dict[str, Any] = {"column": one.column, "unit": one.unit or "–"}
+        row: Row = {"column": one.column, "unit": one.unit or "–"}
         if one.signal == "time":
             row |= _time(record) | {"use": "time"}
         elif one.signal in record.signals:
@@ -42,12 +43,12 @@ def input_rows(record: Record, used: Mapping[str, str]) -> list[dict[str, Any]]:
         else:
             row |= {"meaning": "–", "use": f"no: {one.note or NOT_USED}", "_status": "warn"}
         if one.note and one.signal:
-            row["use"] += f" ({one.note})"
+            row["use"] = f"{row['use']} ({one.note})"
         rows.append(row)
     return rows
 
 
-def _time(record: Record) -> dict[str, Any]:
+def _time(record: Record) -> Row:
     return {
         "meaning": f"time, every {1e3 * record.period_s:.6g} ms",
         "low": float(record.time_s[0]),
@@ -56,7 +57,7 @@ def _time(record: Record) -> dict[str, Any]:
     }
 
 
-def campaign_rows(result: CampaignResult) -> list[dict[str, Any]]:
+def campaign_rows(result: CampaignResult) -> list[Row]:
     """One row a column of the runs' files, its range over all runs."""
     used = {
         "current": "torque kM i",
@@ -64,7 +65,7 @@ def campaign_rows(result: CampaignResult) -> list[dict[str, Any]]:
         "torque": "load",
         "angle": "check of the speed",
     }
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
+    rows: dict[tuple[str, Cell], Row] = {}
     for run in result.imported.runs:
         for source, inputs in (("drive", run.record.inputs), ("sensor", run.sensor_inputs)):
             own = replace(run.record, inputs=inputs)
@@ -76,30 +77,30 @@ def campaign_rows(result: CampaignResult) -> list[dict[str, Any]]:
                     del rows[key]  # a run without load does not use the sensor
                 known = rows.setdefault(key, {"file": source, **row})
                 for side, pick in (("low", min), ("high", max)):
-                    if side in row:
-                        known[side] = pick(known.get(side, row[side]), row[side])
+                    ends = [one[side] for one in (known, row) if side in one]
+                    if ends:
+                        known[side] = pick(end for end in ends if isinstance(end, float))
     return list(rows.values())
 
 
-def campaign_table(result: CampaignResult) -> dict[str, Any]:
+def campaign_table(result: CampaignResult) -> Block:
     """The columns of a campaign's files."""
-    made = _table("Inputs of all runs", campaign_rows(result))
-    made["columns"].insert(0, doc.column("file", "File"))
-    return made
+    return _table("Inputs of all runs", campaign_rows(result), doc.column("file", "File"))
 
 
-def input_table(record: Record, used: Mapping[str, str]) -> dict[str, Any]:
+def input_table(record: Record, used: Mapping[str, str]) -> Block:
     """The columns of one record."""
     return _table(f"Inputs: {record.name}", input_rows(record, used))
 
 
-def result_input_table(result: CorrelationResult) -> dict[str, Any]:
+def result_input_table(result: CorrelationResult) -> Block:
     """The columns of a record that a model was held against."""
     return input_table(result.source, result.used)
 
 
-def _table(caption: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _table(caption: str, rows: list[Row], *first: Column) -> Block:
     columns = [
+        *first,
         doc.column("column", "Column"),
         doc.column("meaning", "Meaning"),
         doc.column("unit", "Unit read"),
@@ -111,7 +112,7 @@ def _table(caption: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
     return doc.table(caption, columns, rows)
 
 
-def finding_table(record: str, findings: Sequence[Finding]) -> dict[str, Any]:
+def finding_table(record: str, findings: Sequence[Finding]) -> Block:
     """Whether a record agrees with itself and with the design's limits."""
     columns = [
         doc.column("subject", "Looked at"),
@@ -138,7 +139,7 @@ def verdict_words(items: Sequence[Item], result: str) -> str:
     return f"{first.label} fails{why}{more}. {result}"
 
 
-def verdict_block(items: Sequence[Item]) -> dict[str, Any]:
+def verdict_block(items: Sequence[Item]) -> Block:
     """The verdict, item by item; shares in per cent."""
     made = []
     for item in items:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.limits import NAMES
 
@@ -19,9 +20,12 @@ if TYPE_CHECKING:
     from analyses.large_signal.border import BorderCheck
     from analyses.large_signal.map import AmplitudeMap
     from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
+    from reports.figures import amplitude_bode as amplitude_bode_figure
+    from reports.figures import map as map_figure
+    from reports.figures import sawtooth as sawtooth_figure
 
 
-def section(result: LargeSignals) -> dict[str, Any]:
+def section(result: LargeSignals) -> Section:
     """Make the section from `analyses.large_signal.large_signals`."""
     from analyses.large_signal.classify import CAUSE_RULE, CRITERIA
 
@@ -42,7 +46,7 @@ def section(result: LargeSignals) -> dict[str, Any]:
     )
     words = _result(result.bode, scale, unit)
     findings = [Finding(severity="info", text=words, where="large-signal")]
-    status = "fail" if failed else "pass"
+    status: Status = "fail" if failed else "pass"
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, findings=findings
     )
@@ -74,7 +78,7 @@ def load_unit(design: Design) -> str:
     return "N" if design.axis == "linear" else "N m"
 
 
-def _border_verdict(border: BorderCheck | None) -> dict[str, Any]:
+def _border_verdict(border: BorderCheck | None) -> VerdictItem:
     """Judge the simulated border against the smallest A_k."""
     from analyses.large_signal.border import TOLERANCE
 
@@ -97,7 +101,7 @@ def _border_verdict(border: BorderCheck | None) -> dict[str, Any]:
     return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
 
 
-def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[dict[str, Any]]:
+def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
     """Judge the rate-limit formulas, or say why they do not apply."""
     from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
 
@@ -129,15 +133,15 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[dict[str, Any]]:
     ]
 
 
-def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
+def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
     """Make the map with the linear onset lines and the simulated border."""
     from analyses.large_signal.classify import CAUSES, WAVEFORMS
 
     shown, design = result.map, result.design
-    points = [
+    points: list[map_figure.Points] = [
         {
             "label": words,
-            "frequency_hz": rounded(check.frequency_hz),
+            "frequency_hz": abscissa(check.frequency_hz),
             "amplitude": rounded(scale * check.simulated_rad),
         }
         for words, check in (
@@ -146,15 +150,15 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]
         )
         if check is not None and np.isfinite(check.simulated_rad).any()
     ]
-    onset = [
+    onset: list[map_figure.Onset] = [
         {"name": name, "label": NAMES[name], "amplitude": rounded(scale * np.asarray(values), 4)}
         for name, values in shown.onset_rad.items()
         if np.isfinite(values).any()
     ]
     full = design.validation.full_deflection_rad
-    data = {
-        "frequency_hz": rounded(shown.frequency_hz),
-        "amplitude": rounded(scale * shown.amplitude_rad),
+    data: map_figure.Data = {
+        "frequency_hz": abscissa(shown.frequency_hz),
+        "amplitude": abscissa(scale * shown.amplitude_rad),
         "causes": list(CAUSES),
         "waveforms": list(WAVEFORMS),
         "cause": shown.cause.tolist(),
@@ -183,7 +187,7 @@ def _map_words(amplitude_map: AmplitudeMap) -> str:
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 
-def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, Any]:
+def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
     """List the border frequency by frequency."""
     border, shifted = result.border, result.border_with_friction
     assert border is not None
@@ -214,9 +218,9 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> dict[str, An
     return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
 
 
-def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> dict[str, Any]:
+def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> Block:
     """Make the amplitude Bode."""
-    series = [
+    series: list[amplitude_bode_figure.Series] = [
         {
             "label": f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})",
             "gain_db": rounded(amplitude_bode.gain_db[k], 4),
@@ -226,15 +230,15 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
             zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
         )
     ]
-    data = {
-        "frequency_hz": rounded(amplitude_bode.frequency_hz),
+    data: amplitude_bode_figure.Data = {
+        "frequency_hz": abscissa(amplitude_bode.frequency_hz),
         "series": series,
         "linear": {
             "gain_db": rounded(amplitude_bode.linear_db, 4),
             "phase_deg": rounded(amplitude_bode.linear_deg, 4),
         },
         "against": {
-            "amplitude": rounded(scale * amplitude_bode.all_amplitude_rad),
+            "amplitude": abscissa(scale * amplitude_bode.all_amplitude_rad),
             "minus3db_hz": rounded(amplitude_bode.minus3db_hz),
             "minus90deg_hz": rounded(amplitude_bode.minus90deg_hz),
             "linear_minus3db_hz": amplitude_bode.linear_minus3db_hz,
@@ -251,7 +255,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
 
 
-def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> dict[str, Any]:
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block:
     """List both bandwidths at the design's amplitudes."""
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
@@ -285,12 +289,12 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> dict[
     return doc.table("Bandwidth against amplitude", columns, rows)
 
 
-def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[dict[str, Any]]:
+def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
     """Make the sawtooth, or say why there is none."""
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s
-    data = {
+    data: sawtooth_figure.Data = {
         "columns": [_sawtooth_column(run, sawtooth, scale, unit, load_unit(design)) for run in sawtooth.runs],
         "rate_limit": limit,
         "unit": unit,
@@ -306,7 +310,7 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
 
 def _sawtooth_column(
     run: SawtoothRun, sawtooth: Sawtooth, scale: float, unit: str, load: str
-) -> dict[str, Any]:
+) -> sawtooth_figure.Load:
     """Give the traces at one load."""
     formula = run.formula
     peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"
@@ -317,8 +321,8 @@ def _sawtooth_column(
     )
     return {
         "title": f"load {run.load_Nm:g} {load}",
-        "time_s": rounded(run.time_s),
-        "reference": rounded(scale * run.reference_rad, 4),
+        "time_s": abscissa(run.time_s),
+        "reference": abscissa(scale * run.reference_rad, 4),
         "output": rounded(scale * run.output_rad, 4),
         "rate": rounded(scale * run.output_rate_rad_s, 4),
         "command_rate": rounded(scale * run.speed_command_rad_s, 4),

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.limiters import Onset
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.sections.names import hertz
+
+if TYPE_CHECKING:
+    from reports.figures import onset as onset_figure
 
 NAMES = {
     "speed": "speed limit",
@@ -26,17 +30,17 @@ NAMES = {
 }
 
 
-def section(design: Design, border: Onset) -> dict[str, Any]:
+def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
     scale, unit = (1.0, "m") if design.axis == "linear" else (math.degrees(1.0), "deg")
-    series = [
+    series: list[onset_figure.Series] = [
         {"label": NAMES.get(name, name), "amplitude": rounded(scale * np.asarray(values), 4)}
         for name, values in border.each_rad.items()
         if np.isfinite(values).any()
     ]
     full = design.validation.full_deflection_rad * scale
-    data = {
-        "frequency_hz": rounded(border.omega_rad_s / (2.0 * np.pi)),
+    data: onset_figure.Data = {
+        "frequency_hz": abscissa(border.omega_rad_s / (2.0 * np.pi)),
         "series": series,
         "unit": unit,
         "full_deflection": full,
@@ -46,19 +50,20 @@ def section(design: Design, border: Onset) -> dict[str, Any]:
         "lowest line "
         "every linear figure of this report holds, except for dry friction."
     )
+    rows = _rows(design, border, scale)
     blocks = [
         doc.figure("onset", data, caption=caption, alt=caption),
-        _table(design, border, scale, unit),
+        _table(rows, unit),
     ]
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words = _result(blocks[1]["rows"], unit)
+    words = _result(rows, unit)
     findings = [Finding(severity="info", text=words, where="limits")] if words else []
     return doc.section(
         "limits", "Validity of the linear model", blocks, result=words, intro=intro, findings=findings
     )
 
 
-def _result(rows: Sequence[Mapping[str, Any]], unit: str) -> str:
+def _result(rows: Sequence[_Linear], unit: str) -> str:
     """Say how far the largest command of the table stays linear."""
     if not rows:
         return ""
@@ -75,15 +80,18 @@ def _noun(limiter: str) -> str:
     return limiter if limiter.endswith("limit") else f"{limiter} limit"
 
 
-def _table(design: Design, border: Onset, scale: float, unit: str) -> dict[str, Any]:
+class _Linear(TypedDict):
+    """Up to which frequency one command amplitude passes unlimited."""
+
+    amplitude: float
+    fraction: float
+    hz: float | None
+    limiter: str
+
+
+def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     """List the highest frequency at which each command amplitude still passes unlimited."""
-    columns = [
-        doc.column("amplitude", "Command amplitude", unit, format="short:3"),
-        doc.column("fraction", "Of full deflection", "%", format="fix:0"),
-        doc.column("hz", "Linear up to", "Hz", format="sig:3"),
-        doc.column("limiter", "Then limited by"),
-    ]
-    rows = []
+    rows: list[_Linear] = []
     for fraction in design.validation.amplitude_fractions:
         amplitude = fraction * design.validation.full_deflection_rad
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
@@ -96,6 +104,16 @@ def _table(design: Design, border: Onset, scale: float, unit: str) -> dict[str, 
                 "limiter": "none in this range" if first is None else NAMES.get(border.active[first], ""),
             }
         )
+    return rows
+
+
+def _table(rows: Sequence[_Linear], unit: str) -> Block:
+    columns = [
+        doc.column("amplitude", "Command amplitude", unit, format="short:3"),
+        doc.column("fraction", "Of full deflection", "%", format="fix:0"),
+        doc.column("hz", "Linear up to", "Hz", format="sig:3"),
+        doc.column("limiter", "Then limited by"),
+    ]
     return doc.table("How far the linear model reaches", columns, rows)
 
 

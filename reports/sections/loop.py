@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from actuator_lti.design.model import Design
 from analyses.loop_figures import LoopFigures
 from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Section
 from reports.numbers import fixed, seconds, to_minus
 from reports.numbers import hertz as hertz_words
 from reports.sections.margins import (
@@ -25,13 +26,18 @@ from reports.sections.margins import (
 )
 from reports.sections.names import LOOPS, hertz
 
+if TYPE_CHECKING:
+    from reports.figures import bode as bode_figure
+    from reports.figures import closed_bode as closed_bode_figure
+    from reports.figures import nyquist as nyquist_figure
+    from reports.figures import sensitivity as sensitivity_figure
+    from reports.figures import step as step_figure
+
 FRAME = 1.6
 STEP_POINTS = 300
 
 
-def section(
-    name: str, design: Design, figures: LoopFigures, locked: LoopFigures | None = None
-) -> dict[str, Any]:
+def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures | None = None) -> Section:
     """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
     grid = frequency_grid(figures)
     title, status = LOOPS[name], worst_status([figures.margins.stable])
@@ -52,7 +58,7 @@ def section(
 
 def result(figures: LoopFigures) -> str:
     """Say in one sentence what the loop is like."""
-    row = {**margin_row(figures), **response_row(figures)}
+    row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
     parts = [
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"]),
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"]),
@@ -62,8 +68,8 @@ def result(figures: LoopFigures) -> str:
         for name, value, unit, hz in parts
         if value is not None
     ]
-    if row["minus3db_hz"] is not None:
-        words.append(f"bandwidth {hertz_words(row['minus3db_hz'])}")
+    if bandwidth is not None:
+        words.append(f"bandwidth {hertz_words(bandwidth)}")
     verdict = f"{figures.margins.verdict.capitalize()} ({figures.margins.evidence})"
     return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
@@ -76,7 +82,7 @@ def _intro(name: str, figures: LoopFigures) -> str:
     return f"{words} The margins are {figures.margins.evidence}: {MEANING[figures.margins.evidence]}."
 
 
-def _facts(figures: LoopFigures) -> dict[str, Any]:
+def _facts(figures: LoopFigures) -> Block:
     """Give the figures to remember of this loop."""
     margins, response = margin_row(figures), response_row(figures)
     chosen = [
@@ -97,20 +103,20 @@ def _short(value: float | None, places: int | None) -> float | None:
     return round(value, places) if places is not None else float(f"{value:.3g}")
 
 
-def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "") -> dict[str, Any]:
+def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "") -> Block:
     """Make the open-loop Bode figure with every margin on it."""
     margins = figures.margins
-    data = {
+    data: bode_figure.Data = {
         **bode_data([("open loop", curve(figures.loop.open_loop, grid))]),
         "loop": name,
         "nyquist_hz": nyquist_hz(figures),
         "gain_margins": [
-            {"frequency_hz": hertz(m.frequency_rad_s), "db": m.db}
+            {"frequency_hz": m.frequency_rad_s / (2.0 * math.pi), "db": m.db}
             for m in margins.gain_margins
             if math.isfinite(m.frequency_rad_s) and m.frequency_rad_s > 0
         ],
         "phase_margins": [
-            {"frequency_hz": hertz(m.frequency_rad_s), "deg": m.deg}
+            {"frequency_hz": m.frequency_rad_s / (2.0 * math.pi), "deg": m.deg}
             for m in margins.phase_margins
             if m.frequency_rad_s > 0
         ],
@@ -124,31 +130,38 @@ def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str =
 
 def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
-) -> dict[str, Any]:
+) -> Block:
     """Make the closed-loop Bode figure with the bandwidths."""
     series = [("rotor free" if locked else "closed loop", curve(figures.response, grid))]
     if locked is not None and locked.stable:
         series.append(("rotor locked", curve(locked.response, grid)))
     band = _bandwidths(figures)
-    data = {**bode_data(series), "loop": name, "nyquist_hz": nyquist_hz(figures), "bandwidth": band}
+    data: closed_bode_figure.Data = {
+        **bode_data(series),
+        "loop": name,
+        "nyquist_hz": nyquist_hz(figures),
+        "bandwidth": band,
+    }
     corner, lag = _hz(band["minus3db_hz"]), _hz(band["minus90deg_hz"])
     words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
     return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
 
 
-def _bandwidths(figures: LoopFigures) -> dict[str, float | None]:
+def _bandwidths(figures: LoopFigures) -> closed_bode_figure.Bandwidth:
     """Give what is marked on the closed-loop figure; null where it is not known."""
     band = figures.bandwidth
-    names = ("minus3db_hz", "minus90deg_hz", "resonance_hz", "resonance_db", "level_db", "dc_db")
-    if band is None:
-        return dict.fromkeys(names)
-    dc_db = 20.0 * math.log10(abs(band.dc_gain))
-    values = (band.minus3db_hz, band.minus90deg_hz, band.resonance_hz, band.resonance_peak_db)
-    level = dc_db - 20.0 * math.log10(math.sqrt(2.0))
-    return dict(zip(names, (*map(finite, values), level, dc_db), strict=True))
+    dc_db = None if band is None else 20.0 * math.log10(abs(band.dc_gain))
+    return {
+        "minus3db_hz": None if band is None else finite(band.minus3db_hz),
+        "minus90deg_hz": None if band is None else finite(band.minus90deg_hz),
+        "resonance_hz": None if band is None else finite(band.resonance_hz),
+        "resonance_db": None if band is None else finite(band.resonance_peak_db),
+        "level_db": None if dc_db is None else dc_db - 20.0 * math.log10(math.sqrt(2.0)),
+        "dc_db": dc_db,
+    }
 
 
-def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> dict[str, Any]:
+def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     """Make the Nyquist figure."""
     margins, system = figures.margins, figures.loop.open_loop
     omega, points = nyquist_curve(system, grid, FRAME)
@@ -159,8 +172,8 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> dict[str, Any
         at = [float(value.real), float(value.imag)]
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     on_circle = response_at(system, np.array(phases)) if phases else np.empty(0, dtype=complex)
-    data = {
-        "frequency_hz": rounded(omega / (2.0 * np.pi)),
+    data: nyquist_figure.Data = {
+        "frequency_hz": abscissa(omega / (2.0 * np.pi)),
         "real": rounded(points.real, 4),
         "imag": rounded(points.imag, 4),
         "modulus": margins.modulus_margin,
@@ -177,9 +190,7 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> dict[str, Any
     return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
 
 
-def sensitivity(
-    title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray
-) -> dict[str, Any]:
+def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     """Make the figure of S and T."""
     peaks = figures.peaks
     assert peaks is not None
@@ -190,8 +201,8 @@ def sensitivity(
         and item.loop in (name, "every", None)
         and item.maximum is not None
     ]
-    data = {
-        "frequency_hz": rounded(grid / (2 * np.pi)),
+    data: sensitivity_figure.Data = {
+        "frequency_hz": abscissa(grid / (2 * np.pi)),
         "s_db": rounded(_db(response_at(figures.loop.sensitivity, grid)), 4),
         "t_db": rounded(_db(response_at(figures.loop.closed_loop, grid)), 4),
         "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
@@ -207,9 +218,7 @@ def sensitivity(
     return doc.figure("sensitivity", data, caption=caption, alt=caption, layout="half")
 
 
-def step(
-    title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = ""
-) -> dict[str, Any]:
+def step(title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "") -> Block:
     """Make the step figure."""
     figures = loop_figures.step
     assert figures is not None
@@ -219,7 +228,7 @@ def step(
     series = [_step_series("rotor free" if locked else "closed loop", loop_figures, end)]
     if locked is not None and locked.step is not None:
         series.append(_step_series("rotor locked", locked, end))
-    data = {
+    data: step_figure.Data = {
         "loop": name,
         "time_s": series[0]["time_s"],
         "series": series,
@@ -235,10 +244,10 @@ def step(
     return doc.figure("step", data, caption=caption, alt=f"Step response. {caption}", layout="half")
 
 
-def bode_data(series: Sequence[tuple[str, Curve]]) -> dict[str, Any]:
+def bode_data(series: Sequence[tuple[str, Curve]]) -> bode_figure.Curves:
     """Give the curves of a Bode figure, on the grid of the first."""
     return {
-        "frequency_hz": rounded(series[0][1].frequency_hz),
+        "frequency_hz": abscissa(series[0][1].frequency_hz),
         "series": [
             {
                 "label": label,
@@ -255,7 +264,7 @@ def nyquist_hz(figures: LoopFigures) -> float | None:
     return None if figures.loop.period_s is None else 0.5 / figures.loop.period_s
 
 
-def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> dict[str, Any]:
+def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> step_figure.Series:
     """Give a step response, cut where nothing happens any more and thinned."""
     figures = loop_figures.step
     assert figures is not None
@@ -274,7 +283,7 @@ def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = No
     time, response = time[::stride], response[::stride]
     if end_s is not None and time[-1] < end_s:
         time, response = np.append(time, end_s), np.append(response, response[-1])
-    return {"label": label, "time_s": rounded(time), "response": rounded(response)}
+    return {"label": label, "time_s": abscissa(time), "response": rounded(response)}
 
 
 def _rise(figures: Any) -> list[float] | None:
@@ -286,7 +295,7 @@ def _rise(figures: Any) -> list[float] | None:
     return [start, start + float(figures.rise_time_s)]
 
 
-def _peak(db: float | None, omega_rad_s: float | None) -> dict[str, Any] | None:
+def _peak(db: float | None, omega_rad_s: float | None) -> sensitivity_figure.Peak | None:
     known = finite(db)
     return None if known is None else {"db": known, "frequency_hz": finite(hertz(omega_rad_s))}
 

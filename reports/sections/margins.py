@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TypedDict, cast
 
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
+from reports.document_schema import Block, Mark, Row, Section, State, Status
 from reports.numbers import to_minus
 from reports.sections.names import LOOPS, hertz
 
-STATUS = {True: "pass", False: "fail", None: "warn"}
-EVIDENCE_STATUS = {"certified": "pass", "checked": "info", "withheld": "warn"}
+STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
+EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
 MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
@@ -59,7 +60,7 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> dict[str, Any]:
+def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> Section:
     """Make the section from the figures of the sampled, sliding loops."""
     named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
     if locked is not None:
@@ -91,14 +92,14 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         return f"Not known to be stable: {', '.join(unstable)}."
     rows = {LOOPS[name].lower(): margin_row(loop_figures) for name, loop_figures in figures.items()}
     words = []
-    for key, what, unit in (
-        ("gain_margin_db", "gain margin", "dB"),
-        ("phase_margin_deg", "phase margin", "deg"),
+    for margins, what, unit in (
+        ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
+        ({name: row["phase_margin_deg"] for name, row in rows.items()}, "phase margin", "deg"),
     ):
-        known = {name: abs(row[key]) for name, row in rows.items() if row[key] is not None}
+        known = {name: abs(margin) for name, margin in margins.items() if margin is not None}
         if known:
             name = min(known, key=lambda n: known[n])
-            words.append(f"the smallest {what} is {rows[name][key]:.1f} {unit} ({name})")
+            words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
     count = "The loop is" if len(rows) == 1 else f"All {len(rows)} loops are"
     count = f"{count} stable, {evidence_words(figures)}"
     return to_minus(f"{count}; {' and '.join(words)}." if words else f"{count}.")
@@ -129,7 +130,7 @@ def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     ]
 
 
-def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+def margin_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of the margins to quote."""
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
@@ -140,7 +141,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
 
-def response_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+def response_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
@@ -151,13 +152,44 @@ def response_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
 
 
-def crossing_table(named: Mapping[str, LoopFigures]) -> dict[str, Any]:
+def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of every crossing."""
     rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
 
-def margin_row(figures: LoopFigures) -> dict[str, Any]:
+class MarginRow(TypedDict):
+    """The margins of one loop, by column."""
+
+    stable: State
+    evidence: Mark
+    gain_margin_db: float | None
+    gain_margin_hz: float | None
+    phase_margin_deg: float | None
+    crossover_hz: float | None
+    crossover_rad_s: float | None
+    delay_margin_ms: float | None
+    delay_margin_samples: float | None
+    modulus_margin: float | None
+    s_peak_db: float | None
+    disk_margin: float | None
+
+
+class ResponseRow(TypedDict):
+    """Bandwidth, resonance and step of one loop, by column."""
+
+    minus3db_hz: float | None
+    minus90deg_hz: float | None
+    resonance_db: float | None
+    resonance_hz: float | None
+    t_peak_db: float | None
+    rise_ms: float | None
+    overshoot_percent: float | None
+    settling_ms: float | None
+    dc: float | None
+
+
+def margin_row(figures: LoopFigures) -> MarginRow:
     """Give the margins of one loop by column."""
     m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
@@ -177,30 +209,28 @@ def margin_row(figures: LoopFigures) -> dict[str, Any]:
     }
 
 
-def response_row(figures: LoopFigures) -> dict[str, Any]:
+def response_row(figures: LoopFigures) -> ResponseRow:
     """Give bandwidth, resonance and step of one loop by column."""
     band, peaks, step = figures.bandwidth, figures.peaks, figures.step
-    row: dict[str, Any] = dict.fromkeys((column["key"] for column in RESPONSE_COLUMNS[1:]), None)
-    if band is not None:
-        row |= {
-            "minus3db_hz": finite(band.minus3db_hz),
-            "minus90deg_hz": finite(band.minus90deg_hz),
-            "resonance_db": finite(band.resonance_peak_db),
-            "resonance_hz": finite(band.resonance_hz) or None,
-        }
-    if peaks is not None:
-        row["t_peak_db"] = finite(peaks.complementary_db)
-    if step is not None:
-        row |= {
-            "rise_ms": times(step.rise_time_s, 1e3),
-            "overshoot_percent": finite(step.overshoot_percent),
-            "settling_ms": times(step.settling_time_s, 1e3),
-            "dc": finite(step.final_value),
-        }
-    return row
+    return {
+        "minus3db_hz": None if band is None else finite(band.minus3db_hz),
+        "minus90deg_hz": None if band is None else finite(band.minus90deg_hz),
+        "resonance_db": None if band is None else finite(band.resonance_peak_db),
+        "resonance_hz": None if band is None else finite(band.resonance_hz) or None,
+        "t_peak_db": None if peaks is None else finite(peaks.complementary_db),
+        "rise_ms": None if step is None else times(step.rise_time_s, 1e3),
+        "overshoot_percent": None if step is None else finite(step.overshoot_percent),
+        "settling_ms": None if step is None else times(step.settling_time_s, 1e3),
+        "dc": None if step is None else finite(step.final_value),
+    }
 
 
-def _crossings(name: str, figures: LoopFigures) -> list[dict[str, Any]]:
+def cells(*rows: MarginRow | ResponseRow) -> Row:
+    """The same rows as cells of one table."""
+    return {key: cast(doc.Cell, value) for row in rows for key, value in row.items()}
+
+
+def _crossings(name: str, figures: LoopFigures) -> list[Row]:
     """List every crossing of one loop."""
     m = figures.margins
     rows = [
@@ -219,7 +249,7 @@ def _crossings(name: str, figures: LoopFigures) -> list[dict[str, Any]]:
     return rows
 
 
-def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> dict[str, Any]:
+def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> Row:
     row = {
         "_loop": next((key for key, words in LOOPS.items() if words == name), ""),
         "_hz": finite(hertz(omega_rad_s)) or None,
@@ -238,7 +268,7 @@ def _gain_note(ratio: float, tangent: bool) -> str:
     return limit + (", touches, does not cross" if tangent else "")
 
 
-def worst_status(stable: Iterable[bool | None]) -> str:
+def worst_status(stable: Iterable[bool | None]) -> Status:
     """Give the status of a section from the stability of its loops: unstable fails, unknown warns."""
     known = list(stable)
     if False in known:

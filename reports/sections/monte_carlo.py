@@ -7,11 +7,13 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
+from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.sections.margins import finite
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
+    from reports.figures import distribution as distribution_figure
 
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
@@ -42,9 +44,7 @@ FIGURE_COLUMNS = [
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
 
-def section(
-    result: MonteCarloResult, design: Design | None = None, at_least: float | None = None
-) -> dict[str, Any]:
+def section(result: MonteCarloResult, design: Design | None = None, at_least: float | None = None) -> Section:
     """Make the section.
 
     Parameters
@@ -56,7 +56,7 @@ def section(
         Probability to be met with 95 % confidence; without it every sample and the worst case must pass.
     """
     items = [_verdict(odds, _case(result, odds), at_least) for odds in result.odds if odds.id != "all"]
-    blocks: list[dict[str, Any]] = [doc.verdicts(items, what="odds")] if items else []
+    blocks: list[Block] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
         blocks += _figures(result)
@@ -74,7 +74,7 @@ def section(
         "case in "
         "the whole tolerance box, as sampling alone does not find it."
     )
-    status = "fail" if failed else "info"
+    status: Status = "fail" if failed else "info"
     return doc.section(
         "monte-carlo", "Tolerances", blocks, result=_result(result), intro=intro, status=status
     )
@@ -101,7 +101,7 @@ def _case(result: MonteCarloResult, odds: Odds) -> WorstCase | None:
     return next((case for case in result.worst if case.requirement == odds.id), None)
 
 
-def _verdict(odds: Odds, case: WorstCase | None, at_least: float | None) -> dict[str, Any]:
+def _verdict(odds: Odds, case: WorstCase | None, at_least: float | None) -> VerdictItem:
     """Judge one requirement by its odds."""
     wanted = 1.0 if at_least is None else at_least
     if at_least is None:
@@ -140,7 +140,7 @@ def _limit(odds: Odds) -> str:
     return ", ".join(parts)
 
 
-def _odds_table(result: MonteCarloResult) -> dict[str, Any]:
+def _odds_table(result: MonteCarloResult) -> Block:
     rows = []
     for odds in result.odds:
         case = _case(result, odds)
@@ -155,7 +155,7 @@ def _odds_table(result: MonteCarloResult) -> dict[str, Any]:
     return doc.table("Odds of meeting each requirement", ODDS_COLUMNS, rows, note)
 
 
-def _figure_table(columns: Iterable[ColumnStatistics]) -> dict[str, Any]:
+def _figure_table(columns: Iterable[ColumnStatistics]) -> Block:
     rows = []
     for c in columns:
         known = dict(zip(c.shares, c.quantiles, strict=True))
@@ -186,7 +186,7 @@ def _words(name: str) -> str:
     )
 
 
-def _figures(result: MonteCarloResult) -> list[dict[str, Any]]:
+def _figures(result: MonteCarloResult) -> list[Block]:
     """Draw the distribution behind every requirement, three a figure."""
     panels = [panel for odds in result.odds if odds.id != "all" for panel in _panels(result, odds)]
     blocks = []
@@ -202,10 +202,10 @@ def _figures(result: MonteCarloResult) -> list[dict[str, Any]]:
     return blocks
 
 
-def _panels(result: MonteCarloResult, odds: Odds) -> list[dict[str, Any]]:
+def _panels(result: MonteCarloResult, odds: Odds) -> list[distribution_figure.Histogram]:
     """Give the columns that a requirement looks at."""
     case = _case(result, odds)
-    panels = []
+    panels: list[distribution_figure.Histogram] = []
     for name in odds.columns:
         column = result.columns[name]
         if len(column.counts) < 2:
@@ -221,7 +221,7 @@ def _panels(result: MonteCarloResult, odds: Odds) -> list[dict[str, Any]]:
     return panels
 
 
-def _worst_table(result: MonteCarloResult) -> dict[str, Any]:
+def _worst_table(result: MonteCarloResult) -> Block:
     columns = [doc.column("requirement", "Worst case for"), doc.column("file", "Design file")]
     columns += [doc.column(f"p{k}", path, format="sig:5") for k, path in enumerate(result.paths)]
     rows: list[Mapping[str, Any]] = [

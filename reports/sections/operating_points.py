@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from actuator_lti.design.model import Design
 from analyses.loop_survey import OperatingPointFigures
 from reports import document as doc
+from reports.document_schema import Row, Section
 from reports.sections.margins import margin_row, response_row
 from reports.sections.names import load_unit
 
 
-def section(points: Sequence[OperatingPointFigures], design: Design) -> dict[str, Any]:
+def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
     """Make the section; one line an operating point, three figures a loop."""
     names = list(dict.fromkeys(name for point in points for name in point.figures))
     linear = design.axis == "linear"
@@ -75,8 +75,8 @@ def _result(points: Sequence[OperatingPointFigures]) -> str:
     )
 
 
-def _row(point: OperatingPointFigures, scale: float) -> dict[str, Any]:
-    row: dict[str, Any] = {"point": point.label, "slope": point.slope_Nms_rad * scale}
+def _row(point: OperatingPointFigures, scale: float) -> Row:
+    row: Row = {"point": point.label, "slope": point.slope_Nms_rad * scale}
     row["load"] = "any" if point.load_Nm is None else point.load_Nm
     for name, result in point.figures.items():
         margins, response = margin_row(result), response_row(result)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
+from reports.document_schema import Block, Row, Section, Status
 from reports.findings import Finding
 
 GRADES = (
@@ -25,11 +25,11 @@ COLUMNS = [
 ]
 
 
-def section(design: Design, warnings: Sequence[str] = ()) -> dict[str, Any]:
+def section(design: Design, warnings: Sequence[str] = ()) -> Section:
     """Make the section."""
     parameters = list(design.parameters.values())
     assumed = sum("X" in item.grade for item in parameters)
-    blocks: list[dict[str, Any]] = [_derived(design)]
+    blocks: list[Block] = [_derived(design)]
     if warnings:
         rows = [{"warning": warning, "_status": "warn"} for warning in warnings]
         blocks.append(doc.table("To be checked", [doc.column("warning", "Warning")], rows))
@@ -42,7 +42,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> dict[str, Any]:
             {"label": f.label, "value": f.value, "grade": f.grade, "source": f.source} for f in design.facts
         ]
         blocks.append(doc.details("Facts that enter no equation", [doc.table("Facts", columns, rows)]))
-    status = "warn" if warnings else "info"
+    status: Status = "warn" if warnings else "info"
     findings = [Finding(severity="warn", text=words, where="parameters") for words in warnings]
     result = (
         f"{len(parameters)} values; {assumed} of them are assumed (grade X)."
@@ -64,7 +64,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def _derived(design: Design) -> dict[str, Any]:
+def _derived(design: Design) -> Block:
     """Give what follows from the values."""
     rotary = design.axis == "rotary"
     items = [
@@ -82,7 +82,7 @@ def _derived(design: Design) -> dict[str, Any]:
     return doc.facts(items)
 
 
-def _row(item: Parameter) -> dict[str, Any]:
+def _row(item: Parameter) -> Row:
     return {
         "path": item.path,
         "symbol": item.symbol,

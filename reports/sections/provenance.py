@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from reports import document as doc
+from reports.document_schema import Section
 from reports.findings import Finding
 
 
 def section(
     design: Mapping[str, Any], provenance: Mapping[str, Any], findings: Sequence[Finding] = ()
-) -> dict[str, Any]:
+) -> Section:
     """Make the section from the document's own head."""
     rows = [
         {"what": "design", "value": f"{design['name']}, revision {design['revision'] or 'none'}"},

@@ -8,20 +8,21 @@ from typing import Any
 
 from analyses.requirements import RequirementVerdict, all_pass
 from reports import document as doc
+from reports.document_schema import Section, Status, VerdictItem
 from reports.sections.names import QUANTITIES
 
 
-def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> dict[str, Any]:
+def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> Section:
     """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
-        blocks = [doc.text("The design file states no requirement.")]
-        return doc.section("verdicts", "Requirements", [], result=blocks[0]["text"], status="info")
+        none = "The design file states no requirement."
+        return doc.section("verdicts", "Requirements", [], result=none, status="info")
     intro = (
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
     items = [item(verdict, load_unit) for verdict in verdicts]
-    status = "pass" if all_pass(tuple(verdicts)) else "fail"
+    status: Status = "pass" if all_pass(tuple(verdicts)) else "fail"
     return doc.section(
         "verdicts", "Requirements", [doc.verdicts(items)], result=result(items), intro=intro, status=status
     )
@@ -38,7 +39,7 @@ def result(items: Sequence[Mapping[str, Any]]) -> str:
     return f"{'All' if not unjudged else f'{met} of'} {len(items)} requirements are met.{rest}"
 
 
-def item(verdict: RequirementVerdict, load_unit: str = "N m") -> dict[str, Any]:
+def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:
     """Make one line of the verdicts."""
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 from reports.sections.limits import NAMES
@@ -16,9 +17,10 @@ from reports.sections.limits import NAMES
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.specification import Specification
+    from reports.figures import torque_speed as torque_speed_figure
 
 
-def section(result: Specification) -> dict[str, Any]:
+def section(result: Specification) -> Section:
     """Make the section from `analyses.specification.specification`."""
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
     intro = "Closed form and simulation side by side; output side unless a column says motor."
@@ -64,7 +66,7 @@ def _finite(value: float | None, scale: float = 1.0) -> float | None:
     return None if value is None or not math.isfinite(value) else scale * value
 
 
-def _capability_table(result: Specification) -> dict[str, Any]:
+def _capability_table(result: Specification) -> Block:
     """List rate, acceleration, current and duty by load."""
     scale, unit = output_unit(result.design)
     columns = [
@@ -106,7 +108,7 @@ def _capability_table(result: Specification) -> dict[str, Any]:
     return doc.table("Rate, acceleration and current at each load", columns, rows, note)
 
 
-def _planes(result: Specification) -> list[dict[str, Any]]:
+def _planes(result: Specification) -> list[Block]:
     """Make a torque-speed plane for each load."""
     linear = result.design.axis == "linear"
     fast, speed_label = (1.0, "speed, m/s") if linear else (60.0 / (2.0 * math.pi), "motor speed, rpm")
@@ -116,17 +118,17 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
     for one in result.capabilities:
         load = one.figures.load_Nm
         moves = [move for move in result.manoeuvres if move.load_Nm == load]
-        paths = []
+        paths: list[torque_speed_figure.Path] = []
         for move in moves:
             fold = np.where(move.speed_rad_s < 0.0, -1.0, 1.0)
             speed, torque = fast * fold * move.speed_rad_s, strong * fold * move.torque_Nm
             # a reversal is a jump of the folded path: leave a gap there
             torque = np.where(np.diff(fold, prepend=fold[0]) != 0.0, np.nan, torque)
             paths.append(
-                {"label": _short(move.name), "speed": rounded(speed, 4), "torque": rounded(torque, 4)}
+                {"label": _short(move.name), "speed": abscissa(speed, 4), "torque": rounded(torque, 4)}
             )
         wanted = f"steady motion at {load:g} "
-        data = {
+        data: torque_speed_figure.Data = {
             "bounds": [_curve(curve.name, curve, fast, strong) for curve in result.plane.bounds],
             "demands": [
                 _curve(curve.name, curve, fast, strong)
@@ -149,11 +151,11 @@ def _planes(result: Specification) -> list[dict[str, Any]]:
     return blocks
 
 
-def _curve(label: str, curve: Any, fast: float, strong: float) -> dict[str, Any]:
+def _curve(label: str, curve: Any, fast: float, strong: float) -> torque_speed_figure.Line:
     return {
         "label": label,
-        "speed": rounded(fast * curve.speed_rad_s, 4),
-        "torque": rounded(strong * curve.torque_Nm, 4),
+        "speed": abscissa(fast * curve.speed_rad_s, 4),
+        "torque": abscissa(strong * curve.torque_Nm, 4),
     }
 
 
@@ -181,7 +183,7 @@ def _fastest(result: Specification, moves: list[Any]) -> float:
     return 1.12 * max([highest, *upright, *[c for c in crossing if c < 4.0 * highest]])
 
 
-def _manoeuvre_table(result: Specification) -> dict[str, Any]:
+def _manoeuvre_table(result: Specification) -> Block:
     """List currents and duty of the manoeuvres."""
     electric = result.design.motor.has_electrical_dynamics
     columns = [
@@ -226,7 +228,7 @@ def _limit_words(limits: dict[str, float]) -> str:
     return ", ".join(parts) or "none"
 
 
-def _step_table(result: Specification) -> dict[str, Any]:
+def _step_table(result: Specification) -> Block:
     """List step times from small to full deflection."""
     scale, unit = output_unit(result.design)
     columns = [

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Row, Section, Status
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.stiffness import AtRest, Check, Stiffness, StiffnessCurve
+    from reports.figures import stiffness as stiffness_figure
 
 STATES = {
     "powered": "powered, command held",
@@ -22,14 +24,14 @@ STATES = {
 }
 
 
-def of_design(design: Design) -> dict[str, Any]:
+def of_design(design: Design) -> Section:
     """Make the section of a report from the linear loops alone."""
     from analyses.stiffness import stiffness
 
     return section(stiffness(design, simulated=False))
 
 
-def section(result: Stiffness) -> dict[str, Any]:
+def section(result: Stiffness) -> Section:
     """Make the section from `analyses.stiffness.stiffness`."""
     unit = f"{load_unit(result.design)}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [*_figure(result, unit), _table(result, unit)]
@@ -43,7 +45,7 @@ def section(result: Stiffness) -> dict[str, Any]:
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status = "info" if not result.checks else "pass" if result.agrees else "fail"
+    status: Status = "info" if not result.checks else "pass" if result.agrees else "fail"
     return doc.section(
         "stiffness",
         "Stiffness",
@@ -65,12 +67,12 @@ def _result(result: Stiffness, unit: str) -> str:
     return f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz."
 
 
-def _figure(result: Stiffness, unit: str) -> list[dict[str, Any]]:
+def _figure(result: Stiffness, unit: str) -> list[Block]:
     shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
     if not shown:
         return []
-    data = {
-        "frequency_hz": rounded(shown[0].frequency_hz),
+    data: stiffness_figure.Data = {
+        "frequency_hz": abscissa(shown[0].frequency_hz),
         "series": [
             {
                 "label": STATES[curve.state],
@@ -85,7 +87,7 @@ def _figure(result: Stiffness, unit: str) -> list[dict[str, Any]]:
     return [doc.figure("stiffness", data, caption=caption, alt=f"Two panels. {caption}")]
 
 
-def _table(result: Stiffness, unit: str) -> dict[str, Any]:
+def _table(result: Stiffness, unit: str) -> Block:
     columns = [
         doc.column("state", "State"),
         doc.column("static", "Static", unit, format="sig:4"),
@@ -97,7 +99,7 @@ def _table(result: Stiffness, unit: str) -> dict[str, Any]:
     return doc.table("Stiffness by state", columns, rows, note)
 
 
-def _row(curve: StiffnessCurve) -> dict[str, Any]:
+def _row(curve: StiffnessCurve) -> Row:
     least, at = curve.least
     moves = math.isfinite(least)
     return {
@@ -108,7 +110,7 @@ def _row(curve: StiffnessCurve) -> dict[str, Any]:
     }
 
 
-def _lost_motion(result: Stiffness) -> dict[str, Any]:
+def _lost_motion(result: Stiffness) -> Block:
     scale, unit = output_unit(result.design)
     lost = result.lost_motion
     assert lost is not None
@@ -129,7 +131,7 @@ def _lost_motion(result: Stiffness) -> dict[str, Any]:
     return doc.table("Lost motion at the output", columns, rows, note)
 
 
-def _at_rest(result: Stiffness, unit: str) -> dict[str, Any]:
+def _at_rest(result: Stiffness, unit: str) -> Block:
     columns = [
         doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
         doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"),
@@ -142,7 +144,7 @@ def _at_rest(result: Stiffness, unit: str) -> dict[str, Any]:
     return doc.table("At rest, by amplitude", columns, [_rest_row(one) for one in result.at_rest], note)
 
 
-def _rest_row(one: AtRest) -> dict[str, Any]:
+def _rest_row(one: AtRest) -> Row:
     size = abs(one.seen_Nm_rad)
     return {
         "moment": one.moment_Nm,
@@ -151,7 +153,7 @@ def _rest_row(one: AtRest) -> dict[str, Any]:
     }
 
 
-def _checks(result: Stiffness, unit: str) -> dict[str, Any]:
+def _checks(result: Stiffness, unit: str) -> Block:
     columns = [
         doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"),
         doc.column("foreseen", "Foreseen", unit, format="sig:6"),
@@ -166,7 +168,7 @@ def _checks(result: Stiffness, unit: str) -> dict[str, Any]:
     return doc.table("Injected moment", columns, [_check_row(check) for check in result.checks], note)
 
 
-def _check_row(check: Check) -> dict[str, Any]:
+def _check_row(check: Check) -> Row:
     return {
         "frequency_hz": check.frequency_hz,
         "foreseen": abs(check.foreseen_Nm_rad),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,13 +12,18 @@ from analyses.validation.at_rest import RestSweep
 from analyses.validation.result import LoopValidation, PointValidation, Validation
 from analyses.validation.tolerance import allowed
 from reports import document as doc
-from reports.document import rounded
+from reports.document import abscissa, rounded
+from reports.document_schema import Block, Row, Section
 from reports.numbers import significant
+
+if TYPE_CHECKING:
+    from reports.figures import overlay_sweep as overlay_sweep_figure
+    from reports.figures import rest_sweep as rest_sweep_figure
 
 NAMES = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 
 
-def sections(validation: Validation) -> list[dict[str, Any]]:
+def sections(validation: Validation) -> list[Section]:
     """Make the section of the loops, and that from rest where there is dry friction."""
     made = [_injection(validation.loops, validation.points)]
     sweep = validation.rest_sweep
@@ -60,10 +65,10 @@ def has_points(loop: LoopValidation) -> bool:
     return loop.measured is not None and bool(_low(loop).any())
 
 
-def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> dict[str, Any]:
+def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> Section:
     """Make the section of the loops measured by injection."""
     shown = {name: loop for name, loop in loops.items() if has_points(loop)}
-    blocks: list[dict[str, Any]] = [_overlay(name, loop) for name, loop in shown.items()]
+    blocks: list[Block] = [_overlay(name, loop) for name, loop in shown.items()]
     blocks.append(_agreement(shown, points))
     intro = (
         "A sine is added at the break point while the drive runs at constant speed. Fundamentals are "
@@ -90,22 +95,22 @@ def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     )  # fmt: skip
 
 
-def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
+def _overlay(name: str, loop: LoopValidation) -> Block:
     """Make the overlay of one loop."""
     assert loop.measured is not None
     sweep = loop.measured.sweep
     f = sweep.frequency_hz
-    panels = [
+    panels: list[overlay_sweep_figure.Response] = [
         _panel("open loop L", loop.open_loop, sweep.open_loop),
         _panel("closed loop T", loop.closed_loop, sweep.closed_loop),
     ]
     third, may = 0.5 / sweep.period_s / 3.0, allowed_below_third(loop)
-    data = {
-        "frequency_hz": rounded(f),
+    data: overlay_sweep_figure.Data = {
+        "frequency_hz": abscissa(f),
         "valid_to_hz": third,
         "panels": panels,
-        "tolerance_db": rounded([may[0]], 3)[0],
-        "tolerance_deg": rounded([may[1]], 3)[0],
+        "tolerance_db": abscissa([may[0]], 3)[0],
+        "tolerance_deg": abscissa([may[1]], 3)[0],
     }
     gain, phase = worst_below_third(loop)
     caption = (
@@ -116,7 +121,7 @@ def _overlay(name: str, loop: LoopValidation) -> dict[str, Any]:
     return doc.figure("overlay_sweep", data, caption=caption, alt=caption)
 
 
-def _panel(title: str, linear: Any, measured: Any) -> dict[str, Any]:
+def _panel(title: str, linear: Any, measured: Any) -> overlay_sweep_figure.Response:
     """One response: magnitudes, phases, differences."""
     ratio = measured / linear
     phase = np.degrees(np.unwrap(np.angle(linear)))
@@ -132,7 +137,7 @@ def _panel(title: str, linear: Any, measured: Any) -> dict[str, Any]:
     }
 
 
-def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> dict[str, Any]:
+def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointValidation]) -> Block:
     """List how well each response is met, and how clean the measurement was."""
     columns = [
         doc.column("name", "Response"),
@@ -155,7 +160,7 @@ def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     return doc.table("Agreement of measured and assembled loops", columns, rows, note)
 
 
-def _loop_row(name: str, loop: LoopValidation) -> dict[str, Any]:
+def _loop_row(name: str, loop: LoopValidation) -> Row:
     assert loop.measured is not None
     assert loop.open_errors is not None
     tones = loop.tones
@@ -167,11 +172,11 @@ def _loop_row(name: str, loop: LoopValidation) -> dict[str, Any]:
     }
 
 
-def _point_row(name: str, point: PointValidation) -> dict[str, Any]:
+def _point_row(name: str, point: PointValidation) -> Row:
     return {"name": f"at {name}, all loops closed", **_quality(point.sweep, point.open_errors)}
 
 
-def _quality(sweep: Any, errors: Any) -> dict[str, Any]:
+def _quality(sweep: Any, errors: Any) -> Row:
     good = sweep.valid
     left = sorted({text for text in sweep.reason if text})
     return {
@@ -190,7 +195,7 @@ def _decibels(values: np.ndarray) -> np.ndarray:
     return 20.0 * np.log10(np.where(size > 0.0, size, np.nan))
 
 
-def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
+def _from_rest(sweep: RestSweep, axis: str) -> Section:
     """Make the section of the sweep from rest."""
     scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
     moved = np.abs(sweep.described) > 0.0  # of NaN, too: no
@@ -200,8 +205,8 @@ def _from_rest(sweep: RestSweep, axis: str) -> dict[str, Any]:
         ("sliding loop", sweep.sliding, False),
         ("describing function of dry friction", sweep.described, False),
     ]
-    data = {
-        "frequency_hz": rounded(sweep.frequency_hz),
+    data: rest_sweep_figure.Data = {
+        "frequency_hz": abscissa(sweep.frequency_hz),
         "series": [
             {
                 "label": label,

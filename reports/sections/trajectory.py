@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from analyses.conduct import conduct
 from nonlinear import Trajectory
-from reports.document import rounded
+from reports.document import abscissa, rounded
 from reports.sections.thinning import kept_rows
+
+if TYPE_CHECKING:
+    from reports.figures import trajectory as trajectory_figure
 
 LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
 
 
-def figure_data(run: Trajectory) -> dict[str, Any]:
+def figure_data(run: Trajectory) -> trajectory_figure.Data:
     """Data of the figure ``trajectory``: thinned with the peaks kept."""
     linear = run.axis == "linear"
     angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
@@ -23,7 +26,7 @@ def figure_data(run: Trajectory) -> dict[str, Any]:
     shown = [run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V]
     rows = kept_rows(shown)
 
-    def series(label: str, values: npt.NDArray[np.float64]) -> dict[str, Any]:
+    def series(label: str, values: npt.NDArray[np.float64]) -> trajectory_figure.Signal:
         return {"label": label, "values": rounded(values[rows])}
 
     position = [series("output", run.output_angle_rad * angle), series("command", run.reference_rad * angle)]
@@ -40,10 +43,12 @@ def figure_data(run: Trajectory) -> dict[str, Any]:
             current.append(series("commanded", run.current_command_A))
         panels.append(_panel("motor current, A", current, run, "current"))
     panels.append(_panel("voltage, V", [series("voltage", run.voltage_V)], run, "voltage"))
-    return {"time_s": rounded(run.time_s[rows], 8), "panels": panels}
+    return {"time_s": abscissa(run.time_s[rows], 8), "panels": panels}
 
 
-def _panel(label: str, series: list[dict[str, Any]], run: Trajectory, limiter: str | None) -> dict[str, Any]:
+def _panel(
+    label: str, series: list[trajectory_figure.Signal], run: Trajectory, limiter: str | None
+) -> trajectory_figure.Part:
     use = run.limits[limiter] if limiter else None
     active = spans(run.limit_active(limiter), run.time_s) if limiter else []
     limit = use.limit if use and np.isfinite(use.limit) else None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reports import document as doc
+from reports.document_schema import Block, Section, VerdictItem
 
 if TYPE_CHECKING:
     from analyses.tuning import BindingRequirement, TuningResult
+    from reports.figures import trade_off as trade_off_figure
 
 GAIN_COLUMNS = [
     doc.column("path", "Gain"),
@@ -30,6 +32,13 @@ REQUIREMENT_COLUMNS = [
     doc.column("binds", "Binds", format="yesno"),
     doc.column("corner", "At"),
 ]
+CONFIRMED_COLUMNS = [
+    doc.column("label", "Requirement"),
+    doc.column("value", "Certified", format="sig:4"),
+    doc.column("limit", "Limit", format="sig:4"),
+    doc.column("unit", "Unit"),
+    doc.column("met", "Met", format="yesno"),
+]
 CHECK_COLUMNS = [
     doc.column("corner", "Design"),
     doc.column("amplitude", "Step", "deg", format="sig:3"),
@@ -41,9 +50,12 @@ CHECK_COLUMNS = [
 ]
 
 
-def section(result: TuningResult) -> dict[str, Any]:
+def section(result: TuningResult) -> Section:
     """Make the section."""
-    blocks = [doc.verdicts(_verdict(r) for r in result.requirements), gains(result), requirements(result)]
+    verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
+    blocks: list[Block] = [verdicts, gains(result), requirements(result)]
+    if result.confirmed:
+        blocks.append(confirmed(result))
     if result.trade_off:
         blocks.append(_curve(result))
     if result.checks:
@@ -57,16 +69,35 @@ def section(result: TuningResult) -> dict[str, Any]:
 
 
 def summary(result: TuningResult) -> str:
-    """What came out, in two sentences."""
+    """What came out, in two or three sentences."""
     over = f"the nominal design and {result.corners - 1} corners of the tolerance box"
-    binding = [r for r in result.requirements if r.binds]
+    if result.corners == 1:
+        over = "the nominal design (no value has a tolerance)"
     if not result.feasible:
-        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in result.requirements if r.relative < 0.0)
+        missed = [r for r in result.requirements if r.relative < 0.0]
+        if not missed:
+            return f"The search meets every requirement over {over}; certified margins do not confirm it."
+        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in missed)
         return f"No gains meet every requirement over {over}. The best compromise misses {worst}."
-    if not binding:
-        return f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
+    words = [f"Every requirement is met over {over}."]
+    if result.placed:
+        words.append(f"Gains alone do not do; added: {', '.join(result.placed)}.")
+    binding = [r for r in result.requirements if r.binds]
     names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
-    return f"Every requirement is met over {over}. Nothing better is possible because of {names}."
+    if result.aim == "least-change":
+        if not changed(result):
+            return f"{words[0]} Nothing needs to change."
+        words.append(f"This is the least change that does; binding: {names}." if binding else "")
+    elif binding:
+        words.append(f"Nothing better is possible because of {names}.")
+    else:
+        words[0] = f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
+    return " ".join(word for word in words if word)
+
+
+def changed(result: TuningResult) -> bool:
+    """Whether any value differs from what the design had."""
+    return any(g.before is None or g.rounded != g.before for g in result.gains)
 
 
 def _amount(r: BindingRequirement) -> str:
@@ -75,7 +106,7 @@ def _amount(r: BindingRequirement) -> str:
     return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
 
 
-def _verdict(r: BindingRequirement) -> dict[str, Any]:
+def _verdict(r: BindingRequirement) -> VerdictItem:
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
         distance=r.distance, passed=r.relative >= 0.0,
@@ -83,7 +114,7 @@ def _verdict(r: BindingRequirement) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def gains(result: TuningResult) -> dict[str, Any]:
+def gains(result: TuningResult) -> Block:
     """Gains in SI and in the motion controller's objects."""
     rows = [
         {
@@ -92,11 +123,13 @@ def gains(result: TuningResult) -> dict[str, Any]:
         }
         for g in result.gains
     ]  # fmt: skip
-    note = "Tuned: rounded to the steps of the motion controller's objects, where the design has them."
+    note = (
+        "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
+    )
     return doc.table("Gains", GAIN_COLUMNS, rows, note)
 
 
-def requirements(result: TuningResult) -> dict[str, Any]:
+def requirements(result: TuningResult) -> Block:
     """Every requirement at its worst corner."""
     rows = [
         {
@@ -109,16 +142,29 @@ def requirements(result: TuningResult) -> dict[str, Any]:
     return doc.table("Requirements at their worst corner", REQUIREMENT_COLUMNS, rows)
 
 
+def confirmed(result: TuningResult) -> Block:
+    """The requirements by certified margins."""
+    rows = [
+        {
+            "label": v.id, "value": v.value, "unit": "" if v.requirement.unit == "1" else v.requirement.unit,
+            "limit": v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum,
+            "met": v.passed is True, "_status": "pass" if v.passed is True else "fail",
+        }
+        for v in result.confirmed
+    ]  # fmt: skip
+    return doc.table("Confirmed by certified margins", CONFIRMED_COLUMNS, rows)
+
+
 def _corner(r: BindingRequirement) -> str:
     return "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
 
 
-def _curve(result: TuningResult) -> dict[str, Any]:
+def _curve(result: TuningResult) -> Block:
     limits = {(r.id, r.unit): r.limit for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
     margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
-    data = {
+    data: trade_off_figure.Data = {
         "title": "What the position loop can trade",
         "points": [
             {"bandwidth_hz": p.bandwidth_hz, "phase_margin_deg": p.phase_margin_deg, "feasible": p.feasible}
@@ -135,10 +181,12 @@ def _curve(result: TuningResult) -> dict[str, Any]:
     )  # fmt: skip
 
 
-def checks(result: TuningResult) -> dict[str, Any]:
+def checks(result: TuningResult) -> Block:
     """The nonlinear check."""
     linear = result.design.axis == "linear"
-    columns = [{**c, "unit": "mm"} if linear and c["key"] == "amplitude" else c for c in CHECK_COLUMNS]
+    columns = [c.copy() for c in CHECK_COLUMNS]
+    for c in columns:
+        c["unit"] = "mm" if linear and c["key"] == "amplitude" else c["unit"]
     rows = [
         {
             "corner": c.corner, "amplitude": c.amplitude_rad * (1e3 if linear else math.degrees(1.0)),

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
-from importlib.util import find_spec
-from typing import Any
 
 from analyses.validation.ledger import Entry
 from analyses.validation.result import Validation
 from reports import document as doc
+from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.conditional import sentence
 from reports.sections.names import LOOPS, POINTS, QUANTITIES
@@ -28,11 +26,11 @@ MORE = {
     "response_closed": "response of the closed loop",
     "response_command": "response to the command",
 }
-STATUS = {True: "pass", False: "fail", None: "info"}
+STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "info"}
 WORD = {True: "agrees", False: "DISAGREES", None: "not judged"}
 
 
-def section(validation: Validation, *, timing: bool = True) -> list[dict[str, Any]]:
+def section(validation: Validation, *, timing: bool = True) -> list[Section]:
     """Make all sections of a validation, verdicts first; without ``timing`` the same input gives the same."""
     from reports.sections import conditional, confirmation, counts, sweep
 
@@ -48,24 +46,23 @@ def section(validation: Validation, *, timing: bool = True) -> list[dict[str, An
     return [*sections, *_others(validation)]
 
 
-def _others(validation: Validation) -> list[dict[str, Any]]:
+def _others(validation: Validation) -> list[Section]:
     """Make the sections of large signals, friction and specification, as far as they were asked for."""
-    parts = {
-        "large_signal": validation.large_signals,
-        "friction_effects": validation.friction,
-        "specification": validation.specification,
-    }
-    made: list[dict[str, Any]] = []
-    for name, result in parts.items():
-        if result is not None and find_spec(f"reports.sections.{name}") is not None:
-            sections = import_module(f"reports.sections.{name}").section(result)
-            made += sections if isinstance(sections, list) else [sections]
+    from reports.sections import friction_effects, large_signal, specification
+
+    made: list[Section] = []
+    if validation.large_signals is not None:
+        made.append(large_signal.section(validation.large_signals))
+    if validation.friction is not None:
+        made.append(friction_effects.section(validation.friction))
+    if validation.specification is not None:
+        made.append(specification.section(validation.specification))
     return made
 
 
-def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
+def summary(validation: Validation, *, timing: bool = True) -> Section:
     """Make the section of verdicts with the ledger."""
-    blocks: list[dict[str, Any]] = [doc.verdicts(verdict_items(validation), what="checks")]
+    blocks: list[Block] = [doc.verdicts(verdict_items(validation), what="checks")]
     failed = [row for row in validation.ledger if row.passed is False]
     if failed:
         blocks.append(ledger_table(failed, "Predictions that the simulation contradicts"))
@@ -83,7 +80,7 @@ def summary(validation: Validation, *, timing: bool = True) -> dict[str, Any]:
         "the "
         "reason."
     )
-    status = "pass" if validation.passed else "fail"
+    status: Status = "pass" if validation.passed else "fail"
     return doc.section(
         "validation", "Linear predictions against simulation", blocks, result=result(validation), intro=intro,
         status=status, findings=findings(validation),
@@ -144,7 +141,7 @@ def _left_out(validation: Validation) -> list[Finding]:
     return findings
 
 
-def verdict_items(validation: Validation) -> list[dict[str, Any]]:
+def verdict_items(validation: Validation) -> list[VerdictItem]:
     """One verdict a loop or break point, one for the frequency responses, one for large commands."""
     items = []
     if not validation.judged:
@@ -196,7 +193,7 @@ def _agreement(held: int, shown: int) -> str:
     return f"{held} of {held} agree" + (f"; {shown} shown, not judged" if shown else "")
 
 
-def _response_items(validation: Validation) -> list[dict[str, Any]]:
+def _response_items(validation: Validation) -> list[VerdictItem]:
     """Agreement of measured and assembled responses up to a third of Nyquist."""
     from reports.sections.sweep import allowed_below_third, has_points, worst_below_third
 
@@ -226,7 +223,7 @@ def _verdict(
     unit: str,
     passed: bool | None,
     reason: str,
-) -> dict[str, Any]:
+) -> VerdictItem:
     """Make one verdict; the distance is positive on the good side."""
     distance = None
     if value is not None:
@@ -245,7 +242,7 @@ def by_loop(rows: Sequence[Entry]) -> dict[str, list[Entry]]:
     return by_loop
 
 
-def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
+def ledger_table(rows: Sequence[Entry], caption: str) -> Block:
     """Lay entries out as a table."""
     columns = [
         doc.column("quantity", "Prediction"),
@@ -264,7 +261,7 @@ def ledger_table(rows: Sequence[Entry], caption: str) -> dict[str, Any]:
 NOISE = 1e-10  # of the value: a smaller difference changes with the order in which sums are taken
 
 
-def row_of(row: Entry) -> dict[str, Any]:
+def row_of(row: Entry) -> Row:
     """One entry as a row; seconds as ms; without the digits that are noise of the last bit."""
     scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, row.unit)
     digits = 6 if row.quantity == "resonance" else 12  # where a flat top is highest is known to 1e-7 at best
@@ -310,9 +307,9 @@ def _size(value_rad: float, axis: str) -> float:
     return value_rad * (1e3 if axis == "linear" else 57.29577951308232)
 
 
-def _times(validation: Validation) -> dict[str, Any]:
+def _times(validation: Validation) -> Block:
     """Where the time went."""
     columns = [doc.column("part", "Part"), doc.column("seconds", "Time", "s", format="fix:2")]
-    rows: list[dict[str, Any]] = [{"part": k, "seconds": v} for k, v in validation.seconds.items()]
+    rows: list[Row] = [{"part": k, "seconds": v} for k, v in validation.seconds.items()]
     rows.append({"part": "together", "seconds": sum(validation.seconds.values())})
     return doc.table("Where the time went", columns, rows)

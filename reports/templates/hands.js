@@ -83,6 +83,8 @@
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
   const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
 
+  const BEHIND = -9, DOUBT = -3, QUIET = 150; // ms
+
   // --- the module ----------------------------------------------------------------------------------------
   let x = null;
   const view = (at, count) => new Float64Array(x.memory.buffer, at, count);
@@ -94,12 +96,31 @@
     view(x.p_at(), row.length).set(row);
     const found = { row, loops: {}, points: {} };
     for (const name of data.loops) found.loops[name] = figures(stageOf(name), 1);
-    for (const name in data.points) found.points[name] = figures(data.points[name], 0);
+    for (const name in data.points) found.points[name] = x.phases_of(data.points[name]) > 1 ? { n: BEHIND } : figures(data.points[name], 0);
     return found;
   };
+  // what takes too long for a moving slider: once nothing has moved for a moment, one piece at a time
+  let pieces = [], waits = 0;
+  const nextPiece = () => {
+    const piece = pieces.shift();
+    if (!piece) { root.dataset.behind = "done"; return; }
+    piece();
+    waits = setTimeout(nextPiece, 0);
+  };
+  const fillBehind = () => {
+    clearTimeout(waits);
+    root.dataset.behind = "waits";
+    pieces = [...periodicPieces(before), ...(now === before ? [] : periodicPieces(now)), table];
+    waits = setTimeout(nextPiece, QUIET);
+  };
+  const periodicPieces = (found) => Object.keys(data.points).filter((name) => found.points[name].n === BEHIND).map((name) => () => {
+    view(x.p_at(), found.row.length).set(found.row);
+    found.points[name] = figures(data.points[name], 0);
+  });
   const figures = (stage, timed) => {
     const n = x.loop(stage, timed);
     if (n <= 0) return { n };
+    if (x.doubtful(stage)) return { n: DOUBT };
     return { n, figures: Array.from(view(x.figures_at(stage), STABLE + 1)), period: x.period_of(stage) };
   };
   const respond = (name, hertz) => {
@@ -153,9 +174,11 @@
   let values = start.slice(), past = [], future = [], before = null, now = null, shown = outer, record = null, refused = "";
   const same = (a, b) => a.every((value, k) => value === b[k]);
   const share = (key, value) => (key.low > 0 ? Math.log(value / key.low) / Math.log(key.high / key.low) : (value - key.low) / (key.high - key.low));
-  const valueAt = (key, part) => (key.low > 0 ? key.low * (key.high / key.low) ** part : key.low + part * (key.high - key.low));
-  const allowed = (key, value) => Number.isFinite(value) && (key.low > 0 ? value > 0 : value >= 0);
+  const along = (key, part) => (key.low > 0 ? key.low * (key.high / key.low) ** part : key.low + part * (key.high - key.low));
+  const valueAt = (key, part) => (key.whole ? Math.round(along(key, part)) : along(key, part));
+  const allowed = (key, value) => Number.isFinite(value) && (key.low > 0 ? value > 0 : key.low < 0 || value >= 0) && (!key.whole || Number.isInteger(value));
   const inUnit = (key, value) => value / key.factor;
+  const said = (key, value) => (key.whole ? String(value) : digits(inUnit(key, value), 4));
   const OPEN = matchMedia("(max-width: 60rem)").matches ? ["control.position", "control.velocity"] : ["control", "control.position", "control.velocity", "control.current"];
   const ORDER = ["control.position", "control.velocity", "control.current", "control", "encoder", "command", "limits", "friction", "load", "supply", "motor", "gear"];
   const titleOf = (path) => path.split(".").slice(0, -1).join(".");
@@ -196,7 +219,8 @@
       const move = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10, PageUp: 10 }[event.key];
       if (!move) return;
       event.preventDefault();
-      preview(k, valueAt(key, Math.min(1, Math.max(0, share(key, values[k]) + move / 200))));
+      const to = valueAt(key, Math.min(1, Math.max(0, share(key, values[k]) + move / 200)));
+      preview(k, key.whole && to === values[k] ? Math.min(key.high, Math.max(key.low, to + Math.sign(move))) : to);
       commit();
     });
     range.addEventListener("dblclick", () => { preview(k, key.value); commit(); });
@@ -228,7 +252,7 @@
     const fixed = html("details", "group fixed"), list = html("ul");
     fixed.append(html("summary", "", `${data.fixed.length} keys without a slider`));
     for (const key of data.fixed) {
-      const item = html("li"), value = digits(inUnit(key, key.value), 5);
+      const item = html("li"), value = key.whole ? String(key.value) : digits(inUnit(key, key.value), 5);
       item.append(html("code", "", key.path), ` ${value} ${key.unit}: ${key.why}.`);
       list.append(item);
     }
@@ -237,7 +261,7 @@
   };
 
   // --- changing ------------------------------------------------------------------------------------------
-  let settled = start.slice(), waiting = false;
+  let settled = start.slice(), lastGood = start.slice(), waiting = false;
   const preview = (k, value) => {
     values = values.slice();
     values[k] = value;
@@ -297,7 +321,7 @@
     if (digits(value, 4) !== digits(old, 4)) made.append(html("span", "was", `was ${digits(old, 4)}`));
     return made;
   };
-  const NONE = { "-1": "too many states for this page", "-2": "its loop is periodic; see the report" };
+  const NONE = { "-1": "not followed here: too many states for this page", [DOUBT]: "stability not known: rounding decides its figures", [BEHIND]: "follows in a moment" };
   const table = () => {
     const head = html("tr");
     const heading = (words, side, scope) => {
@@ -318,10 +342,11 @@
       const row = html("tr"), th = heading(LOOP_NAMES[name] || POINT_NAMES[name], "left", "row");
       row.append(th);
       if (!own.figures || !old.figures) {
-        const td = html("td", "", `not followed here: ${NONE[own.n] || "no loop"}`);
+        const td = html("td", "", NONE[own.figures ? old.n : own.n] || "no loop");
         td.colSpan = FIGURES.length;
         row.append(td);
       } else {
+        if (x.phases_of(stageOf(name) ?? data.points[name]) > 1) th.append(" ", html("span", "unit", "fundamental"));
         if (own.figures[STABLE] !== 1) th.append(" ", html("span", "mark fail", "unstable"));
         th.dataset.loop = name;
         th.dataset.stable = own.figures[STABLE];
@@ -346,13 +371,14 @@
   const state = () => {
     const line = find(".state"), fails = failing(now), old = failing(before), total = data.requirements.length;
     const unstable = data.loops.filter((name) => now.loops[name].figures && now.loops[name].figures[STABLE] !== 1);
-    const words = [];
+    const unknown = data.loops.filter((name) => now.loops[name].n === DOUBT), words = [];
+    if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail (as designed: ${old.length}).` : `All ${total} requirements on the loops are met.`);
+    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail (as designed: ${old.length}).` : unknown.length ? "" : `All ${total} requirements on the loops are met.`);
     if (data.others) words.push(`${data.others} on the whole drive: see the report.`);
     if (refused) words.push(refused);
-    line.className = `state ${unstable.length || fails.length ? "fail" : "pass"}`;
-    line.textContent = words.join(" ");
+    line.className = `state ${unstable.length || fails.length || unknown.length ? "fail" : "pass"}`;
+    line.textContent = words.filter(Boolean).join(" ");
     line.dataset.failing = fails.length;
     const list = find(".moved-list");
     const ids = new Set(old.map((item) => item.loop + item.id)), fresh = fails.filter((item) => !ids.has(item.loop + item.id));
@@ -362,10 +388,10 @@
     rows.forEach((slider, k) => {
       const { key } = slider, value = values[k], moved = value !== key.value;
       if (document.activeElement !== slider.range || !slider.range.matches(":active")) slider.range.value = 1000 * Math.min(1, Math.max(0, share(key, value)));
-      slider.range.setAttribute("aria-valuetext", `${digits(inUnit(key, value), 4)} ${key.unit}`);
-      if (document.activeElement !== slider.field) slider.field.value = digits(inUnit(key, value), 4).replace("−", "-");
+      slider.range.setAttribute("aria-valuetext", `${said(key, value)} ${key.unit}`);
+      if (document.activeElement !== slider.field) slider.field.value = said(key, value).replace("−", "-");
       slider.row.classList.toggle("moved", moved);
-      slider.was.textContent = moved ? `was ${digits(inUnit(key, key.value), 4)}` : "";
+      slider.was.textContent = moved ? `was ${said(key, key.value)}` : "";
     });
     const doing = { undo: past.length, redo: future.length, reset: changes().length };
     for (const name in doing) find(`[data-do="${name}"]`).disabled = !doing[name];
@@ -515,15 +541,18 @@
     drawBorder("as designed", part);
   };
 
+  const unfit = (wanted) => { // why values do not go together; empty where they do
+    const at = (path) => wanted[keys.findIndex((key) => key.path === path)];
+    for (const [path, of] of data.multiples) if (at(path) % at(of) > 0) return `${path} = ${at(path)} is no multiple of ${of} = ${at(of)}: nothing follows until it is one.`;
+    return "";
+  };
   const update = () => {
     const began = performance.now();
     refused = "";
-    const found = compute(values);
-    if (found && data.loops.every((name) => found.loops[name].n !== 0)) now = found;
-    else {
-      refused = "The last value needs another structure of the drive: save the file and make a new report.";
-      view(x.p_at(), now.row.length).set(now.row);
-      compute(values.map((value, k) => settled[k]));
+    const apart = unfit(values), found = apart ? null : compute(values);
+    if (found && data.loops.every((name) => found.loops[name].n !== 0)) { now = found; lastGood = values; } else {
+      refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
+      now = { ...now, ...compute(keys.map((key, k) => lastGood[k])) };
     }
     show();
     table();
@@ -536,6 +565,7 @@
     find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
     if (record && part.y) find(".record").textContent = `${record.name}: ${record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(runBefore), 3)} %.`;
     root.dataset.ms = (performance.now() - began).toFixed(1);
+    fillBehind();
     root.dataset.count = +(root.dataset.count || 0) + 1;
   };
   const choose = (name) => {
@@ -555,7 +585,7 @@
     const letters = [...data.text];
     for (const [[from, to, lead, tail], k] of places) {
       const key = keys[k], value = inUnit(key, values[k]);
-      text += letters.slice(at, from).join("") + lead + (key.unit ? `"${value} ${key.unit}"` : String(Number.isInteger(value) ? value.toFixed(1) : value)) + tail;
+      text += letters.slice(at, from).join("") + lead + (key.unit ? `"${value} ${key.unit}"` : String(Number.isInteger(value) && !key.whole ? value.toFixed(1) : value)) + tail;
       at = to;
     }
     return text + letters.slice(at).join("");

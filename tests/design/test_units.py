@@ -1,10 +1,12 @@
 """Written quantities: against the definitions of the units, and what must be refused."""
 
+import random
+from fractions import Fraction
 from math import pi
 
 import pytest
 
-from actuator_lti.design.units import parse_quantity, scaled
+from actuator_lti.design.units import parse_quantity, parse_unit, scaled
 from actuator_lti.errors import InputError
 
 WRITTEN = [
@@ -82,6 +84,50 @@ def test_what_is_no_quantity_is_refused_with_the_unit_wanted(text: object, unit:
     with pytest.raises(InputError, match="allowed: ") as caught:
         parse_quantity(text, unit)  # type: ignore[arg-type]
     assert says in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["1 As", "1 Nms", "1 Vs/rad", "1 mkg", "1 kkg", "3 ^2", "3 )V", "3 (V", "3 *V", "3 ()"]
+)
+def test_what_can_be_read_in_two_ways_is_no_unit(text: str) -> None:
+    with pytest.raises(InputError, match="unit"):
+        parse_quantity(text, "V*s/rad")
+
+
+def test_words_may_stand_in_the_plural_and_leave_no_trace() -> None:
+    assert parse_quantity("3 kilograms", "kg") == 3.0
+    assert parse_quantity("3 N", "N") == 3.0
+    assert parse_quantity("2 ohms", "ohm") == 2.0
+    assert parse_quantity("5 millivolts", "V") == 5e-3
+
+
+@pytest.mark.parametrize("unit", ["Tm^6*Tm^6*Tm^6*Tm^6*Tm^6", "pm^6*pm^6*pm^6*pm^6*pm^6"])
+def test_a_unit_beyond_the_range_of_floats_is_refused(unit: str) -> None:
+    with pytest.raises(InputError, match="range of floats"):
+        parse_quantity(f"1 {unit}", "m")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_unit_is_the_product_of_its_parts_rounded_once(seed: int) -> None:
+    """Against exact arithmetic: random products of powers, in any spelling of the signs."""
+    draw = random.Random(seed)
+    known = {
+        "mN": ("1e-3", (1, 1, -2)), "km": ("1e3", (0, 1, 0)), "min": ("60", (0, 0, 1)),
+        "g": ("1e-3", (1, 0, 0)),
+        "ft": ("0.3048", (0, 1, 0)), "uJ": ("1e-6", (1, 2, -2)), "lb": ("0.45359237", (1, 0, 0)),
+    }  # fmt: skip
+    text, exact, powers = "1", Fraction(1), [0, 0, 0]
+    for _ in range(draw.randrange(1, 7)):
+        name, power, sign = draw.choice(list(known)), draw.choice((-3, -1, 1, 2, 5)), draw.choice("*/ ")
+        factor, own = known[name]
+        text += f"{sign}{name}^{power}"
+        way = -power if sign == "/" else power
+        exact *= Fraction(factor) ** way
+        powers = [a + way * b for a, b in zip(powers, own, strict=True)]
+    found = parse_unit(text)
+    assert found.factor == float(exact)
+    there = dict(found.dimension)
+    assert [there.get(key, 0) for key in ("[mass]", "[length]", "[time]")] == powers
 
 
 def test_scaling_by_a_large_factor_is_a_product() -> None:

@@ -15,17 +15,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from random_drives import random_drive
+from random_drives import random_drive, random_elastic_drive
 
-from actuator_lti import assemble_loops, load_design
+from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, Instruments
+from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.blocks import Block
+from actuator_lti.loops.periodic import point_blocks
+from actuator_lti.loops.result import Loop
+from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
-from nonlinear._kernels import layout as at
 from nonlinear.export import linear, linear_limiters
 from nonlinear.export.c_files import exported
-from nonlinear.parameters import design_row
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
 STAGES = {
@@ -36,10 +39,6 @@ ANGLES = np.geomspace(1e-2, 3.1, 40)  # rad per sample; below, z I - A of the li
 FURTHEST_DB = 200.0  # a crossing further off than this is where rounding makes the phase
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-
-
-def rigid(design: Design) -> bool:
-    return bool(design_row(design)[at.ELASTIC_DRIVE] <= 0.0)
 
 
 def in_node(designs: list[Design], folder: Path) -> list[dict[str, Any]]:
@@ -69,10 +68,6 @@ def figures_agree(design: Design, ours: dict[str, Any]) -> int:
     """Compare every figure of every loop; the number of loops compared."""
     theirs, count = linear_figures(Population(design, {}, 1)), 0
     for loop in theirs.loops:
-        if ours[loop]["n"] == linear.PERIODIC:
-            assert design.controller.velocity is not None
-            assert design.controller.velocity.every > 1
-            continue
         assert ours[loop]["n"] > 0
         got = numbers(ours[loop]["figures"])
         wanted = [float(theirs.quantity(name, loop)[0]) for name in LOOP_QUANTITIES]
@@ -81,9 +76,36 @@ def figures_agree(design: Design, ours: dict[str, Any]) -> int:
             if name == "gain_margin" and max(abs(a), abs(b)) > FURTHEST_DB:
                 continue
             same = a == b or (math.isnan(a) and math.isnan(b))
-            assert same or a == pytest.approx(b, rel=1e-9, abs=1e-9), (design.name, loop, name)
+            least = 1e-7 if name == "overshoot" else 1e-9  # of the final value, in percent
+            assert same or a == pytest.approx(b, rel=1e-9, abs=least), (design.name, loop, name)
         count += 1
     return count
+
+
+def around_once(blocks: list[Block], z: complex) -> complex:
+    """L = T/S of the fundamental, the periodic motion under a sinusoid found over one period (n states)."""
+    closed = [block.feedback() for block in blocks]
+    n = closed[0].A.shape[0]
+    gone, driven = np.eye(n), np.zeros((n, 1), dtype=complex)
+    for m, each in enumerate(closed):
+        gone, driven = each.A @ gone, each.A @ driven + each.B * z**m
+    x = np.linalg.solve(z ** len(closed) * np.eye(n) - gone, driven)
+    total = 0.0j
+    for m, each in enumerate(closed):
+        total += (each.C @ x)[0, 0] / z**m
+        x = each.A @ x + each.B * z**m
+    T = total / len(closed)
+    return complex(T / (1.0 - T))
+
+
+def wanted_response(design: Design, name: str, loop: Loop) -> np.ndarray:
+    """L at the angles; of a periodic loop without the many states of its fundamental, which lose digits."""
+    z = np.exp(1j * ANGLES)
+    if not loop.periodic:
+        return np.asarray(loop.open_loop(z))
+    wired = wire(design)
+    blocks = stage_blocks(wired, name) if name in LOOPS else point_blocks(wired, name)
+    return np.array([around_once(blocks, each) for each in z])
 
 
 def responses_agree(design: Design, ours: dict[str, Any]) -> None:
@@ -93,18 +115,15 @@ def responses_agree(design: Design, ours: dict[str, Any]) -> None:
     for name in STAGES:
         known, system = ours[name], systems.get(name)
         if known["n"] <= 0:
-            assert (
-                known["n"] == linear.PERIODIC
-                or system is None
-                or (name == "w_ref" and loops.position is None)
-            )
+            assert system is None or (name == "w_ref" and loops.position is None)
             continue
         assert system is not None
         assert known["period"] == pytest.approx(system.period_s, rel=1e-12)
         pairs = numbers(known["response"]).reshape(-1, 2)
-        wanted = system.open_loop(np.exp(1j * ANGLES))
+        wanted = wanted_response(design, name, system)
         got = pairs[:, 0] + 1j * pairs[:, 1]
-        rounding = 1e-14 * np.abs(wanted).max()  # of the level: what is left beside a zero at Nyquist
+        # of the level: what is left beside a zero at Nyquist; a stiff spring's torque is a difference
+        rounding = (1e-14 if design.coupling is None else 1e-12) * np.abs(wanted).max()
         assert (np.abs(got - wanted) <= 1e-9 * np.abs(wanted) + rounding).all(), (design.name, name)
 
 
@@ -129,8 +148,8 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
 
 
 def test_shipped_designs(tmp_path: Path) -> None:
-    designs = [design for name in shipped_designs() if rigid(design := load_design(name))]
-    assert len(designs) >= 4
+    designs = [load_design(name) for name in shipped_designs()]
+    assert any(design.coupling for design in designs)
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         assert figures_agree(design, ours) > 0
         responses_agree(design, ours)
@@ -156,17 +175,35 @@ def test_drives_without_outer_stages(tmp_path: Path) -> None:
         assert limiters_agree(design, ours) > 0
 
 
+def agree_with_the_linear_form(designs: list[Design], folder: Path) -> tuple[int, int]:
+    """Compare all there is; the numbers of loops and of limiters compared."""
+    found = in_node(designs, folder)
+    loops = sum(figures_agree(design, ours) for design, ours in zip(designs, found, strict=True))
+    limiters = 0
+    for design, ours in zip(designs, found, strict=True):
+        responses_agree(design, ours)
+        limiters += limiters_agree(design, ours)
+    return loops, limiters
+
+
 def test_random_drives(tmp_path: Path) -> None:
     """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
     made = (random_drive(np.random.default_rng(seed)) for seed in range(40))
-    designs = [replace(design, instruments=Instruments()) for design in made if rigid(design)]
-    result = in_node(designs, tmp_path)
-    assert sum(figures_agree(design, ours) for design, ours in zip(designs, result, strict=True)) > 60
-    compared = 0
-    for design, ours in zip(designs, result, strict=True):
-        responses_agree(design, ours)
-        compared += limiters_agree(design, ours)
-    assert compared > 40
+    designs = [replace(design, instruments=Instruments()) for design in made]
+    loops, limiters = agree_with_the_linear_form(designs, tmp_path)
+    assert loops > 70
+    assert limiters > 40
+
+
+def test_random_elastic_drives(tmp_path: Path) -> None:
+    """Couplings with play, damping and friction behind them, friction maps, or both."""
+    made = (random_elastic_drive(np.random.default_rng(seed)) for seed in range(30))
+    designs = [replace(design, instruments=Instruments()) for design in made]
+    assert sum(design.coupling is not None for design in designs) > 10
+    assert sum(bool(design.friction.points) for design in designs) > 10
+    loops, limiters = agree_with_the_linear_form(designs, tmp_path)
+    assert loops > 50
+    assert limiters > 20
 
 
 def test_unstable_drives_are_called_so(tmp_path: Path) -> None:
@@ -190,3 +227,53 @@ def test_unstable_drives_are_called_so(tmp_path: Path) -> None:
             assert (numbers(ours[loop]["figures"])[-1] == 1.0) == verdicts[-1]
     assert not all(verdicts)
     assert any(verdicts)
+
+
+def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path: Path) -> None:
+    """The certified search of the command line reads the same margins from the same fundamental."""
+    designs = [load_design("ilr33-amber-multirate"), load_design("joint")]
+    for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
+        loop = assemble_loops(design).break_points["i_ref"]
+        assert loop.periodic
+        wanted = stability_margins(loop.open_loop)
+        got = dict(zip(LOOP_QUANTITIES, numbers(ours["i_ref"]["figures"]), strict=False))
+        assert got["gain_margin"] == pytest.approx(wanted.gain_margin_db, rel=1e-9)
+        assert got["phase_margin"] == pytest.approx(wanted.phase_margin_deg, rel=1e-9)
+        assert got["delay_margin"] == pytest.approx(wanted.delay_margin_s, rel=1e-9)
+        assert got["modulus_margin"] == pytest.approx(wanted.modulus_margin, rel=1e-9)
+
+
+def unstable_inside(seed: int) -> Design:
+    """A current loop far beyond its border that runs 8 to 24 times between two position updates."""
+    rng = np.random.default_rng([seed, 16])
+    design = load_design("ilr33-amber-multirate")
+    control = design.controller
+    assert control.current is not None
+    assert control.velocity is not None
+    assert control.position is not None
+    every = int(rng.choice([4, 6, 8]))
+    return replace(
+        design,
+        controller=replace(
+            control,
+            current=replace(control.current, gain_V_A=control.current.gain_V_A * 10.0 ** rng.uniform(0.6, 2)),
+            velocity=replace(control.velocity, every=every),
+            position=replace(control.position, every=every * int(rng.choice([2, 3]))),
+        ),
+    )
+
+
+def test_where_rounding_decides_no_figure_is_given_as_sure(tmp_path: Path) -> None:
+    """The module doubts at least what `actuator_lti.batch.withheld` withholds, and not everything."""
+    designs = [unstable_inside(seed) for seed in range(16)]
+    doubted = withheld = kept = 0
+    for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
+        theirs = linear_figures(Population(design, {}, 1))
+        for loop in theirs.loops:
+            gone, known = bool(theirs.withheld(loop)[0]), ours[loop]
+            doubt = known["n"] == linear.LOST or bool(known["doubtful"])
+            assert doubt or not gone, loop
+            doubted, withheld, kept = doubted + doubt, withheld + gone, kept + (not doubt)
+    assert withheld > 5
+    assert doubted <= withheld + 3
+    assert kept > 10

@@ -18,7 +18,8 @@ for (const row of given.rows) {
     const count = given.angles.length;
     floats(x.x_at(), count).set(given.angles);
     x.respond(stage, count);
-    found[name] = { n, figures, period: x.period_of(stage), response: plain(floats(x.y_at(), 2 * count)) };
+    const doubtful = x.doubtful(stage);
+    found[name] = { n, doubtful, figures, period: x.period_of(stage), response: plain(floats(x.y_at(), 2 * count)) };
   }
   const count = given.angles.length;
   floats(x.x_at(), count).set(given.angles);

@@ -7,7 +7,10 @@ one printable line. Everything else is a find: it is kept in --keep and named; e
 from __future__ import annotations
 
 import argparse
+import atexit
+import os
 import random
+import shutil
 import signal
 import sys
 import tempfile
@@ -18,6 +21,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -49,27 +53,43 @@ def attack(target: Target, seed: int, number: int) -> Find | None:
     """Try input ``number`` of a target."""
     draw = random.Random(f"{seed}/{target.name}/{number}")
     data = target.fault(draw.choice(target.seeds), draw)
-    with tempfile.TemporaryDirectory(prefix="fuzz-") as folder:
-        path = Path(folder) / f"input{target.suffix}"
-        path.write_bytes(data)
-        try:
-            with limited(), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                target.attack(path)
-        except InputError as error:
-            line = str(error)
-            if line.isprintable() and len(line) < 2000:
-                return None
-            return Find(target.name, number, "no printable line", repr(line[:300]), data)
-        except NumericalError:
+    path = written(data, target.suffix)
+    try:
+        with limited(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            target.attack(path)
+    except InputError as error:
+        line = str(error)
+        if line.isprintable() and len(line) < 2000:
             return None
-        except TooSlow:
-            return Find(target.name, number, f"more than {LIMIT_S} s", place(sys.exc_info()[1]), data)
-        except Exception as error:  # noqa: BLE001 - whatever it is, it is a find
-            return Find(
-                target.name, number, f"{type(error).__name__}: {str(error)[:300]}", place(error), data
-            )
+        return Find(target.name, number, "no printable line", repr(line[:300]), data)
+    except NumericalError:
+        return None
+    except TooSlow:
+        return Find(target.name, number, f"more than {LIMIT_S} s", place(sys.exc_info()[1]), data)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is a find
+        return Find(target.name, number, f"{type(error).__name__}: {str(error)[:300]}", place(error), data)
     return None
+
+
+@cache
+def own_folder(process: int) -> Path:
+    """A folder of this process, in memory where the system has such a place."""
+    memory = Path("/dev/shm")
+    folder = tempfile.mkdtemp(prefix="fuzz-", dir=memory if os.access(memory, os.W_OK) else None)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def written(data: bytes, suffix: str) -> Path:
+    """A file with these bytes, alone in the folder; what the input before it left there is removed."""
+    folder = own_folder(os.getpid())
+    for name in os.listdir(folder):
+        left = folder / name
+        shutil.rmtree(left) if left.is_dir() and not left.is_symlink() else left.unlink()
+    path = folder / f"input{suffix}"
+    path.write_bytes(data)
+    return path
 
 
 @contextmanager
@@ -114,13 +134,20 @@ def main() -> int:
     words.add_argument("--seed", type=int, default=1)
     words.add_argument("--only", default="", help="part of a target's name")
     words.add_argument("--keep", type=Path, default=Path("out/fuzz"))
+    words.add_argument("--say", type=float, default=60.0, help="seconds between two lines of counters")
     asked = words.parse_args()
     chosen = tuple(target for target in targets() if asked.only in target.name)
     finds: dict[tuple[str, str], Find] = {}
-    done, end = Counter[str](), time.monotonic() + asked.seconds
+    done, begin = Counter[str](), time.monotonic()
+    say, end = begin + asked.say, begin + asked.seconds
     for count, (target, number) in enumerate(rounds(asked.seed, chosen)):
-        if count >= asked.inputs or time.monotonic() > end:
+        now = time.monotonic()
+        if count >= asked.inputs or now > end:
             break
+        if now > say:
+            say = now + asked.say
+            sys.stdout.write(f"seed {asked.seed}, {now - begin:.0f} s: {count} inputs, {len(finds)} finds\n")
+            sys.stdout.flush()
         find = attack(target, asked.seed, number)
         done[target.name] += 1
         if find is not None and (find.what.partition(":")[0], find.where) not in finds:

@@ -19,6 +19,7 @@ SCALARS: list[Any] = [
     None, True, False, 0, 1, -1, 2**63, 1e308, -1e-320, "", "x", "a" * 20_000, "\x1b[0m", "\u202e", [], {}, [[]],
     [None], {"a": 1}, "pass", "fail", "table", "sig:3", "sig:999", "fix:-1", "1979-05-27", "NaN", 10**30,
 ]  # fmt: skip
+_WINDOW = 16_384
 NUMBER = re.compile(rb"(?<![\w.\"])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 QUANTITY = re.compile(rb'"([-+]?\d+\.?\d*(?:[eE][-+]?\d+)?)( [^"\n]*)?"')
 
@@ -66,13 +67,15 @@ def _line_fault(data: bytes, draw: random.Random) -> bytes:
 
 
 def _number_fault(data: bytes, draw: random.Random) -> bytes:
-    """One number scaled, negated or replaced."""
-    result = list(NUMBER.finditer(data)) + list(QUANTITY.finditer(data))
+    """One number scaled, negated or replaced; of a large file, one within a few pages of it."""
+    begin = draw.randrange(len(data) - _WINDOW) if len(data) > _WINDOW else 0
+    part = data[begin : begin + _WINDOW]
+    result = list(NUMBER.finditer(part)) + list(QUANTITY.finditer(part))
     if not result:
         return data
     spot = draw.choice(result)
     group = 1 if spot.re is QUANTITY else 0
-    return data[: spot.start(group)] + _number(spot[group], draw) + data[spot.end(group) :]
+    return data[: begin + spot.start(group)] + _number(spot[group], draw) + data[begin + spot.end(group) :]
 
 
 def _number(text: bytes, draw: random.Random) -> bytes:

@@ -17,11 +17,13 @@ from mutate import damaged, damaged_tree, extreme
 
 from actuator_lti.design import load_design, read_design_text, shipped_designs, with_overrides, write_design
 from actuator_lti.design.loader import design_text
+from actuator_lti.design.model import Design
 from actuator_lti.design.objects import import_objects
 from actuator_lti.design.settings_file import read_settings_toml
 from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.reading import decode
+from analyses.outer_loop_file import read_outer_loop
 from analyses.records import (
     CsvFormat,
     RecordSpec,
@@ -58,7 +60,7 @@ class Target:
     suffix : str
     fault : callable
     share : int
-        Inputs of this target out of some hundred, by what they cost.
+        Inputs of this target in a round, by what they cost: some 100 us of a loader, a second of a command.
     """
 
     name: str
@@ -66,7 +68,7 @@ class Target:
     attack: Callable[[Path], object]
     suffix: str = ".toml"
     fault: Fault = damaged
-    share: int = 40
+    share: int = 500
 
 
 SETTINGS = b'[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
@@ -104,6 +106,10 @@ signals.speed = { column = "n", unit = "rpm" }
 """
 ROWS = b"t,i,n\n" + b"".join(b"%d,%d,%d.5\n" % (k, k * k % 7, 3 * k) for k in range(30))
 KNOWN_ROWS = ROWS.replace(b"t,i,n", b"time_s,current_A,speed_rpm")
+AROUND = (
+    b'{"num": [1.5, 2], "den": [0.1, 1.0, 3], "dt": 0, "sampling_period": 0.01, "sign": -1, "name": "a"}',
+    b'{"A": [[0.9, 0.1], [0.0, 0.8]], "B": [[0], [1]], "C": [[1, 0]], "D": [[0]], "dt": 0.001}',
+)
 SUMMARY = b'{"history": {"id": "x", "nights": 3, "approvals": 1}}'
 SPEC = RecordSpec(
     format=CsvFormat(),
@@ -115,6 +121,12 @@ SPEC = RecordSpec(
 )
 
 
+@cache
+def base() -> Design:
+    """What overrides and settings are for."""
+    return load_design("ilr33-amber")
+
+
 def design_round(path: Path) -> None:
     design = load_design(path)
     assert read_design_text(write_design(design)).name == design.name
@@ -122,15 +134,15 @@ def design_round(path: Path) -> None:
 
 def override(path: Path) -> None:
     key, _, value = path.read_bytes().decode("utf-8", "replace").partition("=")
-    with_overrides(load_design("ilr33-amber"), {key: value})
+    with_overrides(base(), {key: value})
 
 
 def settings(path: Path) -> None:
-    import_objects(read_settings_toml(decode(path.read_bytes(), "f"), "f"), load_design("ilr33-amber"))
+    import_objects(read_settings_toml(decode(path.read_bytes(), "f"), "f"), base())
 
 
 def settings_xml(path: Path) -> None:
-    import_objects(read_settings_xml(decode(path.read_bytes(), "f"), "f"), load_design("ilr33-amber"))
+    import_objects(read_settings_xml(decode(path.read_bytes(), "f"), "f"), base())
 
 
 def record(path: Path) -> None:
@@ -140,11 +152,14 @@ def record(path: Path) -> None:
 
 def report(path: Path) -> None:
     from reports.document import dumps, load
+    from reports.html import page
     from reports.pdf.printable import printable
 
     made = load(path)
     dumps(made)
     printable(made)
+    own = {"name": "d", "revision": "1"}, dict.fromkeys(("version", "time", "commit", "design_hash"))
+    page({**made, "design": own[0], "provenance": own[1], "live": None})  # as --include puts it into another
 
 
 def history(path: Path) -> None:
@@ -200,8 +215,17 @@ def small_report() -> bytes:
     )
     curve = {"label": "k", "x": [1.0, 2.0, None], "y": [0.0, -3.0, 1.0], "style": "points"}
     drawn = {"series": [curve], "x_label": "x", "y_label": "y", "levels": [{"y": 1.0, "label": "l"}]}
+    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "passed": True}
+    glance = {
+        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "passed": True},
+        "loops": [{
+            "loop": "Position", "anchor": "a", "stable": {"text": "yes", "status": "pass"},
+            "figures": [{"label": "Gain margin", "value": 7.5, "unit": "dB", "format": "fix:2", **near}],
+        }],
+        "findings": [{"severity": "warn", "text": "t", "where": "one"}],
+    }  # fmt: skip
     blocks = [
-        doc.table("T", columns, rows, "n"), doc.text("x\n\ny"), doc.facts([doc.fact("l", 3.5, "m")]),
+        glance, doc.table("T", columns, rows, "n"), doc.text("x\n\ny"), doc.facts([doc.fact("l", 3.5, "m")]),
         doc.verdicts([verdict]), doc.details("more", [doc.text("z"), doc.table("U", columns, [])]),
         doc.figure("curves", drawn, caption="c", alt="a"),
     ]  # fmt: skip
@@ -289,29 +313,30 @@ def targets() -> tuple[Target, ...]:
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
     return (
         Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),
-               lambda p: parse_quantity(p.read_bytes().decode("utf-8", "replace"), "N*m"), share=150),
-        Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override),
-        Target("design", designs, design_round, share=60),
-        Target("extreme design", designs, design_round, fault=extreme, share=60),
-        Target("settings", (SETTINGS,), settings),
-        Target("settings xml", (xml_seed(),), settings_xml, ".xml"),
-        Target("study", (STUDY,), lambda p: read_study(str(p)), share=20),
-        Target("campaign", (CAMPAIGN,), load_campaign),
-        Target("record file", (RECORD,), record),
-        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
-        Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
-        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
-        Target("parquet", (parquet_file(),), lambda p: read_parquet_record(p, SPEC), ".parquet"),
-        Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),
+               lambda p: parse_quantity(p.read_bytes().decode("utf-8", "replace"), "N*m"), share=1500),
+        Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override, share=200),
+        Target("design", designs, design_round, share=200),
+        Target("extreme design", designs, design_round, fault=extreme, share=200),
+        Target("settings", (SETTINGS,), settings, share=1000),
+        Target("settings xml", (xml_seed(),), settings_xml, ".xml", share=1000),
+        Target("study", (STUDY,), lambda p: read_study(str(p)), share=200),
+        Target("campaign", (CAMPAIGN,), load_campaign, share=1000),
+        Target("record file", (RECORD,), record, share=800),
+        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv", share=600),
+        Target("record by itself", (KNOWN_ROWS,), open_record, ".csv", share=600),
+        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat", share=1500),
+        Target("parquet", (parquet_file(),), lambda p: read_parquet_record(p, SPEC), ".parquet", share=800),
+        Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv", share=800),
         Target("samples", (b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n",),
-               lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv"),
-        Target("report", (small_report(),), report, ".json", tree_fault),
-        Target("site", (SUMMARY,), summary, ".json", tree_fault),
-        Target("history", (history_file(),), history, ".sqlite", share=10),
-        Target("cache entry", (entry_file(),), entry, ".entry"),
-        Target("command margins", designs, command(*linear), fault=extreme, share=3),
-        Target("command simulate", designs, command(*move), fault=extreme, share=3),
-        Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme, share=3),
+               lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv", share=600),
+        Target("outer loop", AROUND, read_outer_loop, ".json", tree_fault, share=1000),
+        Target("report", (small_report(),), report, ".json", tree_fault, share=600),
+        Target("site", (SUMMARY,), summary, ".json", tree_fault, share=1000),
+        Target("history", (history_file(),), history, ".sqlite", share=100),
+        Target("cache entry", (entry_file(),), entry, ".entry", share=1000),
+        Target("command margins", designs, command(*linear), fault=extreme, share=1),
+        Target("command simulate", designs, command(*move), fault=extreme, share=4),
+        Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme, share=4),
         Target("command pdf", (small_report(),), command("pdf", "FILE", "--out", "FOLDER/x.pdf"), ".json",
-               tree_fault, share=2),
+               tree_fault, share=3),
     )  # fmt: skip

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
 import ssl
+import warnings
 from pathlib import Path
 
 import pytest
@@ -79,6 +81,20 @@ def test_the_local_cluster_opens_no_door() -> None:
         with pytest.raises((OSError, TimeoutError)):
             distributed.Client(plain, timeout=2)
         assert not answers(address)
+
+
+def test_two_local_clusters_do_not_ask_for_the_same_port() -> None:
+    with socket.socket() as taken:
+        with contextlib.suppress(OSError):  # somebody else has it: as good
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            before = set(listening())
+            with engine._local_cluster(1), engine._local_cluster(1):
+                doors = set(listening()) - before
+                assert {ip for ip, _ in doors} == {"127.0.0.1"}
+                assert [page for _, port in doors for page in pages(port)] == []
 
 
 def test_items_come_back_whole_and_an_error_goes_its_way() -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from margin_families import FAMILIES, Loop, near_the_border
+from margin_families import FAMILIES, Loop, near_the_border, over_twelve_decades
 from margin_truth import determined, difference, towards_the_border, truth_of
 
 from actuator_lti.margins import StabilityMargins, stability_margins
@@ -75,6 +75,20 @@ def test_a_pole_that_8_ulp_carry_over_the_border_is_not_said_to_be_on_it(k: int)
         if m.evidence == "withheld":
             assert "over the border" in m.evidence_reason
             assert m.agreement.unstable_poles is None
+
+
+@pytest.mark.parametrize(
+    ("k", "use"), [(2000178, 1), (2000625, 1), (2002044, 1), (2001516, 1), (1002855, 2), (1006074, 2)]
+)
+def test_zeros_far_from_the_poles_hide_nothing(k: int, use: int) -> None:
+    rng = np.random.default_rng([k, use])
+    loop = over_twelve_decades(rng)
+    m, answer = stability_margins(loop), truth_of(loop)
+    assert difference(m, answer, 1.0, 1e-6) is None
+    v = np.array([0.0, *np.geomspace(1e-8, 1e8, 40_001)])  # a grid from above
+    L = np.polyval(loop.num[0][0], 1j * v) / np.polyval(loop.den[0][0], 1j * v)
+    assert m.modulus_margin is not None
+    assert m.modulus_margin <= np.abs(1.0 + L).min() * (1.0 + 1e-9)
 
 
 def unlike(m: StabilityMargins, exact: StabilityMargins) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import typer
 
 from actuator_lti.errors import InputError, NumericalError
 from reports.cli import errors
-from reports.cli.app import PANELS
+from reports.cli.app import PANELS, build
 from reports.cli.main import main
 
 
@@ -43,6 +44,16 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"│ {name} " in words for name in wanted)
 
 
+def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
+    todo, docs = [typer.main.get_command(build())], {}
+    for command in todo:
+        todo.extend(getattr(command, "commands", {}).values())
+        said = [command.help or "", *(getattr(parameter, "help", "") or "" for parameter in command.params)]
+        docs[command.name] = re.findall(r"(?<!\\)\[[a-z_. ]+\]", " ".join(said))
+    assert len(docs) > 20
+    assert not any(docs.values()), docs
+
+
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("actuator-lti ")
@@ -51,11 +62,22 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_starting_up_imports_nothing_heavy() -> None:
     code = (
         "import sys, typer.main; from reports.cli.app import build; typer.main.get_command(build());"
-        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pint', 'pydantic', 'pandas'};"
+        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pydantic', 'pandas'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("words", [["margins", "ilr33-amber"], ["stiffness", "ilr33-amber", "--json"]])
+def test_linear_figures_wait_for_no_plotting_library(words: list[str]) -> None:
+    code = (
+        f"import sys; from reports.cli.main import main; main({words!r});"
+        "heavy = {'control', 'matplotlib', 'scipy.signal', 'scipy.stats', 'numba', 'pandas', 'dask'};"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:

@@ -97,6 +97,14 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("format", ["sig:0", "short:0", "ms:0", "sig", "fix:99", "sig:3x", ""])
+def test_a_column_that_no_number_can_be_written_by_is_refused(format: str) -> None:
+    table = doc.table("T", [doc.column("a", "A", format=format)], [{"a": 1.5}])
+    content = json.dumps(made(sections=[doc.section("x", "X", [table])]))
+    with pytest.raises(InputError, match=r"columns\[1\].format"):
+        doc.loads(content, "some.json")
+
+
 def test_numbers_carry_their_digits_and_a_true_minus() -> None:
     assert significant(0.00099996, 3) == "0.00100"
     assert significant(999_999.6, 3) == "1.00×10⁶"

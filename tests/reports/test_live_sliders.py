@@ -11,60 +11,29 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from built_report import HOSTILE
+from live_page import FIGURES, agree, command_line, opened, read, saved, settled, type_value, written
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
-from reports.build import design_report
 from reports.cli.app import build
-from reports.document import dumps, loads
-from reports.html import page as page_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 DESIGN = "ilr33-amber"
-FIGURES = {  # of the page: of `margins --json`
-    "gain_margin": "gain_margin_db",
-    "phase_margin": "phase_margin_deg",
-    "delay_margin": "delay_margin_s",
-    "sensitivity_peak": "sensitivity_peak_db",
-    "bandwidth": "bandwidth_hz",
-    "overshoot": "overshoot_percent",
-    "settling_time": "settling_time_s",
-}
-
-
-def written(design: Design, folder: Path) -> Path:
-    """Write the page of a design without validation."""
-    path = folder / "page.html"
-    path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written(load_design(DESIGN), tmp_path_factory.mktemp("sliders"))
-
-
-def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:
-    """Open a page from disk, offline; complaints and requests are collected."""
-    chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
-    page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
-    own = path.as_uri()
-    page.on("console", lambda message: trouble.append(message.text))
-    page.on("pageerror", lambda error: trouble.append(str(error)))
-    page.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != own else None)
-    page.goto(own + fragment)
-    page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
-    return page
 
 
 @pytest.fixture
@@ -74,54 +43,6 @@ def page(browser: Browser, made: Path) -> Iterator[Page]:
     yield result
     result.context.close()
     assert trouble == []
-
-
-def settled(page: Page, act: Any) -> None:
-    """Do something and wait until the page has followed."""
-    count = page.get_attribute("#hands-on", "data-count")
-    act()
-    page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def type_value(page: Page, key: str, value: float) -> None:
-    """Type a value, in the unit of the page, into the field of a key."""
-    row = f'.row[data-path="{key}"]'
-    page.eval_on_selector(row, "(node) => { node.closest('details').open = true; }")
-    settled(page, lambda: (page.fill(f"{row} .field", repr(value)), page.press(f"{row} .field", "Enter")))
-
-
-def read(page: Page) -> dict[str, dict[str, float]]:
-    """Read every figure of the page, to all digits."""
-    cells = page.eval_on_selector_all(
-        ".now td[data-figure]",
-        "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
-    )
-    result: dict[str, dict[str, float]] = {}
-    for loop, name, value in cells:
-        result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
-    return result
-
-
-def command_line(path: Path) -> dict[str, Any]:
-    done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
-    assert done.exit_code in (0, 1), done.output
-    loops: dict[str, Any] = json.loads(done.stdout)["loops"]
-    return loops
-
-
-def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
-    for loop, result in loops.items():
-        for name, key in FIGURES.items():
-            if result[key] is not None and math.isfinite(result[key]):
-                assert ours[loop][name] == pytest.approx(result[key], rel=1e-9, abs=1e-9), (loop, name)
-
-
-def saved(page: Page, path: Path) -> Path:
-    with page.expect_download() as waiting:
-        page.click('[data-do="save"]')
-    waiting.value.save_as(path)
-    return path
 
 
 def test_figures_as_designed_and_as_changed_are_the_command_lines(page: Page, tmp_path: Path) -> None:
@@ -152,6 +73,10 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
     assert len(keys) > 25
     for key in keys:
         value = key["value"] * 1.2 if key["value"] else 0.4 * key["high"]
+        if key["whole"]:
+            value = key["value"] + 1.0
+        if key["path"] == "control.velocity.every":  # position.every would be no multiple of it
+            continue
         type_value(page, key["path"], value / key["factor"])
         ours, changed = read(page), with_values(design, {key["path"]: value}, check=False)
         theirs = linear_figures(Population(changed, {}, 1))
@@ -304,9 +229,3 @@ def test_policy_and_size(made: Path) -> None:
     assert "'unsafe-eval'" not in policy
     assert "http" not in policy
     assert len(text.encode()) < 2_500_000
-
-
-def test_a_drive_that_cannot_be_followed_says_why(tmp_path: Path) -> None:
-    text = written(load_design("joint"), tmp_path).read_text(encoding="utf-8")
-    assert "No sliders for this design: The drive train is elastic" in text
-    assert "wasm-unsafe-eval" not in text

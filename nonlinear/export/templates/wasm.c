@@ -74,9 +74,10 @@ typedef struct {
     int n;
     double period;
     double lead;
-    double a[MOST * MOST];
-    double b[MOST];
-    double c[MOST];
+    int doubtful;
+    double a[MOST_STATES * MOST_STATES];
+    double b[MOST_STATES];
+    double c[MOST_STATES];
     double row[COLUMNS];
     double quoted[QUOTED];
 } loop_t;
@@ -86,18 +87,24 @@ static double q[P_MOST];
 static double other_s[S_MOST];
 static double other_io[DRIVE_IO_LENGTH];
 static double places[MOST];
-static double column[2 * MOST];
-static double poles[4 * MOST];
+static double column[2 * MOST_STATES];
+static double blocks[MOST_PHASES * BLOCK];
+static double keep[2 * MOST_PHASES * MOST];
+static double poles[4 * MOST_STATES];
 static double points[POINTS];
 static double stack[DEEPEST];
 static double xs[CAPACITY];
 static double rs[2 * CAPACITY];
 static double ss[2 * CAPACITY];
-static double work[2 * MOST * MOST + 2 * MOST];
-static double state[2 * MOST];
-static double exchanged[MOST];
-static double real[MOST];
-static double imaginary[MOST];
+static double work[2 * MOST_STATES * MOST_STATES + 2 * MOST_STATES];
+static double state[2 * MOST_STATES];
+static double exchanged[MOST_STATES];
+static double real[MOST_STATES];
+static double imaginary[MOST_STATES];
+static double given_a[MOST_STATES * MOST_STATES];
+static double given_b[MOST_STATES];
+static double given_c[MOST_STATES];
+static double lent[MOST_STATES * MOST_STATES];
 static double x[MOST_OUT];
 static double y[2 * MOST_OUT];
 
@@ -107,6 +114,16 @@ EXPORT("out_most") int out_most(void) { return MOST_OUT; }
 EXPORT("figures_at") double *figures_at(int stage) { return loops[stage].quoted; }
 EXPORT("row_at") double *row_at(int stage) { return loops[stage].row; }
 EXPORT("period_of") double period_of(int stage) { return loops[stage].period; }
+/* Whether rounding decides the figures of a loop that was computed. */
+EXPORT("doubtful") int doubtful(int stage) { return loops[stage].doubtful; }
+
+/* Updates of the signal at a cut within one period of the drive in p; 0 where there is no such loop. */
+EXPORT("phases_of") int phases_of(int stage)
+{
+    const int every = drive_interval(p, stage);
+
+    return (every > 0) ? drive_repeats(p, stage) / every : 0;
+}
 EXPORT("lead_of") double lead_of(int stage) { return loops[stage].lead; }
 
 /* Matrices and figures of one loop; its states, or why there are none. */
@@ -118,9 +135,20 @@ static int one(int stage, double lead, int timed)
     for (int k = 0; k < COLUMNS; k += 1) {
         it->row[k] = NAN;
     }
-    const int n = drive_assembled(p, q, other_s, other_io, stage, it->a, it->b, it->c, places, column);
+    int n = drive_assembled(p, q, other_s, other_io, stage, it->a, it->b, it->c, places, column);
+    if (n == PERIODIC) {
+        n = drive_periodic_assembled(
+            p, q, other_s, other_io, stage, blocks, places, column, keep, it->a, it->b, it->c);
+    }
     if (n <= 0) {
         return n;
+    }
+    for (int k = 0; k < n * n; k += 1) {
+        given_a[k] = it->a[k];
+    }
+    for (int k = 0; k < n; k += 1) {
+        given_b[k] = it->b[k];
+        given_c[k] = it->c[k];
     }
     it->lead = lead;
     it->period = drive_interval(q, stage) * q[DRIVE_PERIOD];
@@ -133,6 +161,8 @@ static int one(int stage, double lead, int timed)
             it->a[k * n + k] -= 1.0;
         }
     }
+    it->doubtful = !isnan(lead)
+        && drive_rounding_decides(n, given_a, given_b, given_c, poles, it->row, work, state, lent, column);
     drive_quoted(it->row, it->period, it->quoted);
     it->n = n;
     return n;

@@ -1,0 +1,168 @@
+"""Motion and torque on either side of an elastic coupling, as far as a record and the design tell them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lsim
+
+from actuator_lti.design.model import Design
+from analyses.identification.differentiation import Motion, filtered_motion
+from analyses.identification.dynamic import Recipe
+from analyses.records.record import Record
+
+FloatArray = NDArray[np.float64]
+
+ROUNDS = 4
+"""Rounds in which the sign of the load's speed and its moment are found from the speed itself."""
+NOISE_SHARE = 0.1
+"""Largest share of the coupling's torque that noise of the output encoder may make."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoSides:
+    """Motor and load of a drive with a coupling.
+
+    ``motor`` is the motion at the motor shaft, ``load`` that at the coupling's own shaft. ``torque`` is what
+    the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``; ``friction`` the second
+    term alone. ``told`` says where the load's motion comes from.
+    """
+
+    motor: Motion
+    load: Motion
+    torque: FloatArray
+    friction: FloatArray
+    told: str
+
+
+def two_sides(
+    design: Design, record: Record, place: str, motion: Motion, moment: FloatArray, recipe: Recipe
+) -> TwoSides:
+    """Motor's and load's motion of a record.
+
+    The load turns back at another instant than the motor: its friction and inertia act by its own speed. That
+    is taken from the output's encoder where one is recorded whose noise is small; else the load follows from
+    the motor's motion and the design's coupling, ``J_l dW/dt = k (th/N_c - phi) + c (w/N_c - W) - T_f,load +
+    M/N_r``. Where the output alone is recorded, the motor's motion is that and the twist. Play is in what is
+    recorded only.
+
+    Parameters
+    ----------
+    place : str
+        The signal that ``motion`` comes from.
+    motion : Motion
+        At the motor shaft, as if the coupling were rigid.
+    moment : array
+        At the output, by the design and the record.
+    """
+    behind = design.ratio_behind_coupling
+    if place in ("output_angle", "position", "velocity"):
+        load = _scaled(motion, 1.0 / design.ratio_to_coupling)
+        torque, friction = _of_load(design, load)
+        return TwoSides(
+            motor=_with_twist(design, record, motion, torque - moment / behind, recipe),
+            load=load,
+            torque=torque,
+            friction=friction,
+            told="load's own motion, the motor's by the design's stiffness",
+        )
+    followed = _follows(design, record, motion, moment)
+    measured = _measured(design, record, followed, moment, recipe)
+    load = followed if measured is None else measured
+    torque, friction = _of_load(design, load)
+    told = "load's motion " + ("by the design's coupling" if measured is None else "of the output's encoder")
+    return TwoSides(motor=motion, load=load, torque=torque, friction=friction, told=told)
+
+
+def _of_load(design: Design, load: Motion) -> tuple[FloatArray, FloatArray]:
+    """What the coupling carries without a moment, and the friction behind it alone."""
+    friction = design.load.friction
+    own = np.zeros_like(load.velocity)
+    if friction is not None:
+        own = (
+            friction.dry_torque_Nm * np.sign(load.velocity)
+            + friction.viscous_Nms_rad * load.velocity
+            + friction.offset_torque_Nm
+        )
+    return design.load_side_inertia_kgm2 * load.acceleration + own, own
+
+
+def _measured(
+    design: Design, record: Record, followed: Motion, moment: FloatArray, recipe: Recipe
+) -> Motion | None:
+    """The load's motion by the output's encoder; None without one, or where its noise is too large.
+
+    White noise of rms s over the Nyquist band leaves ``s (2 pi f)^2 sqrt(2 f T/5)`` on the acceleration below
+    the cut-off f.
+    """
+    if "output_angle" not in record.signals:
+        return None
+    angle, period = record["output_angle"], record.period_s
+    behind = design.ratio_behind_coupling
+    made = _filtered(behind * angle, period, recipe)
+    noise = float(np.std(behind * angle - made.position))
+    cutoff = recipe.cutoff_hz
+    rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * period)
+    carried = _of_load(design, followed)[0] - moment / behind
+    small = design.load_side_inertia_kgm2 * rough < NOISE_SHARE * float(np.std(carried))
+    return made if small else None
+
+
+def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray) -> Motion:
+    """The load's motion that the motor's makes through the design's coupling, from rest in the twist."""
+    coupling, friction = design.coupling, design.load.friction
+    assert coupling is not None
+    k, c, inertia = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad, design.load_side_inertia_kgm2
+    driver = _scaled(motion, 1.0 / design.ratio_to_coupling)
+    viscous, dry, offset = 0.0, 0.0, 0.0
+    if friction is not None:
+        viscous, dry = friction.viscous_Nms_rad, friction.dry_torque_Nm
+        offset = friction.offset_torque_Nm
+    if inertia == 0.0:
+        return driver
+    a = np.array([[0.0, 1.0], [-k / inertia, -(c + viscous) / inertia]])
+    b = np.array([[0.0], [1.0 / inertia]])
+    system = (a, b, np.eye(2), np.zeros((2, 1)))
+    time = record.period_s * np.arange(len(moment))
+    pull = k * driver.position + c * driver.velocity + moment / design.ratio_behind_coupling - offset
+    speed = driver.velocity
+    place = driver.position
+    for _ in range(ROUNDS if dry > 0.0 else 1):
+        force = pull - dry * np.sign(speed)
+        rest = force[0] - (c + viscous) * speed[0]
+        _, states, _ = lsim(system, force, time, X0=[rest / k, speed[0]])
+        place, speed = states[:, 0], states[:, 1]
+    rate = (k * (driver.position - place) + c * (driver.velocity - speed) - viscous * speed) / inertia
+    rate += (moment / design.ratio_behind_coupling - offset - dry * np.sign(speed)) / inertia
+    return Motion(position=place, velocity=speed, acceleration=rate)
+
+
+def _with_twist(
+    design: Design, record: Record, motion: Motion, carried: FloatArray, recipe: Recipe
+) -> Motion:
+    """The motor's motion where ``motion`` is the output's: the twist under what the coupling carries."""
+    coupling = design.coupling
+    assert coupling is not None
+    twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * carried
+    extra = _filtered(twist, record.period_s, recipe)
+    return Motion(
+        position=motion.position + extra.position,
+        velocity=motion.velocity + extra.velocity,
+        acceleration=motion.acceleration + extra.acceleration,
+    )
+
+
+def _scaled(motion: Motion, factor: float) -> Motion:
+    return Motion(
+        position=factor * motion.position,
+        velocity=factor * motion.velocity,
+        acceleration=factor * motion.acceleration,
+    )
+
+
+def _filtered(values: FloatArray, period: float, recipe: Recipe) -> Motion:
+    return filtered_motion(
+        values, period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order, points=recipe.points
+    )

@@ -1,0 +1,169 @@
+"""The least change that meets the requirements: the nearest point of what is allowed to the design as it is.
+
+Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares fed forward)
+with every requirement met at every corner of the working set: sequential quadratic programming from the
+design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
+crossover becomes the worst), what it finds is then compared with points drawn from shells of smaller
+changes, and each value is taken back towards home by itself. What is returned meets every corner, or is the
+best compromise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analyses.tuning.problem import Problem
+from analyses.tuning.program import Program, Spent
+from analyses.tuning.solve import ROUNDS, Solution, solve, violated
+
+MET = 1e-6  # relative distance that a requirement keeps, above the rounding of a margin
+DRAWN = 256
+WIDEST = 3.0  # radius of the shells while nothing is known to do: a factor 20 in one gain
+WAY = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.4, 0.7])
+BACK = np.linspace(0.0, 1.0, 17)[1:]
+
+
+def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
+    """The nearest gains that meet every requirement at every corner; the best compromise where none do.
+
+    Parameters
+    ----------
+    problem : Problem
+    give_up : bool
+        Whether to stop where already the nominal design misses a limit.
+    """
+    corners = problem.all_corners
+    found = problem.distances(problem.present[None, :], corners)[0]
+    if found.min() >= 0.0:
+        return Solution(problem.present, float(found.min()), corners[:1])
+    working = np.vstack([corners[:1], violated(found, problem, problem.present, corners, corners[:1])])
+    near = _rounds(problem, None, working)
+    if near is not None and near.slack >= 0.0:
+        return near
+    firm = solve(problem, give_up=give_up)
+    if firm.slack < 0.0:
+        return firm
+    again = _rounds(problem, firm, firm.working)
+    assert again is not None
+    return again if again.slack >= 0.0 else _between(problem, firm, again.gains)
+
+
+def _rounds(problem: Problem, firm: Solution | None, working: np.ndarray) -> Solution | None:
+    """Nearest gains on a working set that grows by the corners that they miss; None where there are none."""
+    corners = problem.all_corners
+    gains = None if firm is None else firm.gains
+    last: Solution | None = None
+    for _ in range(ROUNDS):
+        gains = _nearest(problem, gains, None if firm is None else firm.gains, working)
+        if gains is None:
+            return None
+        found = problem.distances(gains[None, :], corners)[0]
+        last = Solution(gains, float(found.min()), working)
+        fresh = violated(found, problem, gains, corners, working)
+        if last.slack >= 0.0 or not len(fresh) or problem.spent:
+            break
+        working = np.vstack([working, fresh])
+    return last
+
+
+def _nearest(
+    problem: Problem, start: np.ndarray | None, firm: np.ndarray | None, working: np.ndarray
+) -> np.ndarray | None:
+    """Nearest gains to home that meet the working set; those of `firm` are known to. None without any."""
+    rng = np.random.default_rng(1)
+    begins = [row for row in (problem.present, start, firm) if row is not None]
+    best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
+    for _ in range(4):
+        before = np.inf if best is None else float(problem.change(best[None, :])[0])
+        drawn = _nearer(problem, best, _shells(problem, best, rng), working)
+        if drawn is not best and drawn is not None:
+            drawn = _nearer(problem, drawn, _descend(problem, drawn, working), working)
+        if drawn is None:
+            return None
+        best = _taken_back(problem, drawn, working)
+        if problem.change(best[None, :])[0] > 0.999 * before or problem.spent:
+            break
+    return best
+
+
+def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarray:
+    """Minimise the change by sequential quadratic programming; rows from there back to the start."""
+    from scipy.optimize import minimize
+
+    def limits(x: np.ndarray) -> np.ndarray:
+        return problem.distances(problem.values(x), working).reshape(len(x), -1) - MET
+
+    def cost(x: np.ndarray) -> float:
+        return float(problem.change(problem.values(x)[None, :])[0])
+
+    program = Program(problem, limits)
+    low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
+    begin = np.clip(problem.coordinates(start), low, high)
+    met = {"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]}
+    settings = {"maxiter": 60, "ftol": 1e-10}
+    bounds = [*zip(low, high, strict=True)]
+    try:
+        found = minimize(cost, begin, method="SLSQP", bounds=bounds, constraints=met, options=settings).x
+    except Spent:
+        found = program.best if program.seen else begin
+    rows = found + WAY[:, None] * (begin - found)
+    return np.clip(problem.values(np.clip(rows, low, high)), problem.lower, problem.upper)
+
+
+def _nearer(
+    problem: Problem, known: np.ndarray | None, rows: np.ndarray, working: np.ndarray
+) -> np.ndarray | None:
+    """Of some gains the nearest to home that meets the working set, or those known to meet it if nearer."""
+    bound = np.inf if known is None else problem.change(known[None, :])[0]
+    rows = rows[problem.change(rows) < bound]
+    for corners in (working[:1], working[1:]):  # few are left for the corners
+        if len(rows) and len(corners):
+            rows = rows[problem.distances(rows, corners).min(axis=(1, 2)) >= 0.0]
+    if not len(rows):
+        return known
+    found: np.ndarray = rows[int(np.argmin(problem.change(rows)))]
+    return found
+
+
+def _shells(problem: Problem, best: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
+    """Points on shells about home, as many near as far; what costs nothing is drawn near where it is."""
+    home = problem.coordinates(problem.present)
+    here = home if best is None else problem.coordinates(best)
+    size = len(home)
+    free = np.array([item.home is None for item in problem.variables])
+    radius = WIDEST if best is None else float(np.sqrt(problem.change(best[None, :])[0]))
+    aim = rng.standard_normal((DRAWN, size))
+    aim /= np.linalg.norm(np.where(free, 0.0, aim), axis=1, keepdims=True) + 1e-300
+    reach = radius * rng.uniform(size=(DRAWN, 1))
+    rows = np.where(free, here + rng.uniform(-0.7, 0.7, (DRAWN, size)), home + reach * aim)
+    return np.clip(problem.values(rows), problem.lower, problem.upper)
+
+
+def _taken_back(problem: Problem, gains: np.ndarray, working: np.ndarray) -> np.ndarray:
+    """Each value by itself, then all together, as far back home as the working set allows."""
+    home = problem.coordinates(problem.present)
+    size = len(home)
+    for mask in (*np.eye(size, dtype=bool), np.ones(size, dtype=bool)):
+        here = problem.coordinates(gains)
+        rows = problem.values(here + BACK[:, None] * np.where(mask, home - here, 0.0))
+        rows = np.clip(rows, problem.lower, problem.upper)
+        nearer = _nearer(problem, gains, rows, working)
+        assert nearer is not None
+        gains = nearer
+    return gains
+
+
+def _between(problem: Problem, firm: Solution, gains: np.ndarray) -> Solution:
+    """The point nearest to gains on the way from a firm solution to them that meets every corner."""
+    one, other = problem.coordinates(firm.gains), problem.coordinates(gains)
+    low, high = 0.0, 1.0
+    best = firm
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        row = problem.values(one + middle * (other - one))
+        slack = float(problem.distances(row[None, :], problem.all_corners).min())
+        if slack >= 0.0:
+            low, best = middle, Solution(row, slack, firm.working)
+        else:
+            high = middle
+    return best

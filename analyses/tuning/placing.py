@@ -1,0 +1,193 @@
+"""What tuning may add to a velocity loop: a notch, a low-pass, feed-forward; neutral until it is needed.
+
+A placed element starts where it does nothing: a notch of depth 1, a low-pass at the end of the band, no
+feed-forward. Its distance from there is what it costs, in the same measure as a gain (`Variable.change`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import inf, pi, sqrt
+from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
+
+from actuator_lti.design.model import Filter
+from actuator_lti.errors import InputError
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+Element = Literal["notch", "lowpass", "feedforward"]
+ELEMENTS: tuple[Element, ...] = get_args(Element)
+DEEPEST = 0.01  # of a notch, -40 dB
+END_OF_BAND = 0.9  # of the Nyquist frequency of the velocity loop
+SHALLOW = 0.999  # a notch above this depth does nothing
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One number that tuning may choose.
+
+    Attributes
+    ----------
+    path : str
+        Dotted key.
+    start : float
+        Where the search starts, SI.
+    low, high : float
+        Allowed values, SI.
+    home : float or None
+        Value that costs nothing; None where every value does.
+    linear : bool
+        Whether it counts by itself (a share that may be 0), and not by its logarithm.
+    per : str
+        Path of a variable that it is measured against (the width of a notch against its frequency).
+    """
+
+    path: str
+    start: float
+    low: float
+    high: float
+    home: float | None
+    linear: bool = False
+    per: str = ""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A design with neutral elements, and their variables."""
+
+    design: Design
+    variables: tuple[Variable, ...]
+    elements: tuple[Element, ...]
+
+
+def subsets(allowed: tuple[Element, ...]) -> Iterator[tuple[Element, ...]]:
+    """Nothing, then each element alone, then pairs, and so on."""
+    for count in range(len(allowed) + 1):
+        yield from combinations(allowed, count)
+
+
+def checked(design: Design, wanted: tuple[str, ...]) -> tuple[Element, ...]:
+    """What may be placed in a design.
+
+    Raises
+    ------
+    InputError
+        For a word that is none of `ELEMENTS`, or an element that the drive has no place for.
+    """
+    for word in wanted:
+        if word not in ELEMENTS:
+            raise InputError(f"place {word!r}: allowed: {', '.join(ELEMENTS)}")
+        if design.controller.velocity is None:
+            raise InputError(f"place {word}: the design {design.name} has no control.velocity to hold it")
+        if word == "feedforward" and design.controller.position is None:
+            raise InputError(
+                f"place {word}: the design {design.name} has no control.position, whose command it needs"
+            )
+    return tuple(item for item in ELEMENTS if item in wanted)
+
+
+def place(design: Design, elements: tuple[Element, ...]) -> Placed:
+    """A design with neutral elements in its velocity loop."""
+    variables: list[Variable] = []
+    for element in elements:
+        if element == "feedforward":
+            variables += _feedforward(design)
+            continue
+        item, rows = (_notch if element == "notch" else _lowpass)(design)
+        velocity = design.controller.velocity
+        assert velocity is not None
+        filters = (*velocity.filters, item)
+        control = replace(design.controller, velocity=replace(velocity, filters=filters))
+        design = replace(design, controller=control)
+        variables += [replace(v, path=f"control.velocity.filter.{len(filters)}.{v.path}",
+                              per=f"control.velocity.filter.{len(filters)}.{v.per}" if v.per else "")
+                      for v in rows]  # fmt: skip
+    return Placed(design, tuple(variables), elements)
+
+
+def band_rad_s(design: Design) -> tuple[float, float]:
+    """Frequencies that a filter may have: to 90 % of Nyquist of the velocity loop, three decades down."""
+    velocity = design.controller.velocity
+    assert velocity is not None
+    high = END_OF_BAND * pi / (velocity.every * design.controller.period_s)
+    return high / 1000.0, high
+
+
+def resonance_rad_s(design: Design) -> float:
+    """Resonance of motor and load on the coupling, without damping; the middle of the band without one."""
+    low, high = band_rad_s(design)
+    if design.coupling is None:
+        return sqrt(low * high)
+    inverse = 1.0 / design.load_side_inertia_kgm2
+    inverse += 1.0 / (design.motor_side_inertia_kgm2 * design.ratio_to_coupling**2)
+    return float(np.clip(sqrt(design.coupling.stiffness_Nm_rad * inverse), low, high))
+
+
+def _notch(design: Design) -> tuple[Filter, list[Variable]]:
+    low, high = band_rad_s(design)
+    centre = resonance_rad_s(design)
+    item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)
+    return item, [
+        Variable("frequency", centre, low, high, None),
+        Variable("width", 0.5 * centre, 0.02 * low, 4.0 * high, None, per="frequency"),
+        Variable("depth", 1.0, DEEPEST, 1.0, 1.0),
+    ]
+
+
+def _lowpass(design: Design) -> tuple[Filter, list[Variable]]:
+    low, high = band_rad_s(design)
+    item = Filter(kind="lowpass", frequency_rad_s=high)
+    return item, [Variable("frequency", high, low, high, high)]
+
+
+def _feedforward(design: Design) -> list[Variable]:
+    position = design.controller.position_loop
+    found = [("feedforward", position.feedforward)]
+    if design.controller.velocity is not None:
+        found.append(("acceleration_feedforward", position.acceleration_feedforward))
+    return [
+        Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
+        for key, value in found
+    ]
+
+
+def idle(design: Design, placed: Placed) -> Design:
+    """The design without placed filters that came out neutral."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return design
+    added = sum(1 for element in placed.elements if element != "feedforward")
+    if not added:
+        return design
+    kept = velocity.filters[: len(velocity.filters) - added]
+    kept += tuple(f for f in velocity.filters[-added:] if f.kind != "notch" or f.depth < SHALLOW)
+    return replace(design, controller=replace(design.controller, velocity=replace(velocity, filters=kept)))
+
+
+def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
+    """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
+
+    Parameters
+    ----------
+    values : ndarray, shape (candidates, variables)
+        SI.
+
+    Returns
+    -------
+    ndarray, shape (candidates,)
+    """
+    places = {v.path: k for k, v in enumerate(variables)}
+    total = np.zeros(len(values))
+    for k, item in enumerate(variables):
+        if item.per:
+            total += (values[:, k] / values[:, places[item.per]]) ** 2
+        elif item.home is not None and item.linear:
+            total += (values[:, k] - item.home) ** 2
+        elif item.home is not None and item.home < inf:
+            total += np.log(values[:, k] / item.home) ** 2
+    return total

@@ -1,0 +1,79 @@
+"""The drive without anything that is not linear: its row, and its start; emitted only, for the live page.
+
+An elastic drive train is held in contact and slipping forward, torque in the direction of motion ("driving"),
+on the first piece of its friction map: its guards are taken away, so that nothing ends this mode.
+"""
+
+# mypy: disallow-untyped-defs=False
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.elastic_modes import enter_mode, put_output
+from nonlinear.export.entries import emitted, init
+
+CLEARED = np.array([
+    layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.OFFSET, layout.LOAD,
+    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
+    layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION,
+    layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED,
+    layout.CURRENT_START, layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START,
+    layout.VELOCITY_INTEGRATOR_START, layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START,
+    layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH, layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
+    layout.HALF_PLAY, layout.LOAD_DRY, layout.LOAD_OFFSET, layout.TWIST_START, layout.LOAD_SPEED_START,
+    layout.MAP_COUNT, layout.MAP_COUNT_REVERSE,
+])  # fmt: skip
+UNLIMITED = np.array(
+    [layout.SPEED_LIMIT, layout.ACCELERATION_LIMIT, layout.CURRENT_LIMIT, layout.VOLTAGE_LIMIT]
+)
+
+
+@emitted
+def map_slope(p):
+    """Slope of the friction map's first piece for w > 0; the viscous friction without a map."""
+    if p[layout.MAP_COUNT] <= 0.0:
+        return p[layout.VISCOUS]
+    if p[layout.MAP_COUNT] < 2.0:
+        return 0.0
+    at = layout.MAP
+    return (p[at + 3] - p[at + 1]) / (p[at + 2] - p[at])
+
+
+@emitted
+def linear_row(p, q):
+    """Copy the parameters of a run, without anything that is not linear; gravity becomes its slope."""
+    for k in range(layout.SIZE):
+        q[k] = p[k]
+    q[layout.LOAD_SLOPE] += p[layout.GRAVITY] * math.cos(p[layout.GRAVITY_ANGLE])
+    q[layout.VISCOUS] = map_slope(p)
+    for k in range(CLEARED.shape[0]):
+        q[CLEARED[k]] = 0.0
+    for k in range(UNLIMITED.shape[0]):
+        q[UNLIMITED[k]] = math.inf
+    q[layout.VISCOUS_REVERSE] = q[layout.VISCOUS]
+    if p[layout.ELASTIC_DRIVE] <= 0.0 or p[layout.RIGID] > 0.0:  # it acts through |M_ext|
+        q[layout.LOAD_COEFFICIENT] = 0.0
+
+
+@emitted
+def set_off(q, s):
+    """Hold an elastic drive train in its linear mode, its angles those of motor and twist."""
+    if q[layout.ELASTIC_DRIVE] <= 0.0:
+        return
+    s[layout.S_DIRECTION], s[elastic_layout.ES_SEGMENT] = 1.0, 0.0
+    s[elastic_layout.ES_LOAD], s[elastic_layout.ES_CONTACT] = 1.0, 1.0
+    enter_mode(q, s)
+    s[elastic_layout.ES_GUARDS] = 0.0
+    turned = s[layout.S_ANGLE] / q[layout.RATIO_TO_COUPLING]
+    s[elastic_layout.ES_LOAD_ANGLE] = turned - s[elastic_layout.ES_TWIST]
+    put_output(q, s)
+
+
+@emitted
+def at_rest(q, s):
+    """Put the drive at its start, ready to be run as a linear map."""
+    init(q, s)
+    set_off(q, s)

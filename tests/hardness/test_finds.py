@@ -1,0 +1,66 @@
+"""Inputs by which the attack once found something: each is refused in one line now."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from fuzz import attack, written
+from mutate import damaged
+from targets import Target, small_report, targets
+
+from actuator_lti.errors import InputError
+
+BY_NAME = {target.name: target for target in targets()}
+
+
+def refused(name: str, data: bytes) -> str:
+    """What is said of an input."""
+    target = BY_NAME[name]
+    with pytest.raises(InputError) as caught:
+        target.attack(written(data, target.suffix))
+    line = str(caught.value)
+    assert line.isprintable()
+    return line
+
+
+def table_of(made: dict) -> dict:
+    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "table")
+
+
+def glance_of(made: dict) -> dict:
+    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "glance")
+
+
+def test_numbers_of_samples_beyond_floats() -> None:
+    line = refused("samples", b"motor.resistance,motor.inductance\n%b,1e-5\n" % (b"9" * 400))
+    assert "no number" in line
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda made: table_of(made)["columns"][0].update(format="sig:0"), "format"),
+        (lambda made: glance_of(made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
+        (lambda made: table_of(made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
+        (lambda made: table_of(made)["rows"][0].update(b={"text": "x"}), "status"),
+        (lambda made: glance_of(made)["loops"][0].update(stable="yes"), "stable"),
+        (lambda made: glance_of(made)["loops"][0]["stable"].pop("status"), "status"),
+        (lambda made: glance_of(made)["weakest"].pop("words"), "words"),
+        (lambda made: made["provenance"].update(time=3), "time"),
+        (lambda made: made["provenance"].update(commit=[1]), "commit"),
+    ],
+)
+def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
+    made = json.loads(small_report())
+    change(made)
+    assert words in refused("report", json.dumps(made).encode())
+
+
+def test_files_of_the_attack_lie_alone_in_their_folder() -> None:
+    first = written(b"1", ".toml")
+    (first.parent / "more").mkdir()
+    (first.parent / "link").symlink_to("more")
+    second = written(b"2", ".csv")
+    assert [path.name for path in second.parent.iterdir()] == ["input.csv"]
+    assert attack(Target("fine", (b"x",), lambda path: path.read_bytes(), fault=damaged), 1, 1) is None

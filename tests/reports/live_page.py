@@ -1,0 +1,100 @@
+"""What tests do with the sliders of a report's page: open, move, read, save, and ask the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from typer.testing import CliRunner
+
+from actuator_lti.design.model import Design
+from reports.build import design_report
+from reports.cli.app import build
+from reports.document import dumps, loads
+from reports.html import page as page_of
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+FIGURES = {  # of the page: of `margins --json`
+    "gain_margin": "gain_margin_db",
+    "phase_margin": "phase_margin_deg",
+    "delay_margin": "delay_margin_s",
+    "sensitivity_peak": "sensitivity_peak_db",
+    "bandwidth": "bandwidth_hz",
+    "overshoot": "overshoot_percent",
+    "settling_time": "settling_time_s",
+}
+
+
+def written(design: Design, folder: Path) -> Path:
+    """Write the page of a design without validation."""
+    path = folder / "page.html"
+    path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
+    return path
+
+
+def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:
+    """Open a page from disk, offline; complaints and requests are collected."""
+    chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
+    page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
+    own = path.as_uri()
+    page.on("console", lambda message: trouble.append(message.text))
+    page.on("pageerror", lambda error: trouble.append(str(error)))
+    page.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != own else None)
+    page.goto(own + fragment)
+    page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
+    return page
+
+
+def settled(page: Page, act: Any) -> None:
+    """Do something and wait until the page has followed."""
+    count = page.get_attribute("#hands-on", "data-count")
+    act()
+    page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def type_value(page: Page, key: str, value: float) -> None:
+    """Type a value, in the unit of the page, into the field of a key."""
+    row = f'.row[data-path="{key}"]'
+    page.eval_on_selector(row, "(node) => { node.closest('details').open = true; }")
+    settled(page, lambda: (page.fill(f"{row} .field", repr(value)), page.press(f"{row} .field", "Enter")))
+
+
+def read(page: Page) -> dict[str, dict[str, float]]:
+    """Read every figure of the page, to all digits."""
+    cells = page.eval_on_selector_all(
+        ".now td[data-figure]",
+        "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
+    )
+    result: dict[str, dict[str, float]] = {}
+    for loop, name, value in cells:
+        result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
+    return result
+
+
+def command_line(path: Path) -> dict[str, Any]:
+    done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
+    assert done.exit_code in (0, 1), done.output
+    loops: dict[str, Any] = json.loads(done.stdout)["loops"]
+    return loops
+
+
+def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
+    for loop, result in loops.items():
+        for name, key in FIGURES.items():
+            if result[key] is None:  # there is none: the page must not show one
+                assert not math.isfinite(ours[loop][name]), (loop, name)
+            elif math.isfinite(result[key]):
+                assert ours[loop][name] == pytest.approx(result[key], rel=1e-9, abs=1e-9), (loop, name)
+
+
+def saved(page: Page, path: Path) -> Path:
+    with page.expect_download() as waiting:
+        page.click('[data-do="save"]')
+    waiting.value.save_as(path)
+    return path

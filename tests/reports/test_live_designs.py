@@ -1,0 +1,146 @@
+"""Every shipped design has sliders that act on its loops: elastic, with play, multirate, friction map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from live_page import FIGURES, agree, command_line, opened, read, saved, settled, type_value, written
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design import with_values
+from actuator_lti.design.access import parameter_value
+from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design.model import Friction, FrictionPoint
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+CHANGES = {  # in the units of the page; the last restores no design
+    "ilr33-amber": {"control.position.gain": 140.0},
+    "ballscrew": {"coupling.stiffness": 60.0, "coupling.play": 3e-6, "load.inertia": 90.0},
+    "ctms-motor-position": {"control.position.gain": 15.0},
+    "emps": {"control.velocity.gain": 300.0, "encoder.difference_samples": 3},
+    "fin": {"coupling.stiffness": 9000.0, "coupling.damping": 3.0},
+    "ilr33-amber-compliant": {"coupling.stiffness": 300.0, "coupling.play": 0.2},
+    "ilr33-amber-multirate": {"control.velocity.gain": 0.02, "control.position.every": 6},
+    "ilr33-amber-tanh": {"friction.viscous": 2e-6},
+    "joint": {"coupling.stiffness": 40000.0, "load.inertia": 2.0, "limits.peak_current": 11.0},
+}
+
+
+@pytest.fixture(params=sorted(CHANGES))
+def shown(request: pytest.FixtureRequest, browser: Browser, tmp_path: Path) -> Iterator[tuple[str, Page]]:
+    """Open the page of a shipped design."""
+    trouble: list[str] = []
+    page = opened(browser, written(load_design(request.param), tmp_path), trouble)
+    yield request.param, page
+    page.context.close()
+    assert trouble == []
+
+
+def test_no_shipped_design_is_left_out() -> None:
+    assert sorted(CHANGES) == sorted(shipped_designs())
+
+
+def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path: Path) -> None:
+    name, page = shown
+    agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
+    before = read(page)
+    for key, value in CHANGES[name].items():
+        type_value(page, key, value)
+    assert page.inner_text(".state")
+    assert "no multiple" not in page.inner_text(".state")
+    changed = saved(page, tmp_path / "changed.toml")
+    after = read(page)
+    assert after != before
+    agree(after, command_line(changed))
+    for key in CHANGES[name]:
+        assert parameter_value(load_design(changed), key) != parameter_value(load_design(name), key)
+
+
+def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_path: Path) -> None:
+    """Their fundamental has the margins of the command line's; while a value moves the row says so."""
+    design = load_design("ilr33-amber-multirate")
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    type_value(page, "control.current.gain", 2e-2)
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    value = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).keys")
+    factor = next(key["factor"] for key in value if key["path"] == "control.current.gain")
+    changed = with_values(design, {"control.current.gain": 2e-2 * factor}, check=False)
+    wanted = stability_margins(assemble_loops(changed).break_points["i_ref"].open_loop)
+    ours = read(page)["at i_ref"]
+    assert ours["gain_margin"] == pytest.approx(wanted.gain_margin_db, rel=1e-9)
+    assert ours["phase_margin"] == pytest.approx(wanted.phase_margin_deg, rel=1e-9)
+    assert ours["delay_margin"] == pytest.approx(wanted.delay_margin_s, rel=1e-9)
+    assert "fundamental" in page.inner_text('.now th[data-loop="at u"]')
+    page.context.close()
+    assert trouble == []
+
+
+def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path: Path) -> None:
+    """An unstable current loop between slow updates: the command line withholds, so does the page."""
+    design = load_design("ilr33-amber-multirate")
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    key = "control.current.gain"
+    type_value(page, key, 60.0 * float(page.input_value(f'.row[data-path="{key}"] .field')))
+    type_value(page, "control.position.every", 20)
+    file = saved(page, tmp_path / "hot.toml")
+    assert linear_figures(Population(load_design(file), {}, 1)).withheld("position")[0]
+    assert "Stability not known" in page.inner_text(".state")
+    assert "position" not in read(page)
+    assert "stability not known" in page.inner_text("table.now")
+    assert page.get_attribute(".state", "class") == "state fail"
+    page.context.close()
+    assert trouble == []
+
+
+def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path: Path) -> None:
+    design = load_design("ilr33-amber-multirate")
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    row = '.row[data-path="control.velocity.every"]'
+    before = read(page)
+    type_value(page, "control.velocity.every", 3)  # 10 is no multiple of 3
+    assert "no multiple" in page.inner_text(".state")
+    type_value(page, "control.position.every", 9)
+    assert "no multiple" not in page.inner_text(".state")
+    settled(page, lambda: page.locator(f"{row} input[type=range]").press("ArrowLeft"))
+    assert page.input_value(f"{row} .field") == "2"
+    settled(page, lambda: page.locator(f"{row} input[type=range]").press("ArrowRight"))
+    agree(read(page), command_line(saved(page, tmp_path / "odd.toml")))
+    assert read(page) != before
+    page.fill(f"{row} .field", "2.5")
+    page.press(f"{row} .field", "Enter")
+    assert page.get_attribute(f"{row} input[type=range]", "aria-valuetext").strip() == "3"
+    page.context.close()
+    assert trouble == []
+
+
+def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
+    """The loops have the slope of the map's first piece, as the linear form has at rest."""
+    map_Nm = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
+    points = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in map_Nm)
+    design = replace(load_design("ilr33-amber"), name="mapped", friction=Friction(points=points))
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    key = "control.velocity.gain"
+    type_value(page, key, 1.3 * float(page.input_value(f'.row[data-path="{key}"] .field')))
+    file = saved(page, tmp_path / "mapped.toml")
+    theirs = linear_figures(Population(load_design(file), {}, 1))
+    ours = read(page)
+    for loop in theirs.loops:
+        for name in FIGURES:
+            wanted = float(theirs.quantity(name, loop)[0])
+            if math.isfinite(wanted):
+                assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (loop, name)
+    assert "first piece" in page.inner_text("#hands-on")
+    page.context.close()
+    assert trouble == []

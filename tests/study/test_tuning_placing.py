@@ -1,0 +1,200 @@
+"""Tuning: the least change against a dense grid, a requirement only a notch meets, what may be placed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.bandwidth import closed_loop_bandwidth
+from actuator_lti.design.model import (
+    Controller,
+    ControllerObjects,
+    Coupling,
+    Design,
+    Friction,
+    Gear,
+    Limits,
+    Load,
+    Motor,
+    PositionLoop,
+    Requirement,
+    Validation,
+    VelocityLoop,
+)
+from actuator_lti.errors import InputError
+from analyses.tuning import TuningSettings, tune
+from analyses.tuning.objects import allowed_range, step_of_gain
+from analyses.tuning.placing import place
+from analyses.tuning.problem import loop_requirements, problem_of
+
+QUICK = TuningSettings(curve=False, check=False)
+
+
+def need(quantity, minimum=None, maximum=None, loop="velocity", unit="dB"):
+    return Requirement(
+        id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, maximum=maximum, loop=loop
+    )
+
+
+def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
+    """A torque source and a velocity loop; with a stiffness the load hangs on a spring of 1 % damping."""
+    inertia, load = 1e-4, 1e-4
+    coupling = None
+    if stiffness is not None:
+        damping = 0.02 * (stiffness * inertia / 2) ** 0.5
+        coupling = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping)
+    return Design(
+        name="servo", title="", motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
+        gears=(Gear(name="none", ratio=1.0),), coupling=coupling,
+        load=Load(inertia_kgm2=load, path="back-drivable"),
+        friction=Friction(viscous_Nms_rad=1e-4), limits=Limits(voltage_V=10.0),
+        controller=Controller(period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
+                              velocity=VelocityLoop(gain=gain, integral_time_s=integral_time)),
+        validation=Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
+    )  # fmt: skip
+
+
+RESONANT = (
+    0.5 * 1e-4 * (2 * np.pi * 700.0) ** 2
+)  # resonance at 700 Hz, where the delay turns by more than 90 deg
+WIDE = (need("gain_margin", 6.0), need("phase_margin", 30.0, unit="deg"), need("bandwidth", 60.0, unit="Hz"))
+
+
+def direct():
+    """A position loop on the torque itself."""
+    control = replace(servo().controller, velocity=None, position=PositionLoop(gain=1.0))
+    return replace(servo(), controller=control)
+
+
+def seen(design):
+    """What certified margins and the bandwidth say of the velocity loop."""
+    loop = assemble_loops(design).velocity
+    found = stability_margins(loop.open_loop, certify=True)
+    assert found.stable is True
+    width = closed_loop_bandwidth(loop.closed_loop).minus3db_hz
+    return found.gain_margin_db, found.phase_margin_deg, width
+
+
+def test_a_requirement_that_only_a_notch_meets():
+    """No gain does, and with the notch certified margins say that every limit is kept."""
+    design = servo(*WIDE, stiffness=RESONANT)
+    problem = problem_of(design, loop_requirements(design), {})
+    grid = np.geomspace(1e-4, 1.0, 400)[:, None]
+    assert problem.distances(grid, problem.all_corners).min(axis=(1, 2)).max() < 0.0
+    refused = tune(design, QUICK)
+    assert not refused.feasible
+    assert "Cannot be met together" in refused.notes[0]
+    tuned = tune(design, replace(QUICK, place=("notch",)))
+    assert tuned.feasible
+    assert tuned.placed == ("notch",)
+    gain, phase, width = seen(tuned.design)
+    assert (gain >= 6.0, phase >= 30.0, width >= 60.0) == (True, True, True)
+    notch = tuned.design.controller.velocity.filters[-1]
+    assert notch.kind == "notch"
+    assert notch.frequency_rad_s / (2 * np.pi) == pytest.approx(700.0, rel=0.3)
+    assert all(v.passed for v in tuned.confirmed)
+
+
+def test_no_smaller_change_of_two_gains_meets_the_requirements():
+    """Every point of a dense grid over both gains that meets all limits is at least as far away."""
+    asked = (need("bandwidth", 50.0, unit="Hz"), need("phase_margin", 62.0, unit="deg"))
+    design = servo(*asked, gain=0.03, integral_time=0.01)
+    tuned = tune(design, QUICK)
+    assert tuned.feasible
+    gain, time = tuned.design.controller.velocity.gain, tuned.design.controller.velocity.integral_time_s
+    change = np.log(gain / 0.03) ** 2 + np.log(time / 0.01) ** 2
+    assert change > 0.01
+    reach = 1.2 * np.sqrt(change)
+    line = np.linspace(-reach, reach, 61)
+    grid = np.exp(np.array(np.meshgrid(line, line)).reshape(2, -1).T) * [0.03, 0.01]
+    problem = problem_of(design, loop_requirements(design), {})
+    met = problem.distances(grid, problem.all_corners).min(axis=(1, 2)) >= 0.0
+    assert met.any()
+    away = (np.log(grid / [0.03, 0.01]) ** 2).sum(axis=1)
+    assert change <= away[met].min() * (1 + 1e-9)
+    _, phase, width = seen(tuned.design)
+    assert phase >= 62.0
+    assert width >= 50.0
+
+
+def test_a_design_that_meets_all_is_left_as_it_is():
+    design = servo(need("phase_margin", 30.0, unit="deg"))
+    tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
+    assert tuned.feasible
+    assert tuned.placed == ()
+    assert tuned.design.controller == design.controller
+
+
+def test_neutral_elements_change_nothing():
+    """A notch of depth 1 is a factor 1; feed-forward starts at what the design has."""
+    design = servo(stiffness=RESONANT, position=PositionLoop(gain=20.0, feedforward=0.4))
+    placed = place(design, ("notch", "feedforward"))
+    starts = {v.path: v.start for v in placed.variables}
+    assert starts["control.position.feedforward"] == 0.4
+    for name in ("velocity", "position"):
+        before = stability_margins(getattr(assemble_loops(design), name).open_loop)
+        after = stability_margins(getattr(assemble_loops(placed.design), name).open_loop)
+        assert after.gain_margin_db == pytest.approx(before.gain_margin_db, rel=1e-9)
+        assert after.phase_margin_deg == pytest.approx(before.phase_margin_deg, rel=1e-9)
+
+
+def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
+    """A P loop of 80 deg falls by 3 dB far below the velocity loop, which the fed share of the rate reaches."""
+    asked = (
+        need("bandwidth", 60.0, loop="position", unit="Hz"),
+        need("phase_margin", 80.0, loop="position", unit="deg"),
+        need("gain_margin", 15.0),
+    )  # fmt: skip
+    design = servo(*asked, gain=0.1, position=PositionLoop(gain=20.0))
+    assert not tune(design, QUICK).feasible
+    tuned = tune(design, replace(QUICK, place=("feedforward",)))
+    assert tuned.feasible
+    assert tuned.placed == ("feedforward",)
+    position = tuned.design.controller.position
+    assert position.feedforward > 0.0 or position.acceleration_feedforward > 0.0
+
+
+def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
+    """0x2348.01 holds 1 to 250 1/s in whole steps; another drive may have any gain."""
+    baseline = load_design("ilr33-amber")
+    assert baseline.objects.named
+    assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
+    other = replace(baseline, objects=ControllerObjects())
+    assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
+    assert step_of_gain(load_design("joint"), "control.position.gain") is None
+
+
+@pytest.mark.parametrize(("words", "design", "message"), [
+    (("filter",), servo(), "notch, lowpass, feedforward"),
+    (("feedforward",), servo(), "no control.position"),
+    (("notch",), direct(), "no control.velocity"),
+])  # fmt: skip
+def test_what_has_no_place_is_refused(words, design, message):
+    asked = replace(design, requirements=(need("gain_margin", 6.0, loop="every"),))
+    with pytest.raises(InputError, match=message):
+        tune(asked, replace(QUICK, place=words))
+
+
+def test_the_command_places_and_says_so(tmp_path):
+    from typer.testing import CliRunner
+
+    from reports.cli.app import build
+
+    words = [
+        "tune",
+        "fin",
+        "--place",
+        "notch,lowpass",
+        "--aim",
+        "least-change",
+        "--no-curve",
+        "--quiet",
+        "--out",
+    ]
+    done = CliRunner().invoke(build(), [*words, str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "least change" in done.output
+    assert load_design(tmp_path / "tuned.toml").controller.velocity.filters == ()
+    refused = CliRunner().invoke(build(), ["tune", "fin", "--place", "spring", "--quiet"])
+    assert isinstance(refused.exception, InputError)
