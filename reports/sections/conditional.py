@@ -63,7 +63,6 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     return made
 
 
-<<<<<<< HEAD
 def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     """Say what the smallest step that does not settle ends in, and which limit acts."""
     swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
@@ -78,10 +77,7 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     return words
 
 
-def _facts(conditional: Conditional, scale: float, unit: str) -> dict[str, Any]:
-=======
 def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
->>>>>>> main
     threshold = conditional.threshold_rad
     items = [
         doc.fact("Largest step that settles", (threshold or conditional.full_deflection_rad) * scale, unit),

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
+from analyses.limit_cycles import Confirmation
 from analyses.validation.counts import WITHIN, Counts
 from reports import document as doc
+from reports.document_schema import Block, FactItem, Section, Status
 from reports.findings import Finding
 
 NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 
-def section(found: Sequence[Counts], axis: str = "rotary") -> dict[str, Any]:
+def section(found: Sequence[Counts], axis: str = "rotary") -> Section:
     """Make the section: standing error, ripple, limit cycles, and from where the loop is linear."""
     intro = (
         "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(pi A)); for "
@@ -25,7 +26,7 @@ def section(found: Sequence[Counts], axis: str = "rotary") -> dict[str, Any]:
     if cycles:
         blocks.append(_cycles(cycles, axis))
     words = [sentence(one, axis) for one in found]
-    status = "warn" if any(one.resting_rad for one in found) else "info"
+    status: Status = "warn" if any(one.resting_rad for one in found) else "info"
     findings = [
         Finding(severity="warn" if one.resting_rad else "info", text=text, where="counts")
         for one, text in zip(found, words, strict=True)
@@ -50,7 +51,7 @@ def sentence(one: Counts, axis: str) -> str:
     return f"{NAMES[one.sensor]}: counts add {', '.join(words)}; {rests}."
 
 
-def _facts(one: Counts, axis: str) -> list[dict[str, Any]]:
+def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
     items = [
@@ -73,7 +74,7 @@ def _facts(one: Counts, axis: str) -> list[dict[str, Any]]:
     return items
 
 
-def _cycles(cycles: Sequence[tuple[Counts, Any]], axis: str) -> dict[str, Any]:
+def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
     """Foreseen limit cycles beside what the simulator says of them."""
     scale, unit, _ = _units(axis)
     columns = [
