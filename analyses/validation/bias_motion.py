@@ -201,7 +201,7 @@ def _fastest(design: Design, load_Nm: float, share: float) -> BiasMotion | None:
 def _commands_fit(design: Design, motion: BiasMotion) -> bool:
     """Whether commands leave room to the limits: a controller without an integral needs an error."""
     control, limits = design.controller, design.limits
-    wanted: Value = motion.voltage_V
+    wanted = motion.voltage_V
     if control.current is not None:
         loop = control.current
         state = current_state(
@@ -211,14 +211,14 @@ def _commands_fit(design: Design, motion: BiasMotion) -> bool:
             loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
             loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
         )
-        wanted = state.command
+        wanted = float(state.command)
         if abs(wanted) > COMMANDED * limits.peak_current_A:
             return False
     if control.velocity is not None:
         velocity = control.velocity
         integral = velocity.integral_time_s is not None
-        wanted = velocity_state(design, motion, wanted, velocity.gain, integral).command
-        return bool(abs(wanted) <= COMMANDED * limits.speed_rad_s)
+        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
+        return abs(wanted) <= COMMANDED * limits.speed_rad_s
     return True
 
 
