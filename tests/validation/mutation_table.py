@@ -78,8 +78,8 @@ def feedforward(d: Design, x: float) -> Design:
 
 
 def command_filter(d: Design, x: float) -> Design:
-    """A filter of the command, x of a millisecond."""
-    return replace(d, command=replace(d.command, filter_time_s=1e-3 * x))
+    """A filter of the command, x of 10 ms, at least the shortest that there is."""
+    return replace(d, command=replace(d.command, filter_time_s=max(1e-2 * x, 0.4 * d.controller.period_s)))
 
 
 CHANGES: dict[str, Change] = {
@@ -99,7 +99,7 @@ CHANGES: dict[str, Change] = {
     "dry friction": friction("dry_torque_Nm"),
     "breakaway ratio": friction("breakaway_ratio"),
     "feed-forward (absolute)": feedforward,
-    "command filter (of a millisecond)": command_filter,
+    "command filter (of 10 ms)": command_filter,
 }
 LIMITS = {"speed_rad_s": 60.0, "peak_current_A": 1.0, "voltage_V": 3.0, "acceleration_rad_s2": 2e3}
 
