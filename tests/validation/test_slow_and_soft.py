@@ -24,6 +24,7 @@ from actuator_lti.design.model import (
     VelocityLoop,
 )
 from analyses.large_signal.border import check_border
+from analyses.loop_figures import loop_figures
 from analyses.validation.bench import on_the_bench
 from analyses.validation.confirm import confirm_margins, stage_questions
 from analyses.validation.figures import point_errors
@@ -31,6 +32,7 @@ from analyses.validation.response import linear_response
 from analyses.validation.rig import rig, small_rig
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tolerance import allowed
+from reports.sections.margins import margin_row
 from tests.validation.random_drives import full_drive
 
 
@@ -102,3 +104,16 @@ def test_an_arm_that_swings_slowly_on_its_way_to_the_border() -> None:
     assert down.predicted == pytest.approx(by_hand, rel=1e-6)
     assert down.border.value == pytest.approx(by_hand, rel=5e-4)
     assert down.passed
+
+
+def test_an_unstable_loop_shows_no_margins() -> None:
+    """A gain at which the loop would be stable is a crossing, no margin."""
+    design = arm()
+    control = design.controller
+    loud = replace(control, velocity=replace(control.velocity, gain=9.0))
+    loops = assemble_loops(replace(design, controller=loud))
+    row = margin_row(loop_figures(loops.present["velocity"]))
+    assert row["stable"]["text"] == "unstable"
+    shown = {name: value for name, value in row.items() if name not in ("stable", "evidence")}
+    assert all(value is None for value in shown.values())
+    assert margin_row(loop_figures(loops.present["current"]))["gain_margin_db"] is not None
