@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.limiters import onset
-from actuator_lti.loops import Loops
+from actuator_lti.loops import Loops, assemble_loops
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
 from analyses.large_signal.steady_start import linear_steady_state
@@ -21,6 +21,7 @@ from nonlinear import LIMITERS
 FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)
 TOLERANCE = 0.01
+LONG = 0.1  # periods of the lowest tone
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class BorderCheck:
         Relative width of the last interval of the bisection.
     reason : str
         Why it is not judged, if so.
+    left_out : str
+        What the drive was judged without, as it has no single slope; in the loops and in the simulation.
     """
 
     friction_on: bool
@@ -50,6 +53,7 @@ class BorderCheck:
     simulated_limiter: tuple[str, ...]
     resolution: float
     reason: str = ""
+    left_out: str = ""
 
     @property
     def ratio(self) -> np.ndarray:
@@ -97,12 +101,17 @@ def check_border(
     friction_on : bool
         Without dry friction the border is that of the linear loop; with it, the shift is what is asked for.
         Encoder counts are left out together with the friction, and so is the drop of a soft supply, which
-        lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is the
-        overload protection (I2t) in any case: at its border it acts after many of its time constants.
+        lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is an
+        overload protection (I2t) that is slow against the tones: at its border it acts after many of its time
+        constants.
     """
-    design, loops = _at_once(design, loops)
+    left_out = ""
     if not friction_on:
         design = replace(on_the_bench(design), supply=None)
+        left_out = ", ".join([*_bent(design), *_slow(design, loops)])
+        if left_out:
+            design = _straight(design)
+            loops = assemble_loops(_straight(loops.design))  # of what is foreseen, which need not be it
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])
@@ -141,26 +150,47 @@ def check_border(
         tuple(names),
         (tries[1] / tries[0]) ** (0.5**rounds) - 1.0,
         _not_linear(design, friction_on),
+        left_out,
     )
-
-
-def _at_once(design: Design, loops: Loops) -> tuple[Design, Loops]:
-    """Drive and limiters without the overload protection, which acts after minutes at its border."""
-    if "overload" not in loops.limiters:
-        return design, loops
-    limiters = {name: path for name, path in loops.limiters.items() if name != "overload"}
-    return replace(design, limits=replace(design.limits, peak_time_s=None)), replace(loops, limiters=limiters)
 
 
 def _not_linear(design: Design, friction_on: bool) -> str:
     """Say why the border need not be that of the linear loop; empty where it must be."""
     if friction_on:
         return "dry friction shifts the border"
-    left_out = ("dry friction", "offset torque", "friction of the load")
-    parts = [word for word in nonlinear_parts(design) if word not in left_out]
+    parts = _bent(design)
     if not parts:
         return ""
     return f"{', '.join(parts)}: no single linear loop describes the drive"
+
+
+def _bent(design: Design) -> list[str]:
+    """What is not linear beside the limits, and not left out together with dry friction."""
+    left_out = ("dry friction", "offset torque", "friction of the load")
+    return [word for word in nonlinear_parts(design) if word not in left_out]
+
+
+def _slow(design: Design, loops: Loops) -> list[str]:
+    """Protection that averages for longer than a tone is simulated."""
+    limits = design.limits
+    if limits.peak_time_s is None or limits.overload_time_s is None:
+        return []
+    low, _ = frequency_range_hz(design, loops)
+    return ["overload protection"] if limits.overload_time_s * low > LONG else []
+
+
+def _straight(design: Design) -> Design:
+    """The drive without play, gravity, and friction that has no single slope: what is left are its limits."""
+    friction, place, coupling = design.friction, design.controller.position_loop, design.coupling
+    friction = replace(friction, points=(), viscous_reverse_Nms_rad=None, load_coefficient=0.0)
+    return replace(
+        design,
+        friction=friction,
+        load=replace(design.load, gravity=None),
+        coupling=None if coupling is None else replace(coupling, play_rad=0.0),
+        controller=replace(design.controller, position=replace(place, friction_feedforward=0.0)),
+        limits=replace(design.limits, peak_time_s=None),
+    )
 
 
 def _bisect(

@@ -23,6 +23,7 @@ PLACES = {
     "hold_i_ref": "current_command_start",
     "u1": "voltage_start",
 }
+ELASTIC = {"W": "load_speed_start", "twist": "twist_start"}  # in contact; with play nobody knows them
 LEFT_AT_REST = (
     r"W|twist|acc|u\d+",
     r"(?:speed\d*|estimate|torque\d+|command|position|derivative)\..+",
@@ -82,7 +83,9 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     unknown = without_value(system.states, PLACES.keys(), LEFT_AT_REST)
     if unknown:
         raise NumericalError(f"state {unknown[0]} of the linear drive: no start of a run knows it")
-    states = {PLACES[name]: x[:, k] for k, name in enumerate(system.states) if name in PLACES}
+    coupling = loops.design.coupling
+    places = {**PLACES, **ELASTIC} if coupling is not None and coupling.play_rad == 0.0 else PLACES
+    states = {places[name]: x[:, k] for k, name in enumerate(system.states) if name in places}
     if speed:
         row = system.outputs.index("w_ref")
         C, D = phases[0][2], phases[0][3]
@@ -95,18 +98,19 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     return LinearSteadyState(output / loops.design.total_ratio, states, stable, periods * M)
 
 
-def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray) -> None:
+def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:
     """Begin sines far beyond the speed limit on the flank of the triangle that they end in.
 
     A triangle finds its mean only slowly, by a factor of about (x - 1)/(x + 1) each half period; from the
-    right place it need not.  Rows with ``x = w A/R`` below that of a full triangle stay as they are.
+    right place it need not.  Rows with ``x = w A/R`` below that of a full triangle, or not
+    ``limited``, stay as they are.
     """
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):
         return
     rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows.frequency_hz()
     x = omega * amplitude_rad / rate
-    which = np.flatnonzero(x >= FULL_TRIANGLE)
+    which = np.flatnonzero((x >= FULL_TRIANGLE) & limited)
     lag = np.arccos(np.pi / (2.0 * x[which]))
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit

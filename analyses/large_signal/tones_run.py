@@ -15,6 +15,7 @@ from nonlinear.reduced import BatchResult
 
 Progress = Callable[[int, int], None]
 HARMONICS = 3
+BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
 LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
 
 
@@ -51,7 +52,7 @@ def run_tones(
     rows.sine("command", amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
     rows.window(windows, cycles, harmonics)
     start.put(rows, which, start_amplitude_rad)
-    triangle_start(design, rows, amplitude_rad)
+    triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
     rows["load"] = load_Nm
     rows["ticks"] = start.settling_ticks + 2 * windows
     result = rows.run(progress=progress)

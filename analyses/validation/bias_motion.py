@@ -200,7 +200,8 @@ def _fastest(design: Design, load_Nm: float, share: float) -> BiasMotion | None:
 
 def _commands_fit(design: Design, motion: BiasMotion) -> bool:
     """Whether commands leave room to the limits: a controller without an integral needs an error."""
-    control, limits, wanted = design.controller, design.limits, motion.voltage_V
+    control, limits = design.controller, design.limits
+    wanted = motion.voltage_V
     if control.current is not None:
         loop = control.current
         state = current_state(

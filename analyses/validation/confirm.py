@@ -29,6 +29,8 @@ SETTLE_CYCLES = 20
 LONGEST_SETTLE_TICKS = 5_000  # at first; what then contradicts is looked at again
 AGAIN = 16  # times the wait
 LONGEST_AGAIN_TICKS = 100_000
+LONGEST_DRIFT_TICKS = 60_000  # a window is as long as the wait
+WAY, DRIFTING, DIED_DOWN = 12, 1e-9, 5.0  # gains looked at; a pole at 1; time constants
 LONGEST_BLIND_TICKS = 20_000  # nobody knows what to wait for: several of the slowest time constants
 GRID, DIPS = 1000, 6  # frequencies looked at, and how many of the nearest approaches to -1 are refined
 SLOWEST = 1e-4  # of half the sampling frequency: a border below is a drift, no oscillation
@@ -178,7 +180,8 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     ups = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio > 1.0]
     downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
     up, down = min(ups, default=None), max(downs, default=None)
-    result = [_gain(setup, "gain up", up, settle_ticks), _gain(setup, "gain down", down, settle_ticks)]
+    result = [_gain(setup, "gain up", up, settle_ticks, loop)]
+    result.append(_gain(setup, "gain down", down, settle_ticks, loop))
     delay = margins.delay_margin
     if delay is not None and delay.samples is not None and isfinite(delay.samples):
         hertz = delay.frequency_rad_s / (2.0 * pi)
@@ -211,7 +214,7 @@ def point_questions(
         for kind, ratio in (("gain up", exact.gain_upper), ("gain down", exact.gain_lower)):
             there = isfinite(ratio) and ratio > 0.0
             border = (ratio, 2.0 * pi * oscillation_hz(loop, gain=ratio)) if there else None
-            asked = _gain(setup, kind, border, settle_ticks)  # type: ignore[arg-type]
+            asked = _gain(setup, kind, border, settle_ticks, loop)  # type: ignore[arg-type]
             result.append(replace(asked, settles_ticks=max(own, asked.settles_ticks)))
         if exact.delay_s is not None and isfinite(exact.delay_s):
             ticks = exact.delay_s / setup.design.controller.period_s
@@ -248,7 +251,9 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
     return nyquist if at_minus_one <= best.fun else float(np.exp(best.x))
 
 
-def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int) -> Question:
+def _gain(
+    setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int, loop: Any
+) -> Question:
     """A gain margin; where none is predicted within the search range the search looks all the same."""
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
         return Question(_blind(setup, kind, settle_ticks), kind, None, None, settles_ticks=settle_ticks)
@@ -258,10 +263,26 @@ def _gain(setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_
     alternating = [half for half in halves if abs(hertz / half - 1.0) < AT_NYQUIST]
     if hertz <= SLOWEST * min(halves):
         alternating = [0.0]
+        settle_ticks = max(settle_ticks, _on_the_way(loop, ratio, setup.hold_ticks))
     if alternating:
         return Question(_real_pole(setup, kind, settle_ticks, alternating[0]), kind, ratio, alternating[0])
     hertz = min(hertz, 0.97 * 0.5 / setup.period_s)
     return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks)), kind, ratio, hertz)
+
+
+def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
+    """Ticks in which every other mode dies down between the nominal gain and a border where the drive drifts.
+
+    On its way there a loop may swing more slowly than it ever does at its nominal gain, and a window shorter
+    than the swing takes a part of it for growth.
+    """
+    system, slowest = loop.open_loop, 0.0
+    A, B, C, D = (np.asarray(x) for x in (system.A, system.B, system.C, system.D))
+    for gain in np.geomspace(1.0, ratio, WAY)[1:-1]:
+        sizes = np.abs(np.linalg.eigvals(A - gain / (1.0 + gain * D[0, 0]) * B @ C))
+        slowest = max(slowest, float(sizes[sizes < 1.0 - DRIFTING].max(initial=0.0)))
+    samples = DIED_DOWN / -log(slowest) if slowest > 0.0 else 0.0
+    return min(ceil(samples) * hold_ticks, LONGEST_DRIFT_TICKS)
 
 
 def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
@@ -277,7 +298,7 @@ def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
 def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Search:
     """Look for the gain at which a real pole reaches 1 (0 Hz, windows as long as the wait) or -1."""
     window = LEAST_SAMPLES * setup.base_ticks
-    wait = max(min(settle_ticks, LONGEST_BLIND_TICKS), window)
+    wait = max(min(settle_ticks, LONGEST_BLIND_TICKS if at_hz else LONGEST_DRIFT_TICKS), window)
     hertz = 1.0 / ((window if at_hz else wait) * setup.design.controller.period_s)
     return Search(setup, kind, hertz, wait, cycles=1, alternating_hz=at_hz)
 

@@ -75,12 +75,13 @@ def _alone(finite: np.ndarray) -> list[int]:
 def _steps(days: np.ndarray, values: np.ndarray, finite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Give corners of the steps from night to night, NaN in the gaps, long courses thinned."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(int)))
-    x, y = [], []
+    x: list[np.ndarray] = []
+    y: list[np.ndarray] = []
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         kept = begin + _thinned(values[begin:end])
         across, up = np.repeat(days[kept], 2)[1:], np.repeat(values[kept], 2)[:-1]
-        x += [across, [np.nan]]
-        y += [up, [np.nan]]
+        x += [across, np.array([np.nan])]
+        y += [up, np.array([np.nan])]
     return np.concatenate(x), np.concatenate(y)
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
+from analyses.limit_cycles import Confirmation
 from analyses.validation.counts import WITHIN, Counts
 from reports import document as doc
 from reports.document_schema import Block, FactItem, Section, Status
@@ -74,7 +74,7 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
     return items
 
 
-def _cycles(cycles: Sequence[tuple[Counts, Any]], axis: str) -> Block:
+def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
     """Foreseen limit cycles beside what the simulator says of them."""
     scale, unit, _ = _units(axis)
     columns = [

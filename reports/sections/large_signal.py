@@ -95,6 +95,7 @@ def _border_verdict(border: BorderCheck | None) -> VerdictItem:
         return doc.verdict(**common, value=None, distance=None, passed=None, reason=reason)
     same, count = sum(border.same_limiter), len(border.same_limiter)
     reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
+    reason += f"; without {border.left_out}" if border.left_out else ""
     reason += f"; not judged: {border.reason}" if border.reason else ""
     distance = 100.0 * (TOLERANCE - error)
     return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)

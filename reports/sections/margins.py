@@ -134,7 +134,8 @@ def margin_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of the margins to quote."""
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
-        "to 0°; all of them are listed below. A dash means that there is no such crossing. "
+        "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
+        "is not stable and has no margins. "
         "Disk margin: α, balanced (S + T)."
     )
     rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
@@ -190,7 +191,17 @@ class ResponseRow(TypedDict):
 
 
 def margin_row(figures: LoopFigures) -> MarginRow:
-    """Give the margins of one loop by column."""
+    """Give the margins of one loop by column; an unstable loop has none, only the crossings listed below."""
+    m = figures.margins
+    row = _stable_row(figures)
+    if m.stable is not False:
+        return row
+    blank = dict.fromkeys(MarginRow.__annotations__)
+    return cast(MarginRow, {**blank, "stable": row["stable"], "evidence": row["evidence"]})
+
+
+def _stable_row(figures: LoopFigures) -> MarginRow:
+    """Give the figures of one loop by column, whatever they are margins of."""
     m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
     return {

@@ -102,13 +102,25 @@ def test_encoder_counts_are_no_part_of_the_border(amber: Design) -> None:
     assert border.passed
 
 
-def test_viscous_friction_by_direction_is_not_judged() -> None:
+def test_viscous_friction_by_direction_is_left_out_and_said() -> None:
     emps = load_design("emps")
     design = replace(emps, friction=replace(emps.friction, viscous_reverse_Nms_rad=240.0))
     border = check_border(design, assemble_loops(design), count=4)
     assert border is not None
-    assert border.passed is None
-    assert "direction" in border.reason
+    assert border.passed is True
+    assert "direction" in border.left_out
+
+
+def test_the_border_of_a_drive_with_play_is_judged_without_it() -> None:
+    fin = load_design("fin")
+    border = check_border(fin, assemble_loops(fin), count=4)
+    assert border is not None
+    assert border.passed is True
+    assert "play" in border.left_out
+    halved = replace(fin, limits=replace(fin.limits, speed_rad_s=0.5 * fin.limits.speed_rad_s))
+    wrong = check_border(fin, assemble_loops(halved), count=4)
+    assert wrong is not None
+    assert wrong.passed is False
 
 
 def test_friction_shifts_the_border(amber: Design) -> None:

@@ -5,16 +5,34 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.model import Supply
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.design.model import (
+    Controller,
+    CurrentLoop,
+    Design,
+    Friction,
+    Gear,
+    Gravity,
+    Limits,
+    Load,
+    Motor,
+    PositionLoop,
+    Supply,
+    Validation,
+    VelocityLoop,
+)
 from analyses.large_signal.border import check_border
+from analyses.loop_figures import loop_figures
 from analyses.validation.bench import on_the_bench
+from analyses.validation.confirm import confirm_margins, stage_questions
 from analyses.validation.figures import point_errors
 from analyses.validation.response import linear_response
-from analyses.validation.rig import rig
+from analyses.validation.rig import rig, small_rig
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tolerance import allowed
+from reports.sections.margins import margin_row
 from tests.validation.random_drives import full_drive
 
 
@@ -55,3 +73,61 @@ def test_the_border_is_that_of_limits_that_act_at_once() -> None:
     assert all(one is not None and one.passed for one in found)
     np.testing.assert_array_equal(found[0].predicted_rad, found[1].predicted_rad)
     np.testing.assert_array_equal(found[0].simulated_rad, found[1].simulated_rad)
+
+
+def arm() -> Design:
+    """A motor of 28 mN m/A behind 100:1 lifts 2 kg on 0.25 m, upright: gravity pushes it away."""
+    return Design(
+        name="arm",
+        title="An arm held upright",
+        motor=Motor(
+            resistance_ohm=0.386,
+            inductance_H=65.3e-6,
+            torque_constant_Nm_A=27.6e-3,
+            back_emf_constant_Vs_rad=27.6e-3,
+            rotor_inertia_kgm2=36.3e-7,
+        ),
+        gears=(Gear(name="strain-wave", ratio=100.0),),
+        load=Load(
+            inertia_kgm2=0.25, path="back-drivable", gravity=Gravity(mass_kg=2.0, arm_m=0.25, offset_rad=0.0)
+        ),
+        axis="rotary",
+        controller=Controller(
+            period_s=1e-4,
+            computing_delay_s=1e-4,
+            position=PositionLoop(gain=25.0, every=10),
+            velocity=VelocityLoop(gain=0.09, integral_time_s=0.02, every=5),
+            current=CurrentLoop(gain_V_A=0.15, integral_time_s=170e-6),
+        ),
+        limits=Limits(voltage_V=36.0, peak_current_A=15.0),
+        friction=Friction(viscous_Nms_rad=4e-5),
+        validation=Validation(full_deflection_rad=1.0),
+    )
+
+
+def test_an_arm_that_swings_slowly_on_its_way_to_the_border() -> None:
+    """It drifts away below g = c Tn/(N^2 Kp kM), c = m g l, and swings slower than any loop above that."""
+    design = arm()
+    setup = small_rig(design, "velocity")
+    loop = assemble_loops(design).present["velocity"]
+    settle = settling_ticks_of(loop.closed_loop, setup.hold_ticks, design.name)
+    questions = stage_questions(setup, loop, stability_margins(loop.open_loop), settle)
+    (down,) = confirm_margins([one for one in questions if one.kind == "gain down"])
+    by_hand = 2.0 * 9.80665 * 0.25 * 0.02 / (100.0**2 * 0.09 * 27.6e-3)
+    assert down.predicted == pytest.approx(by_hand, rel=1e-6)
+    assert down.border.value == pytest.approx(by_hand, rel=5e-4)
+    assert down.passed
+
+
+def test_an_unstable_loop_shows_no_margins() -> None:
+    """A gain at which the loop would be stable is a crossing, no margin."""
+    design = arm()
+    control = design.controller
+    loud = replace(control, velocity=replace(control.velocity, gain=9.0))
+    loops = assemble_loops(replace(design, controller=loud))
+    row = margin_row(loop_figures(loops.present["velocity"]))
+    assert row["stable"]["text"] == "unstable"
+    shown = {name: value for name, value in row.items() if name not in ("stable", "evidence")}
+    assert all(value is None for value in shown.values())
+    quiet = assemble_loops(design).present["velocity"]
+    assert margin_row(loop_figures(quiet))["gain_margin_db"] is not None
