@@ -15,7 +15,7 @@ from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, Load, PositionLoop
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, moment_slope
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
@@ -173,3 +173,13 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
     }
     for quantity, expected in pairs.items():
         assert figures.quantity(quantity, loop)[k] == pytest.approx(expected, rel=1e-7), quantity
+
+
+def test_gravity_may_differ_from_design_to_design() -> None:
+    """The slope of the load is that of cos at each one's own angle."""
+    joint = load_design("joint")
+    assert joint.load.gravity is not None
+    offsets = np.array([0.1, 1.0, 2.5])
+    many = replace(joint, load=replace(joint.load, gravity=replace(joint.load.gravity, offset_rad=offsets)))
+    expected = joint.load.moment_slope_Nm_rad + joint.load.gravity.peak_Nm * np.cos(0.3 + offsets)
+    assert moment_slope(many, Operating(angle_rad=0.3)) == pytest.approx(expected, rel=1e-14)
