@@ -78,7 +78,7 @@ def _margins(quick: bool) -> Iterator[Row]:
 
 
 def _two_mass(quick: bool) -> Iterator[Row]:
-    """Figures of many compliant drives over those of the rigid one, in processor time, the best of three."""
+    """Figures of many compliant drives over those of the rigid one, processor time, best of three."""
     from actuator_lti import load_design
     from actuator_lti.batch import Population, linear_figures
     from actuator_lti.design import parameter_value
@@ -102,8 +102,7 @@ def _two_mass(quick: bool) -> Iterator[Row]:
             best.append(min(seconds) / count)
         note = f"{1e6 * best[1]:.0f} us a design against {1e6 * best[0]:.0f} us"
         name = f"a two-mass drive over the rigid one, {words}"
-        yield Row(group=GROUP, name=name, measured=best[1] / best[0],
-                  unit="x", target=3.0, note=note)  # fmt: skip
+        yield Row(group=GROUP, name=name, measured=best[1] / best[0], unit="x", target=3.0, note=note)
 
 
 def _difference(figures: Any, loop: str, k: int, truth: Any) -> float:

@@ -180,7 +180,10 @@ def _electrical(design: Design, record: Record) -> Finding | None:
         return None
     if not {"voltage", "current", "speed"} <= set(record.signals):
         return None
-    u, i, w = (_inner(_smooth(record, record[name])) for name in ("voltage", "current", "speed"))
+    u, i, w = (_smooth(record, record[name]) for name in ("voltage", "current", "speed"))
+    if motor.inductance_H is not None:  # of a direct drive as large as the rest
+        u = u - motor.inductance_H * np.gradient(i, record.period_s)
+    u, i, w = (_inner(values) for values in (u, i, w))
     table = np.column_stack([motor.resistance_ohm * i, motor.back_emf_constant_Vs_rad * w])
     size = np.linalg.norm(table, axis=0)
     if not np.all(size > 0.03 * np.linalg.norm(u)) or np.linalg.cond(table / size) > 100.0:

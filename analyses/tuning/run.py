@@ -133,8 +133,9 @@ def tune(
 
 
 def share_of(searched: int, choices: int) -> int:
-    """Designs that the next of some choices may look at: an equal share of what is left, and enough."""
-    return max((MOST_DESIGNS - searched) // choices, MOST_DESIGNS // 5)
+    """Designs that the next of some choices may look at: half of what is left, all of it for the last."""
+    left = MOST_DESIGNS - searched
+    return max(left if choices == 1 else left // 2, MOST_DESIGNS // 12)
 
 
 @dataclass(frozen=True)

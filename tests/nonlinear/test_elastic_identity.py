@@ -20,16 +20,18 @@ RATES = [(1, 1), (2, 10)]
 
 @dataclass(frozen=True)
 class Point:
-    """An operating point: side of the contact (0: gap), moment at the output, total play."""
+    """An operating point: side of the contact (0: gap), moment at the output, total play, load friction."""
 
     name: str
     side: float
     moment_Nm: float
     play_rad: float = 0.02
+    load_coefficient: float = 0.02
 
 
 DRIVING, DRIVEN = Point("driving", 1.0, 0.0), Point("driven", -1.0, 2.0)
 GAP = Point("gap", 0.0, LOAD_DRY + 0.01, 1e3)
+SLIDING = Point("sliding", 1.0, LOAD_DRY, 0.0, 0.0)  # a spring without play: its torque passes zero
 
 
 def variant(point: Point, delay: float, rates: tuple[int, int], **load: float) -> Design:
@@ -46,7 +48,7 @@ def variant(point: Point, delay: float, rates: tuple[int, int], **load: float) -
             velocity=replace(c.velocity, every=rates[0]),
             position=replace(c.position, every=rates[1]),
         ),
-        friction=Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=0.02),
+        friction=Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient),
         load=replace(design.load, friction=LoadFriction(dry_torque_Nm=LOAD_DRY, viscous_Nms_rad=1e-3)),
         coupling=replace(design.coupling, play_rad=point.play_rad),
     )
@@ -98,7 +100,10 @@ def assert_identical(point: Point, delay: float, rates: tuple[int, int]) -> None
     assert run.coupling_torque_Nm is not None
     assert run.events == 0
     assert np.ptp(run.motor_speed_rad_s) > 5.0  # the motion is not trivial
-    assert (point.side * run.coupling_torque_Nm > 0.0).all() or point.side == 0.0
+    if point.play_rad == 0.0:
+        assert np.ptp(np.sign(run.coupling_torque_Nm)) == 2.0
+    else:
+        assert (point.side * run.coupling_torque_Nm > 0.0).all() or point.side == 0.0
     simulated = {
         "th": run.motor_angle_rad,
         "w": run.motor_speed_rad_s,
@@ -131,3 +136,9 @@ def test_driven(delay: float, rates: tuple[int, int]) -> None:
 @pytest.mark.parametrize("delay", DELAYS)
 def test_in_the_gap(delay: float, rates: tuple[int, int]) -> None:
     assert_identical(GAP, delay, rates)
+
+
+@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_sliding_on_a_spring_without_play(delay: float, rates: tuple[int, int]) -> None:
+    assert_identical(SLIDING, delay, rates)
