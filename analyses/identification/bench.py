@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.correlation.driving import command_of
 from analyses.identification.dynamic import FrictionForm, Recipe
 from analyses.identification.electrical import ElectricalFit, electrical_estimate, fit_electrical
 from analyses.identification.following_error import following_item
@@ -119,7 +120,7 @@ def identify_bench(
         start = design_with_estimate(start, electrical_estimate(start, electrical, told))
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
-    model, simulated = _unbiased(start, model, used, settings)
+    model, simulated = _unbiased(start, _with_commands(start, model, used), used, settings)
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
     lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
     items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled, *filter(None, lags))
@@ -162,6 +163,16 @@ def _fitted(
         return fit.model, fit.laws
     model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
     return model, ()
+
+
+def _with_commands(start: Design, model: JointModel, used: Sequence[Record]) -> JointModel:
+    """The model whose records say what their command is used for."""
+    parts = []
+    for part, record in zip(model.records, used, strict=True):
+        command = command_of(start, record)
+        more = {} if command is None else {command.signal: "command of the simulated drive"}
+        parts.append(replace(part, used={**more, **part.used}))
+    return replace(model, records=tuple(parts))
 
 
 def _unbiased(
