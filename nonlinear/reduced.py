@@ -123,11 +123,6 @@ class BatchResult:
         """Fraction of the ticks of the last window that began at rest."""
         return self.outs[:, at.OUT_WINDOW_STICK] / self.rows[:, at.WINDOW]
 
-    def limit_first_s(self, name: str) -> Floats:
-        """First time at which a limiter acted; inf if never."""
-        first = self.outs[:, at.OUT_LIMIT_FIRST + at.LIMITERS.index(name)]
-        return np.where(first < 0.0, np.inf, first * self.rows[:, at.PERIOD])
-
     def extreme(self, signal: str) -> tuple[Floats, Floats]:
         """Minimum and maximum over the run."""
         place = at.OUT_EXTREMES + 2 * at.SIGNALS.index(signal)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = ["OperatingPoint", "Population", "variable_paths"]
 
 Values = Mapping[str, np.ndarray]
-ASKED = ("validation", "failure", "duty")  # sections of what is asked of a drive, which does not vary
 
 
 def variable_paths(design: Design) -> tuple[str, ...]:

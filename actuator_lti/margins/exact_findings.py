@@ -106,18 +106,6 @@ def findings(loop: ExactLoop, merge: bool = False) -> Findings:
     return Findings(loop, tuple(gains), tuple(reals))
 
 
-def accurate(figure: Callable[[], arb | acb]) -> arb | acb:
-    """A figure to the full accuracy of a double, by doubling the precision in which it is worked out."""
-    bits = _FIRST_BITS
-    while bits <= _MOST_BITS:
-        with ctx.workprec(bits):
-            value = figure()
-            if value.rel_accuracy_bits() >= _ACCURATE:
-                return value
-        bits *= 2
-    raise NumericalError("a figure of the loop could not be told from zero")
-
-
 def _end(w: float, N: fmpz, D: fmpz) -> Crossing | None:
     if N == 0 or D == 0 or (N > 0) == (D > 0):
         return None

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from analyses.loop_figures import loop_figures
 from analyses.validation.coherent import coherent
 from analyses.validation.conditional import step_rows
 from analyses.validation.release import full_range
@@ -219,7 +220,6 @@ def _linearity(
 ) -> Floats:
     """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
     from analyses.limit_cycles.foreseen import without_nonlinearities
-    from analyses.loop_figures import loop_figures
     from analyses.validation.response import linear_response
 
     band = loop_figures(loops.present["position"], loops.reference_to_output).bandwidth

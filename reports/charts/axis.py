@@ -14,7 +14,6 @@ import numpy as np
 from reports.numbers import plain_decade, short, to_minus
 
 MARGIN = 0.05
-MAX_SPAN_DECADES = 40.0
 
 
 @dataclass(kw_only=True)

@@ -45,7 +45,6 @@ def run(paths: Sequence[Path], play: Path | None, period_s: float | None, common
 
 def bench(folder: Path, name: str, drive: Design, seed: int, force: bool, as_json: bool) -> None:
     """Write the records of a simulated bench of a compliant drive, and say what to do with them."""
-    from dataclasses import asdict
 
     from analyses.virtual_bench_files import write_record
     from analyses.virtual_bench_plan import plan_for

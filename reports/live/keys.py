@@ -111,11 +111,7 @@ def _slider(design: Design, path: str) -> dict[str, Any]:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
     made, value = _named(design, path), parameter_value(design, path)
-    low, high = (
-        (0.0, _top(design, path))
-        if value == 0.0
-        else (value / SLIDER_FACTOR, min(value * SLIDER_FACTOR, field.high))
-    )
+    low, high = _range(design, path, value)
     known = design.parameters.get(path)
     return {
         **made,

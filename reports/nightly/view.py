@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 STRIP = 30
 CLOSER = 1e-3  # of the limit; a smaller step of the distance is none
 SHOWN_CHANGES = 100
-_RANK = {"timeout": 0, "crash": 0, "error": 0, "fail": 1, "pass": 3}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,68 @@
+"""Every figure that a requirement may name, reached for one design and for many: the two agree on any drive.
+
+Drives of `wide_designs` (any stage outermost, rigid or elastic, any filter, estimator, rate, delay,
+feed-forward), with gravity, a friction map, friction that differs by direction, and numbers over decades.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_wide_identity import wide_designs
+
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.batch.static import drive_figures
+from actuator_lti.design.model import Design, FrictionPoint, Gravity
+from actuator_lti.drive_figure import drive_figure
+from actuator_lti.loops import assemble_loops
+from actuator_lti.margins import stability_margins
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
+
+
+@st.composite
+def wider_designs(draw: st.DrawFn) -> Design:
+    """Also under gravity, with a friction map or another friction backwards, sizes over two decades."""
+    design = draw(wide_designs())
+    size = 10.0 ** draw(st.floats(-1.0, 1.0))
+    torque = design.friction.dry_torque_Nm or 1e-3
+    shape = ((0.0, 1.0), (50.0, 0.6), (400.0, 1.4))
+    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=part * torque) for w, part in shape)
+    other = replace(design.friction, dry_torque_Nm=size * torque, dry_torque_reverse_Nm=0.7 * size * torque)
+    friction = draw(st.sampled_from([design.friction, other, replace(design.friction, points=points)]))
+    gravity = draw(st.sampled_from([None, Gravity(mass_kg=size, arm_m=0.05, offset_rad=2.0)]))
+    load = replace(design.load, inertia_kgm2=size * design.load.inertia_kgm2, gravity=gravity)
+    return replace(design, friction=friction, load=load, name="any")
+
+
+@settings(max_examples=25, deadline=None)
+@given(wider_designs(), st.sampled_from([0.0, 3.0, -20.0]))
+def test_drive_figures(design: Design, load_Nm: float) -> None:
+    """Speed, current, acceleration, torque margin, stiffness, lost motion."""
+    many = Population(design, {}, 2)
+    for name in DRIVE_QUANTITIES:
+        one = drive_figure(design, name, load_Nm)
+        truth = np.nan if one is None else float(one)
+        if name == "motor_current" and not design.motor.has_electrical_dynamics:
+            continue
+        assert drive_figures(many, name, load_Nm) == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), name
+
+
+@settings(max_examples=8, deadline=None)
+@given(wider_designs())
+def test_loop_figures(design: Design) -> None:
+    """The margins of every loop; where one of the two withholds them it has no say."""
+    figures = linear_figures(Population(design, {}, 1), time_figures=False)
+    loops = assemble_loops(design).present
+    assert set(figures.loops) == set(loops)
+    for name, loop in loops.items():
+        truth = stability_margins(loop.open_loop)
+        if truth.stable is None or figures.withheld(name)[0]:
+            continue
+        assert bool(figures.stable(name)[0]) is truth.stable
+        for key in ("gain_margin", "phase_margin", "modulus_margin", "sensitivity_peak", "delay_margin"):
+            reader = LOOP_QUANTITIES[key].reader.removeprefix("margins.")
+            value = getattr(truth, reader)
+            expected = np.inf if value is None else value
+            assert figures.quantity(key, name)[0] == pytest.approx(expected, rel=1e-6), (name, key)
