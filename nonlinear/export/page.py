@@ -22,11 +22,6 @@ CURRENT_LIMIT, VOLTAGE_LIMIT = at.CURRENT_LIMIT, at.VOLTAGE_LIMIT
 LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in the flags
 
 
-def is_elastic(row: Any) -> bool:
-    """Whether a row is that of an elastic drive train, or of one with a friction map."""
-    return bool(row[at.ELASTIC_DRIVE] > 0.0)
-
-
 def changes_row(design: Design, path: str) -> bool | None:
     """Whether a key has an influence on the row; None where it cannot be followed."""
     traced = Traced(Tape(rounding=True), "k", parameter_value(design, path))

@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, linear_limiters, page
@@ -54,7 +55,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "requirements": _requirements(design),
-        "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
+        "others": _others(design),
         "step": _step(design),
         "limits": _limits(design),
         "map": _map(design),
@@ -96,6 +97,18 @@ def _requirements(design: Design) -> list[dict[str, Any]]:
         for loop in judged_loops(item.loop, stages)
         if loop in stages
     ]
+
+
+def _others(design: Design) -> dict[str, int]:
+    """Count the requirements on the whole drive, which do not follow, and those not met as designed."""
+    others = [item for item in design.requirements if item.quantity not in LOOP_QUANTITIES]
+    failed = 0
+    for item in others:
+        if item.quantity in DRIVE_QUANTITIES:
+            value = float(drive_figure(design, item.quantity, item.load_Nm or 0.0))
+            low, high = item.minimum, item.maximum
+            failed += not ((low is None or value >= low) and (high is None or value <= high))
+    return {"count": len(others), "failed": failed}
 
 
 def _step(design: Design) -> dict[str, Any]:

@@ -428,7 +428,8 @@
     if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
     if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now ${fails.length === 1 ? "fails" : "fail"} (as designed: ${old.length}).` : unknown.length ? "" : total === 1 ? "The requirement on the loops is met." : `All ${total} requirements on the loops are met.`);
-    if (data.others) words.push(`${data.others} on the whole drive: see the report.`);
+    const { count, failed } = data.others;
+    if (count) words.push(`${count} on the whole drive ${count === 1 ? "does" : "do"} not follow${failed ? `; as designed ${failed} ${failed === 1 ? "is" : "are"} not met` : ""}: see the report.`);
     if (refused) words.push(refused);
     line.className = `state ${unstable.length || fails.length || unknown.length ? "fail" : "pass"}`;
     line.textContent = words.filter(Boolean).join(" ");

@@ -160,7 +160,7 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
         last_label=visible(title),
     )
     root = ElementTree.fromstring(line_chart(chart))
-    drawn = {"svg", "path", "text", "g", "rect", "clipPath", "use", "defs"}
+    drawn = {"svg", "path", "text", "tspan", "g", "rect", "clipPath", "use", "defs"}
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
 
 

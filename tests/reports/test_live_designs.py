@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from live_page import FIGURES, agree, command_line, opened, read, saved, settled, type_value, written
+from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
@@ -21,6 +22,8 @@ from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Friction, FrictionPoint
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
+from reports.cli.app import build
+from reports.live import live_model
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -180,3 +183,11 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(
     wanted = [CAUSES[k] for k in causes(rows.run(), linear, amplitude)]
     assert [cell[0] for cell in cells] == wanted
     assert len(set(wanted)) > 2
+
+
+@pytest.mark.parametrize("name", ["joint", "ilr33-amber"])
+def test_requirements_on_the_whole_drive_are_counted_as_the_command_line_judges_them(name: str) -> None:
+    done = CliRunner().invoke(build(), ["margins", name, "--json"])
+    whole = [item for item in json.loads(done.stdout)["verdicts"] if item["loop"] is None]
+    failed = sum(item["passed"] is False for item in whole)
+    assert live_model(load_design(name))["others"] == {"count": len(whole), "failed": failed}
