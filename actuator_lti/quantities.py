@@ -118,6 +118,8 @@ _LIST = (
              "motor current at top speed", "motor_current_A", -1, source="capability"),
     Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
              "acceleration", "acceleration_rad_s2", 1, "m/s^2", source="capability"),
+    Quantity("torque_margin", "1", "drive", "motor torque at rest over what it takes to start against a load",
+             "torque margin", "torque_margin", 1, source="capability"),
     Quantity("static_stiffness", "N*m/rad", "drive", "moment over deflection at 0 Hz, powered",
              "static stiffness", "static_stiffness_Nm_rad", 1, "N/m", source="stiffness"),
     Quantity("least_stiffness", "N*m/rad", "drive", "least moment over deflection, 0.1 to 1000 Hz",

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actuator_lti.drive.profile import profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.plain_system import as_control
 
@@ -132,10 +133,13 @@ def all_loop_figures(
         If the margins of a loop cannot be found, and ``refused`` is not given.
     """
     result = {}
+    said = profile_note(loops.design)
     for name, loop in loops.present.items():
         response = loops.plain_response if name == "position" else None
         try:
             result[name] = loop_figures(loop, response, step=step, certify=certify)
+            if name == "position" and said:
+                result[name] = replace(result[name], notes=(*result[name].notes, said))
         except (InputError, NumericalError) as error:
             if refused is None:
                 raise

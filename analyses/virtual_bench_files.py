@@ -137,6 +137,25 @@ def write_bench(
     return path
 
 
+RECORD_COLUMNS = {
+    "current_reference": "current_command_A",
+    "current": "current_A",
+    "angle": "motor_angle_rad",
+    "output_angle": "output_angle_rad",
+}
+
+
+def write_record(path: str | Path, record: Record) -> None:
+    """Write a record of the two-mass bench as CSV with units in the header."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    names = [name for name in RECORD_COLUMNS if name in record.signals]
+    header = ",".join(["time_s", *(RECORD_COLUMNS[name] for name in names)])
+    columns = [record.time_s, *(record[name] for name in names)]
+    text = _csv(columns, ("%.9g",) + ("%.12g",) * len(names), ",")
+    write_bytes(path, f"{header}\n{text}".encode())
+
+
 def _drive_text(record: Record) -> bytes:
     """Tick counter, mA, rpm, counts; semicolons and decimal commas, as a drive of German make writes."""
     columns = [

@@ -2,7 +2,8 @@
 
 Two records: a multisine of the current in one direction under a moment that keeps the coupling on one flank,
 and a current that reverses across the play. The drive's own loops outside the current do not act; its
-``[instruments]`` act in the loop and, drawn again, in the log.
+``[instruments]`` act in the loop and, drawn again, in the log. The load is balanced: its gravity and slope do
+not act.
 """
 
 from __future__ import annotations
@@ -89,7 +90,15 @@ def _torque_drive(design: Design, seed: int) -> Design:
         raise InputError("this bench needs a rotary drive with a current loop and a coupling", design.name)
     controller = replace(design.controller, position=None, velocity=None)
     instruments = replace(design.instruments, seed=seed)
-    return replace(design, controller=controller, command=Command(), instruments=instruments, requirements=())
+    load = replace(design.load, gravity=None, moment_slope_Nm_rad=0.0)
+    return replace(
+        design,
+        controller=controller,
+        command=Command(),
+        instruments=instruments,
+        load=load,
+        requirements=(),
+    )
 
 
 def _bias(design: Design, plan: TwoMassPlan) -> float:

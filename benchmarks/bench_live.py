@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-DESIGNS = ("ilr33-amber", "ilr33-amber-multirate", "emps")
+DESIGNS = ("ilr33-amber", "ilr33-amber-multirate", "emps", "fin", "joint", "ballscrew")
 TARGET_MS = 50.0
-ROUNDS = 3
+ROUNDS = 2
 
 
 def rows(quick: bool = False) -> Iterable[Row]:

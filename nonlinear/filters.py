@@ -53,6 +53,11 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
         zero, pole = _given(item, "zero", where), _given(item, "pole", where)
         w0 = _below_nyquist(np.sqrt(zero * pole), period_s, item.kind, where)
         return tustin((0.0, 1.0 / zero, 1.0), (0.0, 1.0 / pole, 1.0), w0, period_s)
+    if item.kind == "skewed-notch":
+        zero, pole, width = (_given(item, name, where) for name in ("zero", "pole", "width"))
+        w0 = _below_nyquist(np.sqrt(zero * pole), period_s, item.kind, where)
+        top = (1.0 / (zero * zero), item.depth * width / (zero * zero), 1.0)
+        return tustin(top, (1.0 / (pole * pole), width / (pole * pole), 1.0), w0, period_s)
     w0 = _below_nyquist(_given(item, "frequency", where), period_s, item.kind, where)
     if item.kind == "notch":
         width = _given(item, "width", where)

@@ -118,7 +118,7 @@ def asset(name: str) -> str:
 @cache
 def script(*, live: bool = False) -> str:
     """Give the one script of a page: folds and printing, the live figures, and sliders where it has any."""
-    return asset("page.js") + asset("live.js") + (asset("hands.js") if live else "")
+    return asset("page.js") + asset("live.js") + (asset("hands_map.js") + asset("hands.js") if live else "")
 
 
 def security_policy(*scripts: str, wasm: bool = False) -> str:

@@ -65,15 +65,15 @@ def _slope_at(mode, k, xs, rs, ss):
 
 
 @kernel
-def _hidden(mode, k, xs, rs, ss):
+def _hidden(mode, k, f1, f2, xs, rs, ss):
     """Whether the cubic through both ends, of one sign, comes near zero between them."""
-    f1 = quantity_at(mode, k, xs, rs, ss, 1.0, 0.0)
-    f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
     width = xs[k + 1] - xs[k]
-    s1 = width * _slope_at(mode, k, xs, rs, ss)
-    s2 = width * _slope_at(mode, k + 1, xs, rs, ss)
     sign = 1.0 if f1 > 0.0 else -1.0
-    if not (s1 * sign < 0.0 and s2 * sign > 0.0):
+    s1 = width * _slope_at(mode, k, xs, rs, ss)
+    if not s1 * sign < 0.0:
+        return False
+    s2 = width * _slope_at(mode, k + 1, xs, rs, ss)
+    if not s2 * sign > 0.0:
         return False
     lowest = min(f1 * sign, f2 * sign)
     for i in range(1, 16):
@@ -138,17 +138,20 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
 @kernel
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
+    f2 = quantity_at(mode, 0, xs, rs, ss, 1.0, 0.0)
     for k in range(count - 1):
+        f1 = f2
         if ss[2 * k + 2] == 0.0 and ss[2 * k + 3] == 0.0:  # lost in rounding
+            if k + 2 < count:
+                f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
             continue
-        f1 = quantity_at(mode, k, xs, rs, ss, 1.0, 0.0)
         f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
         above, after = f1 > 0.0, f2 > 0.0
         if (above and not after) or (after and not above):
             if mode == PHASE and rs[2 * k] > 0.0 and rs[2 * k + 2] > 0.0:
                 continue
             _crossing(mode, xs[k], f1, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
-        elif (mode == GAIN or rs[2 * k] < 0.0) and _hidden(mode, k, xs, rs, ss):
+        elif (mode == GAIN or rs[2 * k] < 0.0) and _hidden(mode, k, f1, f2, xs, rs, ss):
             x = _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged)
             f = _value(mode, x, n, h, b, c, work, state, exchanged)
             if (f > 0.0 and not above) or (above and not f > 0.0):
@@ -175,19 +178,23 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
 @kernel
 def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, state, exchanged):
     """The smallest |1 + L| and where."""
-    best = 0
-    for k in range(count):
-        if distance_at(rs, k) < distance_at(rs, best):
-            best = k
-    row[MODULUS] = distance_at(rs, best)
-    row[MODULUS_X] = xs[best]
+    row[MODULUS] = distance_at(rs, 0)
+    row[MODULUS_X] = xs[0]
+    for k in range(1, count):
+        distance = distance_at(rs, k)
+        if distance < row[MODULUS]:
+            row[MODULUS] = distance
+            row[MODULUS_X] = xs[k]
     at_end = math.hypot(1.0 + nyquist_r, nyquist_i)
     if at_end < row[MODULUS]:
         row[MODULUS] = at_end
         row[MODULUS_X] = math.pi
     limit = 1.3 * row[MODULUS]
+    after = distance_at(rs, 0)
     for k in range(count - 1):
-        if min(distance_at(rs, k), distance_at(rs, k + 1)) > limit:
+        before = after
+        after = distance_at(rs, k + 1)
+        if min(before, after) > limit:
             continue
         f1 = quantity_at(SENSITIVITY, k, xs, rs, ss, 1.0, 0.0)
         f2 = quantity_at(SENSITIVITY, k + 1, xs, rs, ss, 1.0, 0.0)
@@ -224,8 +231,9 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
             best = size
             row[PEAK_T_X] = xs[k]
     row[PEAK_T] = best
+    f2 = quantity_at(RESONANCE, 0, xs, rs, ss, 1.0, lead)
     for k in range(count - 1):
-        f1 = quantity_at(RESONANCE, k, xs, rs, ss, 1.0, lead)
+        f1 = f2
         f2 = quantity_at(RESONANCE, k + 1, xs, rs, ss, 1.0, lead)
         if not (f1 > 0.0 and f2 <= 0.0):
             continue
@@ -246,8 +254,9 @@ def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchan
     row[QUARTER_X] = math.nan
     if not (level > 0.0):
         return
+    f2 = quantity_at(BANDWIDTH, 0, xs, rs, ss, level, lead)
     for k in range(count - 1):
-        f1 = quantity_at(BANDWIDTH, k, xs, rs, ss, level, lead)
+        f1 = f2
         f2 = quantity_at(BANDWIDTH, k + 1, xs, rs, ss, level, lead)
         if f1 > 0.0 and f2 <= 0.0:
             x, _r, _i = root(
@@ -255,11 +264,14 @@ def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchan
             )
             row[BANDWIDTH_X] = x
             break
+    f2 = quantity_at(QUARTER, 0, xs, rs, ss, level, lead)
     for k in range(count - 1):
-        f1 = quantity_at(QUARTER, k, xs, rs, ss, level, lead)
+        f1 = f2
         f2 = quantity_at(QUARTER, k + 1, xs, rs, ss, level, lead)
+        if not (f1 > 0.0 and f2 <= 0.0):
+            continue
         _closed, side = closed_loop(rs[2 * k], rs[2 * k + 1], xs[k], lead)
-        if f1 > 0.0 and f2 <= 0.0 and side < 0.0:
+        if side < 0.0:
             x, _r, _i = root(
                 QUARTER, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
             )

@@ -21,51 +21,69 @@ DEEPEST = 48  # halvings on the way to one point
 
 
 @kernel
-def _shifted(n, h, b, x, work, state, exchanged):
-    """Write z I - A and b; returns z - 1."""
-    sine = math.sin(0.5 * x)
-    delta_r, delta_i = -2.0 * sine * sine, math.sin(x)
-    for i in range(n):
-        for j in range(max(i - 1, 0), n):
-            work[2 * (i * n + j)] = -h[i * n + j]
-            work[2 * (i * n + j) + 1] = 0.0
-        work[2 * (i * n + i)] += delta_r
-        work[2 * (i * n + i) + 1] = delta_i
-        state[2 * i], state[2 * i + 1] = b[i], 0.0
-        exchanged[i] = 0.0
-    return delta_r, delta_i
+def _exchanged(n, k, h, b, delta_r, delta_i, work, state):
+    """One step of the elimination of z I - A where row k + 1, real but for its diagonal, comes first."""
+    upper, lower, row = 2 * (k * n + k), 2 * ((k + 1) * n + k), (k + 1) * n + k
+    below = -h[row]
+    factor_r, factor_i = work[upper] / below, work[upper + 1] / below
+    work[upper], work[upper + 1] = below, 0.0
+    up_r, up_i = delta_r - h[row + 1], delta_i
+    work[lower + 2] = work[upper + 2] - (factor_r * up_r - factor_i * up_i)
+    work[lower + 3] = work[upper + 3] - (factor_r * up_i + factor_i * up_r)
+    work[upper + 2], work[upper + 3] = up_r, up_i
+    for j in range(2, n - k):
+        up_r = -h[row + j]
+        work[lower + 2 * j] = work[upper + 2 * j] - factor_r * up_r
+        work[lower + 2 * j + 1] = work[upper + 2 * j + 1] - factor_i * up_r
+        work[upper + 2 * j], work[upper + 2 * j + 1] = up_r, 0.0
+    state[2 * k + 2] = state[2 * k] - factor_r * b[k + 1]
+    state[2 * k + 3] = state[2 * k + 1] - factor_i * b[k + 1]
+    state[2 * k], state[2 * k + 1] = b[k + 1], 0.0
+    return factor_r, factor_i
 
 
 @kernel
-def _eliminated(n, k, work, state, exchanged):
-    """One step of the elimination, rows k and k + 1 exchanged where that is better."""
-    upper, lower = 2 * (k * n + k), 2 * ((k + 1) * n + k)
-    pivot_r, pivot_i = work[upper], work[upper + 1]
-    below_r, below_i = work[lower], work[lower + 1]
+def _in_place(n, k, h, b, delta_r, delta_i, work, state):
+    """The same without an exchange: row k + 1 less a multiple of row k."""
+    upper, lower, row = 2 * (k * n + k), 2 * ((k + 1) * n + k), (k + 1) * n + k
     factor_r, factor_i = 0.0, 0.0
-    if abs(below_r) + abs(below_i) > abs(pivot_r) + abs(pivot_i):
-        for j in range(2 * (n - k)):
-            kept = work[upper + j]
-            work[upper + j] = work[lower + j]
-            work[lower + j] = kept
-        for j in range(2):
-            kept = state[2 * k + j]
-            state[2 * k + j] = state[2 * k + 2 + j]
-            state[2 * k + 2 + j] = kept
-        factor_r, factor_i = over(pivot_r, pivot_i, below_r, below_i)
-        exchanged[k] = 1.0
-    elif pivot_r != 0.0 or pivot_i != 0.0:
-        factor_r, factor_i = over(below_r, below_i, pivot_r, pivot_i)
-    work[lower], work[lower + 1] = factor_r, factor_i
-    if factor_r == 0.0 and factor_i == 0.0:
-        return
+    if work[upper] != 0.0 or work[upper + 1] != 0.0:
+        factor_r, factor_i = over(-h[row], 0.0, work[upper], work[upper + 1])
     for j in range(1, n - k):
         up_r, up_i = work[upper + 2 * j], work[upper + 2 * j + 1]
-        work[lower + 2 * j] -= factor_r * up_r - factor_i * up_i
-        work[lower + 2 * j + 1] -= factor_r * up_i + factor_i * up_r
+        work[lower + 2 * j] = -h[row + j] - (factor_r * up_r - factor_i * up_i)
+        work[lower + 2 * j + 1] = -(factor_r * up_i + factor_i * up_r)
+    up_r, up_i = work[upper + 2], work[upper + 3]
+    work[lower + 2] = delta_r - h[row + 1] - (factor_r * up_r - factor_i * up_i)
+    work[lower + 3] = delta_i - (factor_r * up_i + factor_i * up_r)
     up_r, up_i = state[2 * k], state[2 * k + 1]
-    state[2 * k + 2] -= factor_r * up_r - factor_i * up_i
-    state[2 * k + 3] -= factor_r * up_i + factor_i * up_r
+    state[2 * k + 2] = b[k + 1] - (factor_r * up_r - factor_i * up_i)
+    state[2 * k + 3] = -(factor_r * up_i + factor_i * up_r)
+    return factor_r, factor_i
+
+
+@kernel
+def _eliminated(n, h, b, x, work, state, exchanged):
+    """Bring z I - A to upper triangular form, b along with it; returns z - 1.
+
+    Rows are read from h as they are needed; a row that is still real is multiplied as one.
+    """
+    sine = math.sin(0.5 * x)
+    delta_r, delta_i = -2.0 * sine * sine, math.sin(x)
+    for j in range(n):
+        work[2 * j], work[2 * j + 1] = -h[j], 0.0
+    work[0], work[1] = delta_r - h[0], delta_i
+    state[0], state[1] = b[0], 0.0
+    for k in range(n - 1):
+        upper, lower = 2 * (k * n + k), 2 * ((k + 1) * n + k)
+        if abs(h[(k + 1) * n + k]) > abs(work[upper]) + abs(work[upper + 1]):
+            factor_r, factor_i = _exchanged(n, k, h, b, delta_r, delta_i, work, state)
+            exchanged[k] = 1.0
+        else:
+            factor_r, factor_i = _in_place(n, k, h, b, delta_r, delta_i, work, state)
+            exchanged[k] = 0.0
+        work[lower], work[lower + 1] = factor_r, factor_i
+    return delta_r, delta_i
 
 
 @kernel
@@ -111,9 +129,7 @@ def _again(n, c, work, state, exchanged):
 @kernel
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
-    delta_r, delta_i = _shifted(n, h, b, x, work, state, exchanged)
-    for k in range(n - 1):
-        _eliminated(n, k, work, state, exchanged)
+    delta_r, delta_i = _eliminated(n, h, b, x, work, state, exchanged)
     response_r, response_i = _substituted(n, c, work, state)
     again_r, again_i = _again(n, c, work, state, exchanged)
     slope_r, slope_i = times(1.0 + delta_r, delta_i, again_i, -again_r)
@@ -212,18 +228,12 @@ def _keep(k, x, response_r, response_i, slope_r, slope_i, xs, rs, ss):
 
 
 @kernel
-def _smooth(left, x, response_r, response_i, slope_r, slope_i, xs, rs, ss, tolerance):
-    """Whether log L is a cubic between the kept point ``left`` and x."""
-    width = x - xs[left]
-    before_r, before_i = rs[2 * left], rs[2 * left + 1]
-    ratio_r, ratio_i = over(response_r, response_i, before_r, before_i)
-    here_r, here_i = over(slope_r, slope_i, response_r, response_i)
-    there_r, there_i = over(ss[2 * left], ss[2 * left + 1], before_r, before_i)
-    predicted_r, predicted_i = 0.5 * width * (here_r + there_r), 0.5 * width * (here_i + there_i)
-    gain_error = math.log(math.hypot(ratio_r, ratio_i)) - predicted_r
-    turn = math.atan2(ratio_i, ratio_r) - predicted_i
+def _smooth(width, growth, turned, before_r, before_i, here_r, here_i, tolerance):
+    """Whether log L is a cubic between two points, from its change and from its derivatives at both."""
+    predicted_r, predicted_i = 0.5 * width * (here_r + before_r), 0.5 * width * (here_i + before_i)
+    turn = turned - predicted_i
     turn -= 2.0 * math.pi * float(math.floor(turn / (2.0 * math.pi) + 0.5))
-    return abs(gain_error) + abs(turn) < tolerance and abs(predicted_i) < 1.0
+    return abs(growth - predicted_r) + abs(turn) < tolerance and abs(predicted_i) < 1.0
 
 
 @kernel
@@ -236,6 +246,8 @@ def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, ex
     """
     response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, grid[0], work, state, exchanged)
     _keep(0, grid[0], response_r, response_i, slope_r, slope_i, xs, rs, ss)
+    before_r, before_i = over(slope_r, slope_i, response_r, response_i)
+    level, angle = math.log(math.hypot(response_r, response_i)), math.atan2(response_i, response_r)
     count = 1
     largest = 0.0
     for g in range(1, points):
@@ -252,11 +264,15 @@ def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, ex
                 slope_r, slope_i = 0.0, 0.0
             left = count - 1
             width = x - xs[left]
-            smooth = _smooth(left, x, response_r, response_i, slope_r, slope_i, xs, rs, ss, tolerance)
+            here_r, here_i = over(slope_r, slope_i, response_r, response_i)
+            level_here, angle_here = math.log(size), math.atan2(response_i, response_r)
+            growth, turned = level_here - level, angle_here - angle
+            smooth = _smooth(width, growth, turned, before_r, before_i, here_r, here_i, tolerance)
             room = depth < DEEPEST and count + depth + points - g < CAPACITY - 2
             still = slope_r == 0.0 and slope_i == 0.0
             if smooth or still or not room or width < 1e-12 * x:
                 _keep(count, x, response_r, response_i, slope_r, slope_i, xs, rs, ss)
+                before_r, before_i, level, angle = here_r, here_i, level_here, angle_here
                 count += 1
                 depth -= 1
             else:

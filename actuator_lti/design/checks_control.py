@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import degrees, isfinite, pi
 
-from actuator_lti.design.model import Design, Filter
+from actuator_lti.design.model import FILTER_KEYS, Design, Filter
 from actuator_lti.errors import InputError
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
@@ -13,12 +13,6 @@ MAX_MAP_POINTS = 16  # of each direction
 TRACKING_LIMIT = 0.828  # w0 T at which the tracking loop of model.md section 7 becomes unstable: 2 sqrt 2 - 2
 Refuse = Callable[[str, object, str], InputError]
 
-_FILTER_KEYS = {
-    "lowpass": ({"frequency_rad_s"}, {"order", "damping"}),
-    "notch": ({"frequency_rad_s", "width_rad_s"}, {"depth"}),
-    "leadlag": ({"zero_rad_s", "pole_rad_s"}, set()),
-    "biquad": ({"b", "a"}, set()),
-}
 _KEY_OF = {"frequency_rad_s": "frequency", "width_rad_s": "width", "zero_rad_s": "zero", "pole_rad_s": "pole"}
 
 
@@ -55,7 +49,7 @@ def _filters(design: Design, refuse: Refuse) -> None:
 
 
 def _filter(item: Filter, path: str, nyquist: float, refuse: Refuse) -> None:
-    needed, optional = _FILTER_KEYS[item.kind]
+    needed, optional = FILTER_KEYS[item.kind]
     fresh = Filter(kind=item.kind)
     for name in (*_KEY_OF, "b", "a", "order", "damping", "depth"):
         value, key = getattr(item, name), _KEY_OF.get(name, name)

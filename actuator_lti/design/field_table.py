@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 from actuator_lti.design.field import BIG, SMALL, Field
+from actuator_lti.design.model import FilterKind
 
 
 def _positive(path: str, attribute: str, unit: str, symbol: str, text: str, **more: object) -> Field:
@@ -285,7 +288,7 @@ _CONTROL = (
                   "added to the torque command in the direction of the command's motion", example="0.4 A"),
 )
 _FILTER = (
-    _choice("control.velocity.filter.*.kind", "kind", ("lowpass", "notch", "leadlag", "biquad"),
+    _choice("control.velocity.filter.*.kind", "kind", get_args(FilterKind),
             "what the filter does", required=True),
     _choice("control.velocity.filter.*.on", "on", ("torque", "speed"),
             "whether it filters the torque command or the measured speed"),
@@ -296,11 +299,12 @@ _FILTER = (
               high=10.0, example="0.7"),
     _positive("control.velocity.filter.*.width", "width_rad_s", "rad/s", "", "width of a notch",
               example="50 Hz"),
-    _quantity("control.velocity.filter.*.depth", "depth", "1", "", "gain of a notch at its centre",
-              low=0.0, high=1.0, example="0.1"),
-    _positive("control.velocity.filter.*.zero", "zero_rad_s", "rad/s", "", "zero of a lead-lag",
+    _quantity("control.velocity.filter.*.depth", "depth", "1", "",
+              "gain of a notch at its centre: width of its zeros over that of its poles", low=0.0, high=1.0,
+              example="0.1"),
+    _positive("control.velocity.filter.*.zero", "zero_rad_s", "rad/s", "", "zero, or frequency of a pair",
               example="50 rad/s"),
-    _positive("control.velocity.filter.*.pole", "pole_rad_s", "rad/s", "", "pole of a lead-lag",
+    _positive("control.velocity.filter.*.pole", "pole_rad_s", "rad/s", "", "pole, or frequency of a pair",
               example="500 rad/s"),
     Field(path="control.velocity.filter.*.b", attribute="b", kind="quantities", low=-BIG, high=BIG,
           description="numerator of a biquad in z^-1, b0 b1 b2"),

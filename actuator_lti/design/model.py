@@ -25,7 +25,15 @@ Sensor = Literal["motor", "output"]
 Direction = Literal["both", "forward", "reverse"]
 MotorConstants = Literal["dc", "rms-line", "peak-phase"]
 AntiWindup = Literal["conditional", "clamped", "back-calculation"]
-FilterKind = Literal["lowpass", "notch", "leadlag", "biquad"]
+FilterKind = Literal["lowpass", "notch", "skewed-notch", "leadlag", "biquad"]
+FILTER_KEYS: dict[FilterKind, tuple[set[str], set[str]]] = {
+    "lowpass": ({"frequency_rad_s"}, {"order", "damping"}),
+    "notch": ({"frequency_rad_s", "width_rad_s"}, {"depth"}),
+    "skewed-notch": ({"zero_rad_s", "pole_rad_s", "width_rad_s"}, {"depth"}),
+    "leadlag": ({"zero_rad_s", "pole_rad_s"}, set()),
+    "biquad": ({"b", "a"}, set()),
+}
+"""What each kind of filter needs, and what it may have besides."""
 FilterPlace = Literal["torque", "speed"]
 Overload = Literal["thermal", "excess"]
 ObjectFamily = Literal["", "faulhaber-mc-v3"]
@@ -246,6 +254,7 @@ class Filter:
     """One filter of the velocity loop, at its period, discretised by Tustin, prewarped (model.md section 7).
 
     ``lowpass``: frequency, order 1 or 2, damping; ``notch``: frequency w0, width (rad/s), depth (gain at w0);
+    ``skewed-notch``: zeros at zero, depth width wide, poles at pole, width wide; gain 1 at DC;
     ``leadlag``: zero and pole, (s/zero + 1)/(s/pole + 1); ``biquad``: sampled coefficients ``b``, ``a``.
     """
 
@@ -386,8 +395,8 @@ class Limits:
     overload: Overload = "thermal"
 
     @property
-    def overload_time_s(self) -> float | None:
-        """tau of the overload state; None without overload protection."""
+    def overload_time_s(self) -> Any:
+        """tau of the overload state, of one design or stacked ones; None without overload protection."""
         if self.peak_time_s is None:
             return None
         r2 = (self.peak_current_A / self.continuous_current_A) ** 2

@@ -49,6 +49,8 @@ _DERIVED = {
     "H henry": ("1", "V*s/A"),
     "F farad": ("1", "A*s/V"),
     "deg degree": ("0.017453292519943295", "rad"),
+    "arcmin arcminute": ("0.0002908882086657216", "rad"),
+    "arcsec arcsecond": ("4.84813681109536e-06", "rad"),
     "rev turn revolution": ("6.283185307179586", "rad"),
     "rpm": ("0.10471975511965977", "rad/s"),
     "Hz hertz": ("6.283185307179586", "rad/s"),

@@ -147,6 +147,15 @@ def _notch(item: Filter) -> tuple[Polynomial, Polynomial]:
     return (1.0, item.depth * width, w0**2), (1.0, width, w0**2)
 
 
+def _skewed_notch(item: Filter) -> tuple[Polynomial, Polynomial]:
+    zero, pole, width = item.zero_rad_s, item.pole_rad_s, item.width_rad_s
+    assert zero is not None
+    assert pole is not None
+    assert width is not None
+    gain = (pole / zero) ** 2
+    return (gain, gain * item.depth * width, pole**2), (1.0, width, pole**2)
+
+
 def _leadlag(item: Filter) -> tuple[Polynomial, Polynomial]:
     zero, pole = item.zero_rad_s, item.pole_rad_s
     assert zero is not None
@@ -157,6 +166,7 @@ def _leadlag(item: Filter) -> tuple[Polynomial, Polynomial]:
 ANALOG: dict[str, Callable[[Filter], tuple[Polynomial, Polynomial]]] = {
     "lowpass": _lowpass,
     "notch": _notch,
+    "skewed-notch": _skewed_notch,
     "leadlag": _leadlag,
 }
 """Numerator and denominator in s, highest power first, of every filter that is given in s."""
@@ -166,11 +176,11 @@ def centre_rad_s(item: Filter) -> Any:
     """The frequency at which Tustin's rule is prewarped; ``None`` for a sampled biquad."""
     if item.kind == "biquad":
         return None
-    if item.kind == "leadlag":
-        assert item.zero_rad_s is not None
-        assert item.pole_rad_s is not None
-        return (item.zero_rad_s * item.pole_rad_s) ** 0.5
-    return item.frequency_rad_s
+    if item.frequency_rad_s is not None:
+        return item.frequency_rad_s
+    assert item.zero_rad_s is not None
+    assert item.pole_rad_s is not None
+    return (item.zero_rad_s * item.pole_rad_s) ** 0.5
 
 
 def biquad(item: Filter, period_s: Any) -> Block:

@@ -42,6 +42,9 @@ class Capability:
         Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
     accelerates_to_limit : bool or ndarray
         Whether it is the acceleration limit that sets it, and not the torque.
+    torque_margin : float or ndarray
+        Motor torque at rest over what friction and the load ask of it to start, the smaller of both
+        directions; ``inf`` where nothing holds it. (ECSS-E-ST-33-01C calls it the motorization factor.)
     """
 
     output_rate_rad_s: Any
@@ -49,6 +52,7 @@ class Capability:
     motor_current_A: Any
     acceleration_rad_s2: Any
     accelerates_to_limit: Any
+    torque_margin: Any
 
 
 def stall_torque_Nm(design: Design) -> Any:
@@ -58,10 +62,21 @@ def stall_torque_Nm(design: Design) -> Any:
         return motor.source_gain_Nm_V * limits.voltage_V
     assert motor.torque_constant_Nm_A is not None
     assert motor.resistance_ohm is not None
-    current = limits.voltage_V / motor.resistance_ohm
+    current = limits.voltage_V / circuit_resistance_ohm(design)
     if design.controller.current is not None:
         current = np.minimum(current, limits.peak_current_A)
     return motor.torque_constant_Nm_A * current
+
+
+def circuit_resistance_ohm(design: Design) -> Any:
+    """Resistance between the source and the back-EMF while the voltage is at its limit: R + R_s.
+
+    There u = U = U_s - R_s i, so ``U_s = (R + R_s) i + kE w``. It holds for motoring and R_s <= R; a supply
+    of more resistance than the winding gives its most current at less than its whole voltage.
+    """
+    resistance = design.effective_motor.resistance_ohm
+    assert resistance is not None
+    return resistance if design.supply is None else resistance + design.supply.resistance_ohm
 
 
 def torque_gain_Nm_rad(design: Design) -> Any:
@@ -153,7 +168,7 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     kinds.append(FORCE)
     bounds.append(_first_root(against - stall, slopes, 0.0))
     if motor.source_gain_Nm_V is None:
-        R, kM, kE = motor.resistance_ohm, motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+        R, kM, kE = circuit_resistance_ohm(design), motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
         assert R is not None
         assert kM is not None
         assert kE is not None
@@ -199,6 +214,9 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
     starts = (stall > needed) & (stall > against)
     gain = np.where(starts, (stall - against) / design.inertia_kgm2, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        held = np.maximum(needed, against)
+        margin = np.where(held > 0.0, stall / held, math.inf)
     limit = design.limits.acceleration_rad_s2
     current = np.where(np.isfinite(speed), torque / kM, np.nan) if kM is not None else np.nan
     return Capability(
@@ -207,6 +225,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
         motor_current_A=current,
         acceleration_rad_s2=np.minimum(gain, limit) / design.total_ratio,
         accelerates_to_limit=limit < gain,
+        torque_margin=margin,
     )
 
 
@@ -234,4 +253,5 @@ def capability(design: Design, load_Nm: float = 0.0) -> Capability:
         current = np.nan_to_num(back.motor_current_A) - np.nan_to_num(ahead.motor_current_A)
     worse = (rate < 0) | ((rate == 0) & ((acceleration < 0) | ((acceleration == 0) & (current > 0))))
     names = Capability.__dataclass_fields__
-    return Capability(**{n: np.where(worse, getattr(back, n), getattr(ahead, n)) for n in names})
+    figures = {n: np.where(worse, getattr(back, n), getattr(ahead, n)) for n in names}
+    return Capability(**{**figures, "torque_margin": np.minimum(ahead.torque_margin, back.torque_margin)})

@@ -19,6 +19,7 @@ from actuator_lti.margins.exact_delay import ExactDelayLoop, exact_delay_loop, n
 from actuator_lti.margins.exact_findings import Crossing
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
+from actuator_lti.margins.trust import TOUCH
 
 _BITS = 128
 _GAIN = Form(arb(1), acb(0), arb(-1))
@@ -27,6 +28,7 @@ _UNDER_ONE = 0.9
 _SLACK = 1e-8  # relative: how much lower a smallest distance may be without being found
 _AT_END = (0.9, 0.99, 0.999, 0.9999)  # parts of the distance at infinity at which a smaller one is looked for
 _ROUNDS = 8
+_AT_REST = 1e-3  # how far L has moved from its value at rest where a crossover is one of its own
 _REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries change nothing"
 
 
@@ -41,14 +43,9 @@ def certified_delayed_margins(
         Something could not be told.
     """
     with ctx.workprec(_BITS):
-        gains, reals, unstable = _answer(form, band)
-        problem = None
-        for way in (1.0, -1.0):
-            near_gains, near_reals, near_unstable = _answer(neighbour(form, way), band)
-            if near_unstable != unstable:
-                problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
-            problem = problem or difference(gains, near_gains, "|L| = 1")
-            problem = problem or difference(reals, near_reals, "the real axis")
+        gains, reals, unstable, problem = _compared(form, band, merge=False)
+        if problem is not None:
+            gains, reals, unstable, problem = _compared(form, band, merge=True)
         if problem is None:
             margins = _with_distances(Axis(exact_delay_loop(form)), margins)
     agreement = Agreement(unstable, margins.agreement.unstable_nyquist)
@@ -70,6 +67,25 @@ def certified_delayed_margins(
         evidence="certified",
         evidence_reason=_REASON,
     )
+
+
+def _compared(
+    form: DelayForm, band: tuple[float, float] | None, merge: bool
+) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...], int, str | None]:
+    """The answer, and what neighbours 8 ulp away say against it.
+
+    With ``merge`` a gain of one at zero frequency, within `TOUCH`, is no crossover; that of the given doubles
+    may lie at any frequency below the loop's own.
+    """
+    gains, reals, unstable = _answer(form, band, merge)
+    problem = None
+    for way in (1.0, -1.0):
+        near_gains, near_reals, near_unstable = _answer(neighbour(form, way), band, merge)
+        if near_unstable != unstable:
+            problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+        problem = problem or difference(gains, near_gains, "|L| = 1")
+        problem = problem or difference(reals, near_reals, "the real axis")
+    return gains, reals, unstable, problem
 
 
 def _with_distances(axis: Axis, margins: StabilityMargins) -> StabilityMargins:
@@ -94,7 +110,7 @@ def withheld(margins: StabilityMargins, reason: str) -> StabilityMargins:
 
 
 def _answer(
-    form: DelayForm, band: tuple[float, float] | None
+    form: DelayForm, band: tuple[float, float] | None, merge: bool
 ) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...], int]:
     """Gain crossovers, crossings of the negative real axis, unstable closed-loop poles."""
     loop = exact_delay_loop(form)
@@ -108,8 +124,11 @@ def _answer(
     reals = [_crossing(axis, x) for x in zeros(axis, _PHASE, axis.edges(start, far), order)]
     reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= FLOOR)]
     N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
-    if D0 != 0 and N0 / D0 < 0:
-        reals = [Crossing(0.0, complex(float((N0 / D0).p) / float((N0 / D0).q))), *reals]
+    at_rest = None if D0 == 0 else float((N0 / D0).p) / float((N0 / D0).q)
+    if at_rest is not None and at_rest < 0.0:
+        reals = [Crossing(0.0, complex(at_rest)), *reals]
+    if merge and at_rest is not None and abs(at_rest - 1.0) <= TOUCH:
+        gains = [c for c in gains if abs(c.L - at_rest) > _AT_REST]
     return tuple(gains), tuple(reals), _unstable(axis, axis.edges(start, top))
 
 

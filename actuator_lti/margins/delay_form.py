@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg.lapack import dgebal
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.factors import poles, zeros
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 
@@ -186,11 +186,27 @@ def _output(form: DelayForm, lag: Complex) -> Complex:
 
 def _evaluate(form: DelayForm, low: Real, high: Real) -> Intervals:
     x, half = 0.5 * (low + high), 0.5 * (high - low)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        found = _evaluated(form, x, half)
+    if not (np.isfinite(found.L).all() and np.isfinite(found.slope).all()):
+        raise NumericalError(
+            f"the loop overflows double precision between {low[0]:.3g} and {high[-1]:.3g}: a pole there, or "
+            "numbers too large"
+        )
+    return found
+
+
+def _evaluated(form: DelayForm, x: Real, half: Real) -> Intervals:
     n, q = form.B1.size, form.delays.size
     points = np.exp(1j * x) if form.sampled else 1j * x
     F, lag = _matrix(form, points)
     row = _output(form, lag)
-    inverse = np.linalg.inv(F)
+    try:
+        inverse = np.linalg.inv(F)
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(
+            f"a pole of the loop lies on the border of stability between {x[0]:.6g} and {x[-1]:.6g}"
+        ) from error
     rhs = np.concatenate((form.B1, form.D21))
     X = inverse @ rhs
     Y = (row[:, None, :] @ inverse)[:, 0, :]
@@ -204,16 +220,16 @@ def _evaluate(form: DelayForm, low: Real, high: Real) -> Intervals:
         spread = np.abs(L0) * _relative_spread(points, half, form.zeros, form.poles)
     else:
         spread = _spread(form, half, np.abs(inverse), np.abs(X), np.abs(Y), q)
+    spread = np.where(np.isfinite(spread), spread, np.inf)  # what overflows is no bound
     back = np.exp(-1j * x * form.series)
     return Intervals(x, half, L0 * back, (slope0 - 1j * form.series * L0) * back, spread)
 
 
 def _relative_spread(points: Complex, half: Real, zeros: Complex, poles: Complex) -> Real:
     """Bound of |L(x)/L - 1| from the factors: each (p - root) changes by half at most."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        up = half[:, None] / np.abs(points[:, None] - zeros)
-        down = half[:, None] / np.abs(points[:, None] - poles)
-        most = np.prod(1.0 + up, axis=1) / np.prod(np.maximum(1.0 - down, 0.0), axis=1)
+    up = half[:, None] / np.abs(points[:, None] - zeros)
+    down = half[:, None] / np.abs(points[:, None] - poles)
+    most = np.prod(1.0 + up, axis=1) / np.prod(np.maximum(1.0 - down, 0.0), axis=1)
     return np.where((down < 1.0).all(axis=1), most - 1.0, np.inf)
 
 
@@ -225,9 +241,7 @@ def _spread(form: DelayForm, half: Real, G: Real, X: Real, Y: Real, q: int) -> R
     k = np.concatenate((np.zeros(n), np.abs(form.D12) * form.delays))
     if not n + q:
         return np.zeros(half.size)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # beside a pole: no bound there
-        spread = _series_bound(G @ K, X, Y @ K, k, half)
-    return np.where(np.isfinite(spread), spread, np.inf)
+    return _series_bound(G @ K, X, Y @ K, k, half)
 
 
 def _series_bound(GK: Real, X: Real, YK: Real, k: Real, half: Real) -> Real:

@@ -45,6 +45,15 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     return _assembled(setting, band_rad_s, agreement, (gain_x, gain_touch), (phase_x, phase_touch), distances)
 
 
+def without_intervals(form: DelayForm, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
+    """What exact arithmetic starts from where the intervals in double precision do not settle."""
+    none = np.empty(0), np.empty(0, dtype=bool)
+    at_infinity = [(1.0, math.inf), (2.0, math.inf)]
+    return _assembled(
+        setting_of(form, band_rad_s), band_rad_s, Agreement(None, None), none, none, at_infinity
+    )
+
+
 def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
     """Frequencies at which the gain crosses ``level``, in order (x)."""
     scaled = replace(form, C1=form.C1 / level, D11=form.D11 / level, D12=form.D12 / level)

@@ -8,7 +8,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delay_form import DelayForm, delay_form, from_rational
-from actuator_lti.margins.delayed import delayed_margins
+from actuator_lti.margins.delayed import delayed_margins, without_intervals
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured import measured_margins
@@ -113,7 +113,15 @@ def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -
     """In double precision, and by certified intervals where the two ways to stability do not both tell."""
     from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
 
-    margins = delayed_margins(form, band)
+    try:
+        margins = delayed_margins(form, band)
+    except NumericalError as error:
+        if form.sampled:
+            raise
+        try:
+            return certified_delayed_margins(form, without_intervals(form, band), band)
+        except (NumericalError, InputError):
+            raise error from None
     told_twice = margins.agreement.agree and None not in (
         margins.agreement.unstable_poles,
         margins.agreement.unstable_nyquist,

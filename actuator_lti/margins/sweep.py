@@ -16,6 +16,7 @@ from actuator_lti.margins.trust import TOUCH
 
 RESOLVED = 0.05  # change inside an interval, relative to the value, below which it is not split further
 _MOST = 400_000
+_MOST_SLOW = 30_000  # below the turns of the delay: poles that need more are lost in rounding
 _NARROWEST = 1e-12
 _STEPS = 80
 _CLOSE = 1e-14
@@ -44,10 +45,9 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Intervals], Mas
         good = resolved(intervals)
         done.append(_taken(intervals, good))
         low, high = low[~good], high[~good]
-        if count > _MOST:
+        if count > (_MOST if _turning(form, high) else _MOST_SLOW):
             raise NumericalError(
-                f"more than {_MOST} intervals up to {edges[-1]:.4g} rad/s: the delay turns the loop too many "
-                "times while its gain is of consequence; shorten the delay, or ask for a narrower band_rad_s"
+                f"{count} intervals up to {edges[-1]:.4g} rad/s did not do: {_why(form, high)}"
             )
         if low.size and float(((high - low) / high).min()) < _NARROWEST:
             raise NumericalError(
@@ -56,6 +56,24 @@ def subdivided(form: DelayForm, edges: Real, resolved: Callable[[Intervals], Mas
         middle = 0.5 * (low + high)
         low, high = np.concatenate((low, middle)), np.concatenate((middle, high))
     return joined(done)
+
+
+def _turning(form: DelayForm, unsettled: Real) -> bool:
+    """Whether a delay turns the loop at all up to these frequencies."""
+    longest = max([form.series, *form.delays.tolist()], default=0.0)
+    return float(unsettled.max(initial=0.0)) * longest > 1.0
+
+
+def _why(form: DelayForm, unsettled: Real) -> str:
+    if _turning(form, unsettled):
+        return (
+            "the delay turns the loop too many times while its gain is of consequence; shorten the delay, or "
+            "ask for a narrower band_rad_s"
+        )
+    return (
+        f"rounding hides the loop below {unsettled.max(initial=0.0):.3g} rad/s, where its gain rises too far "
+        "(slow poles beside those at zero)"
+    )
 
 
 def _taken(intervals: Intervals, mask: Mask) -> Intervals:

@@ -11,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.dynamic import FrictionForm, Recipe
 from analyses.identification.electrical import ElectricalFit, electrical_estimate, fit_electrical
+from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
 from analyses.identification.joint_model import JointModel
@@ -118,9 +119,10 @@ def identify_bench(
         start = design_with_estimate(start, electrical_estimate(start, electrical, told))
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
-    model = _unbiased(start, model, used, settings)
+    model, simulated = _unbiased(start, model, used, settings)
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
-    items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled)
+    lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
+    items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled, *filter(None, lags))
     try:
         estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
         made = design_with_estimate(with_structure(start, model), estimate)
@@ -164,13 +166,13 @@ def _fitted(
 
 def _unbiased(
     start: Design, model: JointModel, used: Sequence[Record], settings: BenchSettings
-) -> JointModel:
-    """The model less its own bias, where a design can be made of it and simulated."""
+) -> tuple[JointModel, tuple[Record, ...]]:
+    """The model less its own bias, where a design can be made of it and simulated; the simulated records."""
     try:
         estimate = joint_estimate(start, model, "", inertia_to=settings.inertia_to)
         made = design_with_estimate(with_structure(start, model), estimate)
     except InputError:
-        return model  # said where the design is made
+        return model, ()  # said where the design is made
     return without_bias(start, made, model, used, _recipe(used[0], settings))
 
 

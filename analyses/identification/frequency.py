@@ -57,8 +57,8 @@ def excited_lines(
 
     A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first. The
     noise of a line is what the spectrum of the whole record holds beside it, where a periodic signal has
-    nothing. (The scatter between periods would be too large: what a motion that is not periodic leaves at the ends of one
-    period comes back at the start of the next with the opposite sign, and goes out of the mean.)
+    nothing. (The scatter between periods would be too large: what a motion that is not periodic leaves at the
+    ends of one period comes back at the start of the next with the opposite sign, and goes out of the mean.)
 
     Parameters
     ----------

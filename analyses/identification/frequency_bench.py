@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,14 +122,14 @@ def identify_frequency(
     used = {**used, "angle": "motor angle", command: used.get(command, "its period")}
     lines = _between_ticks(design, record, excited_lines(with_torque, tuple(names), period))
     held = _held(design, dict(fixed or {}))
-    fit = _fitted(lines, reduction, names, held)
+    fit = _fitted(lines, reduction, names, held, _reaction(design, with_torque))
     play = None if play_record is None else _play_of(design, play_record, fit)
     made = _made(design, fit, play, held, record.name, behind)
     text = write_design(made)
     records = [record] if play_record is None else [record, play_record]
     findings = {one.name: check_record(design, one) for one in records}
     items = [inputs_item(name, result) for name, result in findings.items()]
-    items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name)]
+    items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name, fit.reaction)]
     return FrequencyResult(
         record=record,
         play_record=play_record,
@@ -176,7 +177,22 @@ def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]
     return replace(record, signals=signals), {source: f"drive: {told}"}
 
 
-def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float]) -> TwoMass:
+def _reaction(design: Design, record: Record) -> float:
+    """Torque on the motor by that in the coupling: 1/N_c, and the friction that grows with it.
+
+    ``CM N_r`` with the sign of the power that goes to the load, by the mean speed and current of the record:
+    the flank on which it was taken.
+    """
+    mean = float(np.mean(record["torque_at_motor"]))
+    turned = float(record["angle"][-1] - record["angle"][0])
+    side = np.sign(mean * turned) if abs(turned) > 1.0 else 0.0
+    own = design.friction.load_coefficient * design.ratio_behind_coupling
+    return float(1.0 / design.ratio_to_coupling + side * own)
+
+
+def _fitted(
+    lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float], reaction: float
+) -> TwoMass:
     """The fit; a damping or friction that comes out negative is held at zero, the errors stay those without.
 
     One that is merely small against its error stays: held at zero, its part would go into the others, beyond
@@ -184,22 +200,36 @@ def _fitted(lines: Lines, reduction: float, names: Sequence[str], held: Mapping[
     """
     start = {**start_of(lines, reduction, torque=names[0]), **held}
     load = "load_angle" if "load_angle" in names else None
-    fit = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed=held)
+    go = partial(fit_two_mass, lines, reduction=reduction, torque=names[0], load=load, reaction=reaction)
+    fit = go(start, fixed=held)
     if fit.misfit > MISFIT_DOUBTED:
         for other in other_starts(start, lines, reduction):
             with suppress(NumericalError, np.linalg.LinAlgError):
-                again = {**other, **held}
-                result = fit_two_mass(lines, again, reduction, torque=names[0], load=load, fixed=held)
-                start, fit = (again, result) if result.misfit < fit.misfit else (start, fit)
+                result = go({**other, **held}, fixed=held)
+                fit = result if result.misfit < fit.misfit else fit
             if fit.misfit <= MISFIT_DOUBTED:
                 break
     below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
-    zero = dict.fromkeys(below, 0.0)
-    held_at_zero = fit_two_mass(lines, start, reduction, torque=names[0], load=load, fixed={**held, **zero})
-    rows = [fit.names.index(name) for name in held_at_zero.names]
-    return replace(held_at_zero, covariance=fit.covariance[np.ix_(rows, rows)])
+    return _held_at_zero(fit, below)
+
+
+def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
+    """The fit where some parameters are zero: the others move as their covariance with these has it."""
+    gone = [fit.names.index(name) for name in below]
+    rest = [k for k in range(len(fit.names)) if k not in gone]
+    gain = np.linalg.solve(fit.covariance[np.ix_(gone, gone)], fit.covariance[np.ix_(gone, rest)])
+    values = fit.values[rest] - fit.values[gone] @ gain
+    again = replace(
+        fit,
+        names=tuple(fit.names[k] for k in rest),
+        values=values,
+        covariance=fit.covariance[np.ix_(rest, rest)],
+        fixed={**fit.fixed, **dict.fromkeys(below, 0.0)},
+    )
+    more = [name for name in FLOORS if name in again.names and again[name] < 0.0]
+    return _held_at_zero(again, more) if more else again
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
@@ -223,7 +253,8 @@ OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
 
 def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
     """The play, its error with what the errors of the frequency response make of it."""
-    own = {name: fit[name] for name in OF_THE_LOAD}
+    dry, dry_std = _load_dry(design)
+    own = {**{name: fit[name] for name in OF_THE_LOAD}, "load_dry": dry}
     play = _play_at(design, record, fit, own)
     names = [name for name in OF_THE_LOAD if name in fit.names]
     rows = [fit.names.index(name) for name in names]
@@ -234,7 +265,20 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
         slopes.append((moved.half_rad - play.half_rad) / step if step > 0.0 else 0.0)
     g = np.array(slopes)
     passed_on = float(np.sqrt(max(g @ fit.covariance[np.ix_(rows, rows)] @ g, 0.0)))
+    if dry_std > 0.0:
+        moved = _play_at(design, record, fit, {**own, "load_dry": dry + dry_std})
+        passed_on = float(np.hypot(passed_on, moved.half_rad - play.half_rad))
     return replace(play, half_std_rad=float(np.hypot(play.half_std_rad, passed_on)))
+
+
+def _load_dry(design: Design) -> tuple[float, float]:
+    """The design's dry friction behind the coupling, which the play is found with, and its standard error."""
+    friction, parameter = design.load.friction, design.parameters.get("load.friction.dry_torque")
+    if friction is None:
+        return 0.0, 0.0
+    tolerance = None if parameter is None else parameter.tolerance
+    std = 0.0 if tolerance is None else tolerance.std or (tolerance.half_width or 0.0) / np.sqrt(3.0)
+    return friction.dry_torque_Nm, float(std)
 
 
 def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
@@ -246,7 +290,7 @@ def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, 
     cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
     motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)
     load = filtered_motion(behind * record["output_angle"], period, cutoff_hz=cutoff, order=4)
-    inertial = values["load_inertia"] * load.acceleration
+    inertial = values["load_inertia"] * load.acceleration + values["load_dry"] * np.sign(load.velocity)
     if "torque" in record.signals:
         inertial = inertial - record["torque"] / behind
     twist = motor.position / fit.reduction - load.position
@@ -288,7 +332,7 @@ def _misfit_item(fit: TwoMass) -> Item:
     )
 
 
-def _written_item(written: Design, lines: Lines, record: str) -> Item:
+def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
     """The response of the design as it was written against the measured lines."""
     coupling, friction = written.coupling, written.load.friction
     assert coupling is not None
@@ -300,7 +344,7 @@ def _written_item(written: Design, lines: Lines, record: str) -> Item:
         "viscous": written.friction.viscous_Nms_rad,
         "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
     }
-    model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling)
+    model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling, reaction)
     measured, relative = response(lines, "angle", lines.names[0])
     weight = 1.0 / np.maximum(relative, 1e-3)
     error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))

@@ -26,7 +26,7 @@ UNSURE_SHARE = 0.5
 
 def without_bias(
     start: Design, made: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
-) -> JointModel:
+) -> tuple[JointModel, tuple[Record, ...]]:
     """The model less what the same fit finds too much in records simulated with the design that came of it.
 
     Sampling between the controller's ticks, filtered speeds at reversals, play and rest are met by the
@@ -43,12 +43,27 @@ def without_bias(
         That came of it; it is simulated.
     recipe : Recipe or None
         Of the fit.
+
+    Returns
+    -------
+    JointModel, tuple of Record
+        With the records as they were simulated; none where they could not be.
     """
     reason = _cannot(made, records)
     if reason:
-        return replace(model, bias_told=reason)
+        return replace(model, bias_told=reason), ()
     try:
-        simulated = [_simulated(made, record) for record in records]
+        simulated = tuple(_simulated(made, record) for record in records)
+    except (InputError, NumericalError) as error:
+        return replace(model, bias_told=f"not taken off: {error}"), ()
+    return _corrected(start, made, model, simulated, recipe), simulated
+
+
+def _corrected(
+    start: Design, made: Design, model: JointModel, simulated: Sequence[Record], recipe: Recipe | None
+) -> JointModel:
+    """The model less what the same fit finds too much in the simulated records."""
+    try:
         again = fit_records(
             start,
             simulated,

@@ -203,6 +203,7 @@ def record_rows(
         told = f"{told}, {sides.told}"
     if driven_by == "current":
         constant = design.effective_motor.torque_constant_Nm_A
+        assert constant is not None  # drive_of has used it
         drive = constant * mean_current(design, record, record["current"], motion.acceleration)
     names, columns = _friction_columns(motion, form, knots_rad_s)
     if back_emf:

@@ -83,7 +83,7 @@ def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
 def mean_current(design: Design, record: Record, current: FloatArray, acceleration: FloatArray) -> FloatArray:
     """The current between the ticks: the samples less their lead times the rate of what the voltage drives.
 
-    That rate is ``di/dt + (kE/R) dw/dt``. A correction that is not small belongs to another current than this.
+    That rate is ``di/dt + (kE/R) dw/dt``. A correction that is not small is left out.
     """
     held = held_voltage(design, record)
     if held is None:

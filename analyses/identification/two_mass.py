@@ -36,6 +36,7 @@ class TwoMass:
     reduction: float
     misfit: float
     lines: int
+    reaction: float = 0.0
 
     def __getitem__(self, name: str) -> float:
         return float(self.values[self.names.index(name)]) if name in self.names else self.fixed[name]
@@ -76,16 +77,20 @@ class TwoMass:
         return middle, float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
 
-def angle_responses(omega: FloatArray, p: Mapping[str, float], n: float) -> tuple[ComplexArray, ComplexArray]:
+def angle_responses(
+    omega: FloatArray, p: Mapping[str, float], n: float, reaction: float | None = None
+) -> tuple[ComplexArray, ComplexArray]:
     """Motor angle and load angle over motor torque (model.md section 6, without play).
 
-    ``J_m s^2 th + Cv s th + T/n = torque``, ``J_l s^2 phi + Cv_l s phi = T``, ``T = (k + c s)(th/n - phi)``.
+    ``J_m s^2 th + Cv s th + r T = torque``, ``J_l s^2 phi + Cv_l s phi = T``, ``T = (k + c s)(th/n - phi)``;
+    r is 1/n, or ``1/n + CM' sgn(w T)`` where friction grows with the torque that the coupling carries.
     """
+    share = 1.0 / n if reaction is None else reaction
     s = 1j * omega
     spring = p["stiffness"] + p["damping"] * s
     load = p["load_inertia"] * s**2 + p["load_viscous"] * s
     motor = p["motor_inertia"] * s**2 + p["viscous"] * s
-    both = motor * (load + spring) + spring * load / n**2
+    both = motor * (load + spring) + spring * load * share / n
     return np.asarray((load + spring) / both), np.asarray(spring / n / both)
 
 
@@ -98,6 +103,7 @@ def fit_two_mass(
     motor: str = "angle",
     load: str | None = None,
     fixed: Mapping[str, float] | None = None,
+    reaction: float | None = None,
 ) -> TwoMass:
     """Fit the two-mass drive to the lines, by maximum likelihood with noise on all signals.
 
@@ -115,6 +121,8 @@ def fit_two_mass(
         N_c, up to the coupling.
     fixed : mapping, optional
         Parameters that are held.
+    reaction : float, optional
+        Torque on the motor by that in the coupling; 1/N_c by default.
 
     Raises
     ------
@@ -135,7 +143,7 @@ def fit_two_mass(
         return {**held, **{name: value if name in FLOORS else abs(value) for name, value in own.items()}}
 
     def residual(q: FloatArray) -> FloatArray:
-        g = angle_responses(lines.omega_rad_s, unpacked(q), reduction)
+        g = angle_responses(lines.omega_rad_s, unpacked(q), reduction, reaction)
         both = _whitened(lines, [output for output, _ in outputs], torque, [g[k] for _, k in outputs])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
@@ -158,6 +166,7 @@ def fit_two_mass(
         covariance=np.asarray(covariance),
         fixed=held,
         reduction=reduction,
+        reaction=1.0 / reduction if reaction is None else reaction,
         misfit=misfit,
         lines=len(lines.omega_rad_s) * len(outputs),
     )

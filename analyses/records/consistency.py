@@ -43,6 +43,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
         _reduction,
         _electrical,
         _command,
+        _kind_of_current,
         _current_limit,
         _speed_limit,
         _voltage_limit,
@@ -128,7 +129,8 @@ def _clock(design: Design, record: Record) -> Finding | None:
     off = abs(ticks - round(ticks))
     subject = "sampling period against the drive's tick"
     if off <= TICK_TOLERANCE * ticks:
-        return Finding(subject=subject, passed=True, text=f"{round(ticks)} ticks")
+        whole = f"{round(ticks)} ticks; a clock that is off by a whole number of them is not seen here"
+        return Finding(subject=subject, passed=True, text=whole)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
     return Finding(subject=subject, passed=None, text=text)
 
@@ -249,6 +251,19 @@ def _within(subject: str, what: str, result: float, limit: float, unit: str) -> 
 
 def _largest(values: FloatArray) -> float:
     return float(np.quantile(np.abs(values), 0.999))
+
+
+def _kind_of_current(design: Design, record: Record) -> Finding | None:
+    """What a current is whose scale nothing else in the record tells."""
+    if "current" not in record.signals or "voltage" in record.signals:
+        return None
+    if record.signals.keys() & {"force", "torque_reference", "current_reference"}:
+        return None
+    text = (
+        "without a voltage, a current or torque command nothing in this record tells its scale (rms read as "
+        "DC: 0.82 times): inertia and friction come out in proportion to it"
+    )
+    return Finding(subject="scale of the current", passed=None, text=text)
 
 
 def _current_limit(design: Design, record: Record) -> Finding | None:

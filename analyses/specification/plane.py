@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.facts import circuit_resistance_ohm, stall_torque_Nm
 
 POINTS = 41
 
@@ -58,7 +58,8 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
         assert motor.resistance_ohm is not None
         assert motor.torque_constant_Nm_A is not None
         assert motor.back_emf_constant_Vs_rad is not None
-        k_M, k_E, R = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad, motor.resistance_ohm
+        k_M, k_E = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+        R = circuit_resistance_ohm(design)
         if math.isfinite(limits.voltage_V):
             no_load = limits.voltage_V / k_E
             line = np.linspace(0.0, no_load, POINTS)

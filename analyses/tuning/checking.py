@@ -43,9 +43,9 @@ def confirm(
 
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
     rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
-    for item, found in zip(requirements, binding, strict=True):
-        if found.corner:
-            rows.setdefault(tuple(sorted(found.corner.items())), []).append(item)
+    for item, result in zip(requirements, binding, strict=True):
+        if result.corner:
+            rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
     verdicts: list[RequirementVerdict] = []
     for corner, asked in rows.items():
         design = with_values(tuned, dict(corner), check=False)

@@ -33,10 +33,10 @@ def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
         Whether to stop where already the nominal design misses a limit.
     """
     corners = problem.all_corners
-    found = problem.distances(problem.present[None, :], corners)[0]
-    if found.min() >= 0.0:
-        return Solution(problem.present, float(found.min()), corners[:1])
-    working = np.vstack([corners[:1], violated(found, problem, problem.present, corners, corners[:1])])
+    result = problem.distances(problem.present[None, :], corners)[0]
+    if result.min() >= 0.0:
+        return Solution(problem.present, float(result.min()), corners[:1])
+    working = np.vstack([corners[:1], violated(result, problem, problem.present, corners, corners[:1])])
     near = _rounds(problem, None, working)
     if near is not None and near.slack >= 0.0:
         return near
@@ -57,9 +57,9 @@ def _rounds(problem: Problem, firm: Solution | None, working: np.ndarray) -> Sol
         gains = _nearest(problem, gains, None if firm is None else firm.gains, working)
         if gains is None:
             return None
-        found = problem.distances(gains[None, :], corners)[0]
-        last = Solution(gains, float(found.min()), working)
-        fresh = violated(found, problem, gains, corners, working)
+        result = problem.distances(gains[None, :], corners)[0]
+        last = Solution(gains, float(result.min()), working)
+        fresh = violated(result, problem, gains, corners, working)
         if last.slack >= 0.0 or not len(fresh) or problem.spent:
             break
         working = np.vstack([working, fresh])
@@ -103,10 +103,10 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     settings = {"maxiter": 60, "ftol": 1e-10}
     bounds = [*zip(low, high, strict=True)]
     try:
-        found = minimize(cost, begin, method="SLSQP", bounds=bounds, constraints=met, options=settings).x
+        result = minimize(cost, begin, method="SLSQP", bounds=bounds, constraints=met, options=settings).x
     except Spent:
-        found = program.best if program.seen else begin
-    rows = found + WAY[:, None] * (begin - found)
+        result = program.best if program.seen else begin
+    rows = result + WAY[:, None] * (begin - result)
     return np.clip(problem.values(np.clip(rows, low, high)), problem.lower, problem.upper)
 
 
@@ -121,8 +121,8 @@ def _nearer(
             rows = rows[problem.distances(rows, corners).min(axis=(1, 2)) >= 0.0]
     if not len(rows):
         return known
-    found: np.ndarray = rows[int(np.argmin(problem.change(rows)))]
-    return found
+    result: np.ndarray = rows[int(np.argmin(problem.change(rows)))]
+    return result
 
 
 def _shells(problem: Problem, best: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:

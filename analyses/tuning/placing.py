@@ -147,12 +147,12 @@ def _lowpass(design: Design) -> tuple[Filter, list[Variable]]:
 
 def _feedforward(design: Design) -> list[Variable]:
     position = design.controller.position_loop
-    found = [("feedforward", position.feedforward)]
+    result = [("feedforward", position.feedforward)]
     if design.controller.velocity is not None:
-        found.append(("acceleration_feedforward", position.acceleration_feedforward))
+        result.append(("acceleration_feedforward", position.acceleration_feedforward))
     return [
         Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
-        for key, value in found
+        for key, value in result
     ]
 
 

@@ -124,10 +124,10 @@ def maximise(
     settings = {"maxiter": iterations, "ftol": 1e-9}
     begin = np.append(x0, first if most is None else min(first, most))
     try:
-        found = minimize(
+        result = minimize(
             program.cost, begin, jac=program.cost_slope, method="SLSQP", bounds=bounds,
             constraints=met, options=settings,
         ).x[:-1]  # fmt: skip
     except Spent:
-        found = program.best
-    return problem.values(np.clip(found, low, high))
+        result = program.best
+    return problem.values(np.clip(result, low, high))

@@ -86,7 +86,7 @@ def tune(
     tell(0, stages)
     rules = rule_gains(design)
     searched = 0
-    best: Found | None = None
+    best: Attempt | None = None
     for k, elements in enumerate(choices):
         placed = place(design, elements)
         problem = problem_of(
@@ -95,25 +95,25 @@ def tune(
         solution = _solved(problem, settings.aim, give_up=k + 1 < len(choices))
         searched += problem.evaluations
         if best is None or solution.slack > best.solution.slack:
-            best = Found(placed, problem, solution, problem.evaluations)
+            best = Attempt(placed, problem, solution, problem.evaluations)
         tell(k + 1, stages)
         if solution.slack >= 0.0:
             break
     assert best is not None
     placed, problem, solution = best.placed, best.problem, best.solution
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
-    found = problem.distances(gains[None, :], problem.all_corners)[0]
+    result = problem.distances(gains[None, :], problem.all_corners)[0]
     tuned = replace(_tuned(problem, gains), name=f"{design.name}-tuned")
     tell(len(choices) + 1, stages)
-    requirements = _binding(problem, gains, found, settings.aim)
+    requirements = _binding(problem, gains, result, settings.aim)
     confirmed = confirm(tuned, wanted, requirements)
     tell(len(choices) + 2, stages)
-    checks = nonlinear_checks(tuned, problem, gains, found) if settings.check else ()
+    checks = nonlinear_checks(tuned, problem, gains, result) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
-        bool(found.min() >= 0.0) and all(v.passed is True for v in confirmed),
+        bool(result.min() >= 0.0) and all(v.passed is True for v in confirmed),
         design,
         tuned,
         _settings(problem, design, rules, solution.gains, gains),
@@ -123,7 +123,7 @@ def tune(
         checks,
         curve,
         searched,
-        (*_notes(problem, gains, found), *_said(confirmed)),
+        (*_notes(problem, gains, result), *_said(confirmed)),
         settings.aim,
         placed.elements,
         confirmed,
@@ -136,7 +136,7 @@ def share_of(searched: int, choices: int) -> int:
 
 
 @dataclass(frozen=True)
-class Found:
+class Attempt:
     """What one choice of elements came to."""
 
     placed: Placed
@@ -152,7 +152,7 @@ def _solved(problem: Problem, aim: Aim, *, give_up: bool) -> Solution:
 
 
 def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
-    """Where a certified margin does not bear out what the search found."""
+    """Where a certified margin does not bear out what the search result."""
     return tuple(
         f"Not confirmed by certified margins: {v.id}: "
         + (v.reason if v.value is None else f"{v.value:.6g} {v.requirement.unit}")
@@ -185,17 +185,17 @@ def _tuned(problem: Problem, gains: np.ndarray) -> Design:
 
 
 def _binding(
-    problem: Problem, gains: np.ndarray, found: np.ndarray, aim: Aim
+    problem: Problem, gains: np.ndarray, result: np.ndarray, aim: Aim
 ) -> tuple[BindingRequirement, ...]:
     """Every requirement at its worst corner."""
-    smallest = float(found.min())
+    smallest = float(result.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
     if aim == "least-change":  # nothing binds a design that meets all as it came
         enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
     made = []
     for k, requirement in enumerate(problem.requirements):
-        corner = int(np.argmin(found[:, k]))
-        relative = float(found[corner, k])
+        corner = int(np.argmin(result[:, k]))
+        relative = float(result[corner, k])
         known = -3.0 < relative < 10.0
         distance = relative * size_of(requirement) if known else None
         made.append(
@@ -244,7 +244,7 @@ def _settings(
     return tuple(made)
 
 
-def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str, ...]:
+def _notes(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[str, ...]:
     notes = [
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
         "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
@@ -254,8 +254,8 @@ def _notes(problem: Problem, gains: np.ndarray, found: np.ndarray) -> tuple[str,
         notes.append(f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}.")
     if problem.spent:
         notes.append(f"The search ended after {problem.evaluations} designs, its bound.")
-    if found.min() < 0.0:
-        missed = [r.id for k, r in enumerate(problem.requirements) if found[:, k].min() < 0.0]
+    if result.min() < 0.0:
+        missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
         notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")
     at_end = (gains <= problem.lower * (1 + 1e-9)) | (gains >= problem.upper * (1 - 1e-9))
     at_end &= gains != problem.present

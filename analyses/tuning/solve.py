@@ -53,11 +53,11 @@ def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     best: Solution | None = None
     for _ in range(ROUNDS):
         gains = _best_of([_climb(problem, start, working) for start in starts], problem, working)
-        found = problem.distances(gains[None, :], corners)[0]
-        slack = float(found.min())
+        result = problem.distances(gains[None, :], corners)[0]
+        slack = float(result.min())
         if best is None or slack > best.slack:
             best = Solution(gains, slack, working)
-        fresh = violated(found, problem, gains, corners, working)
+        fresh = violated(result, problem, gains, corners, working)
         hopeless = give_up and float(problem.distances(gains[None, :], working).min()) < 0.0
         if not len(fresh) or hopeless or problem.spent:
             break
@@ -87,14 +87,14 @@ def _best_of(candidates: list[np.ndarray], problem: Problem, working: np.ndarray
 
 
 def violated(
-    found: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
+    result: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
 ) -> np.ndarray:
     """For each requirement its worst corner, where it is worse than in the working set."""
     known = problem.distances(gains[None, :], working)[0].min()
     fresh = []
-    for k in range(found.shape[1]):
-        worst = int(np.argmin(found[:, k]))
-        if found[worst, k] < known - 1e-6 and not _among(corners[worst], working):
+    for k in range(result.shape[1]):
+        worst = int(np.argmin(result[:, k]))
+        if result[worst, k] < known - 1e-6 and not _among(corners[worst], working):
             fresh.append(corners[worst])
     return np.unique(np.array(fresh), axis=0) if fresh else np.empty((0, corners.shape[1]))
 

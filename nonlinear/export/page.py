@@ -14,6 +14,7 @@ from nonlinear.parameters import design_row
 PLACES = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
     "current": at.IO_CURRENT, "flags": at.IO_FLAGS, "period": at.PERIOD, "ratio": at.RATIO,
+    "stick": at.FLAG_STICK,
 }  # fmt: skip
 EVERY_POSITION, EVERY_VELOCITY = at.EVERY_POSITION, at.EVERY_VELOCITY
 SPEED_LIMIT, ACCELERATION_LIMIT = at.SPEED_LIMIT, at.ACCELERATION_LIMIT

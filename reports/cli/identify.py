@@ -79,7 +79,10 @@ PeriodOption = Annotated[
 BenchOption = Annotated[
     Path | None,
     typer.Option(
-        "--virtual-bench", metavar="DIR", help="Write the files of a simulated campaign there instead."
+        "--virtual-bench",
+        metavar="DIR",
+        help="Write the files of a simulated campaign there instead; with --frequency-response those of a "
+        "compliant drive's multisine and reversal.",
     ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of the virtual bench.")]
@@ -187,7 +190,8 @@ def identify(
 
     identify --virtual-bench folder --seed 1: simulate a campaign of 54 runs,
     and write logs and campaign.toml as a bench would. Try the first way on
-    it.
+    it. With --frequency-response --design joint: the sweep and the reversal
+    of a compliant drive, for the third way.
 
     Every column of every file is accounted for. Each record is held against
     itself and against the design's limits, and the written design against the
@@ -217,6 +221,9 @@ def identify(
         raise InputError("give one of: a campaign file, records, --virtual-bench DIR")
     elif virtual_bench is not None:
         drive = load_drive(design or "ilr33-amber", changes)
+        if frequency_response:
+            identify_frequency.bench(virtual_bench, design or "ilr33-amber", drive, seed, force, as_json)
+            return
         _bench(virtual_bench, design or "ilr33-amber", drive, seed, force, as_json, quiet)
     elif frequency_response:
         identify_frequency.run(given, play, period, common)

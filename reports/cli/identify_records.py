@@ -73,12 +73,14 @@ def as_data(result: BenchResult, written: Path | None) -> dict[str, Any]:
                 "standard_error": s,
                 "standard_error_correlated": d,
                 "between_records": model.between[n],
+                "bias_removed": model.bias.get(n),
             }
             for n, v, s, d in values
         },
         "electrical": None if result.electrical is None else asdict(result.electrical),
         "laws": [asdict(law) for law in result.laws],
         "fixed": {name: asdict(one) for name, one in model.fixed.items()},
+        "bias": model.bias_told,
         "covariance": model.covariance,
         "relative_residual": model.relative_residual,
         "records": [

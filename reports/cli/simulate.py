@@ -262,6 +262,8 @@ def write_files(run: Trajectory, csv: Path | None, parquet: Path | None, plot: P
 
 def show(run: Trajectory, files: list[str], as_json: bool) -> None:
     """Print the summary."""
+    import math
+
     from reports.cli.output import print_json, print_line
     from reports.sections.trajectory import summary
 
@@ -275,6 +277,9 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
         if isinstance(value, float):
             print_line(f"  {_in_words(name, value)}")
     for name, use in run.limits.items():
+        if math.isinf(use.limit):
+            print_line(f"  {name + ' limit':26} none")
+            continue
         words = "never" if use.first_time_s is None else f"{100 * use.fraction:.3g} % of the time, "
         words += "" if use.first_time_s is None else f"first at {use.first_time_s:.6g} s"
         print_line(f"  {name + ' limit':26} {use.limit:.6g} {use.unit}: {words}")

@@ -8,14 +8,20 @@ from typing import Any
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
+from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, linear_limiters, page
 from nonlinear.export.c_files import exported
+from reports.figures.map import WORDS
 from reports.live.keys import followed
 from reports.live.text import patches
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
 MAP = "The friction of the loops has the slope of the first piece of its map."
 OPEN = "The drive has no loop."
+COLUMNS, LEVELS = 18, 12  # cells of the map
+LOWEST = 1.0 / 200.0  # of full deflection
+LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
@@ -51,6 +57,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "others": sum(item.quantity not in LOOP_QUANTITIES for item in design.requirements),
         "step": _step(design),
         "limits": _limits(design),
+        "map": _map(design),
         "text": text,
         "patches": places,
     }
@@ -112,6 +119,24 @@ def _step(design: Design) -> dict[str, Any]:
         "unit": "A",
         "factor": 1.0,
         "of": "current",
+    }
+
+
+def _map(design: Design) -> dict[str, Any] | None:
+    """Give the cells of the map of sines, and the rule that names them; none without a position loop."""
+    if design.controller.position is None:
+        return None
+    return {
+        "columns": COLUMNS,
+        "levels": LEVELS,
+        "updates": LEAST_UPDATES,
+        "lowest": LOWEST,
+        "longest": LONGEST_TICKS,
+        "full": design.validation.full_deflection_rad,
+        "stick": STICK_FRACTION,
+        "decibel": FRICTION_DB,
+        "degrees": FRICTION_DEG,
+        "words": WORDS,
     }
 
 

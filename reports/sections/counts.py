@@ -21,7 +21,7 @@ def section(found: Sequence[Counts], axis: str = "rotary") -> Section:
         "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "
         "output's in its position."
     )
-    blocks = [doc.facts(_facts(one, axis)) for one in found]
+    blocks: list[Block] = [doc.facts(_facts(one, axis)) for one in found]
     cycles = [(one, cycle) for one in found for cycle in one.cycles]
     if cycles:
         blocks.append(_cycles(cycles, axis))

@@ -114,6 +114,7 @@ def parameter_table(result: BenchResult, axis: str) -> Block:
         doc.column("value", "Value", format="sig:7"),
         doc.column("white", "Standard error, white residuals", format="sig:4"),
         doc.column("std", "Standard error", format="sig:3"),
+        *([doc.column("bias", "Bias removed", format="sig:3")] if model.bias else []),
         doc.column("unit", "Unit"),
     ]
     rows: list[Row] = []
@@ -126,12 +127,13 @@ def parameter_table(result: BenchResult, axis: str) -> Block:
                 "white": model.standard_errors[k],
                 "std": float(np.sqrt(model.covariance[k, k])),
                 "unit": unit,
+                **({"bias": model.bias[name]} if model.bias else {}),
             }
         )
     note = (
         "White residuals: ordinary least squares, as is usually published. Standard error: with the "
         "autocorrelation of the residuals, and the scatter between records where there are several; this one "
-        "goes into the design."
+        "goes into the design." + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
     )
     return doc.table("Identified parameters", columns, rows, note)
 

@@ -38,7 +38,7 @@ def section(result: FrequencyResult) -> Section:
     fit = result.fit
     intro = (
         f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
-        "two-mass drive by maximum likelihood with the noise of every line from the scatter between periods. "
+        "two-mass drive by maximum likelihood with the noise of every line from the spectrum beside it. "
         f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
     )
     status: Status = "pass" if result.passed else "fail"
@@ -100,7 +100,8 @@ def response_figures(result: FrequencyResult) -> list[Block]:
     from analyses.identification.two_mass import NAMES, angle_responses
 
     lines, fit = result.lines, result.fit
-    model = angle_responses(lines.omega_rad_s, {name: fit[name] for name in NAMES}, fit.reduction)
+    own = {name: fit[name] for name in NAMES}
+    model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
     hertz = lines.omega_rad_s / (2.0 * np.pi)
     figures = []
     for k, (signal, label) in enumerate((("angle", "motor angle"), ("load_angle", "load angle"))):

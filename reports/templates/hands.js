@@ -77,42 +77,91 @@
     ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "Bandwidth, −3 dB", "Hz", 1],
     ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
   ];
+  const TIMED = ["overshoot", "settling_time", "rise_time"];
   const CLOSED = ["bandwidth", "overshoot", "settling_time"]; // of a break point these say nothing
   const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
   const STABLE = data.quantities.length;
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
   const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
 
-  const BEHIND = -9, DOUBT = -3, QUIET = 150; // ms
+  const BEHIND = -9, DOUBT = -3, QUIET = 150, SLICE = 12, TOO_SLOW = 6; // ms
 
   // --- the module ----------------------------------------------------------------------------------------
   let x = null;
   const view = (at, count) => new Float64Array(x.memory.buffer, at, count);
   const stageOf = (name) => data.stages[name];
   const outer = data.loops[data.loops.length - 1];
-  const compute = (values) => {
+  const slow = new Set(); // loops whose step takes too long for a moving slider: a slow pole beside a short period
+  const compute = (values, whole) => {
     const row = rowOf(values);
     if (!row) return null;
     view(x.p_at(), row.length).set(row);
     const found = { row, loops: {}, points: {} };
-    for (const name of data.loops) found.loops[name] = figures(stageOf(name), 1);
+    for (const name of data.loops) {
+      const began = performance.now(), timed = whole || !slow.has(name);
+      found.loops[name] = figures(stageOf(name), timed ? 1 : 0);
+      found.loops[name].waits = !timed;
+      if (performance.now() - began > TOO_SLOW) slow.add(name);
+    }
     for (const name in data.points) found.points[name] = x.phases_of(data.points[name]) > 1 ? { n: BEHIND } : figures(data.points[name], 0);
     return found;
   };
   // what takes too long for a moving slider: once nothing has moved for a moment, one piece at a time
   let pieces = [], waits = 0;
   const nextPiece = () => {
-    const piece = pieces.shift();
-    if (!piece) { root.dataset.behind = "done"; return; }
-    piece();
+    const end = performance.now() + SLICE;
+    while (pieces.length && performance.now() < end) pieces.shift()();
+    if (!pieces.length) { root.dataset.behind = "done"; return; }
     waits = setTimeout(nextPiece, 0);
   };
   const fillBehind = () => {
     clearTimeout(waits);
     root.dataset.behind = "waits";
-    pieces = [...periodicPieces(before), ...(now === before ? [] : periodicPieces(now)), table];
+    pieces = [...timedPieces(now), ...periodicPieces(before), ...(now === before ? [] : periodicPieces(now)), table, ...mapPieces(now)];
     waits = setTimeout(nextPiece, QUIET);
   };
+  let sines = null, mapGrid = null, inView = false;
+  const mapPieces = (found) => {
+    const loop = found.loops[outer];
+    if (found.cells) { drawMap(found.cells); return []; }
+    drawMap([]);
+    if (!sines || !mapGrid || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
+    const { hertz, amplitude } = mapGrid, { row } = found, cells = [];
+    const tones = hertz.map((f) => sines.toneOf(f, row[data.places.outer] * row[data.places.period]));
+    const settling = loop.figures[PLACE.settling_time], wait = 1.5 * (Number.isFinite(settling) ? settling : 400 * loop.period);
+    const ticks = sines.startUp(row, wait);
+    let linear = null;
+    const listed = [() => { linear = sines.linearAt(row, tones.map((tone) => tone.hertz)); }];
+    for (let j = amplitude.length - 1; j >= 0; j--) {
+      for (let k = 0; k < tones.length; k++) listed.push(() => {
+        const cause = linear && sines.cell(row, tones[k], amplitude[j], linear[k], ticks);
+        if (cause) cells.push({ j, k, cause, ticks, tone: tones[k], amplitude: amplitude[j] });
+      });
+      listed.push(() => drawMap(cells));
+    }
+    listed.push(() => { found.cells = cells; });
+    return listed;
+  };
+  const drawMap = (cells) => {
+    if (!mapGrid) return;
+    const edges = (list, k) => { const half = Math.sqrt(list[1] / list[0]); return [list[k] / half, list[k] * half]; };
+    const { hertz, amplitude } = mapGrid;
+    tell("border", "chart:cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
+      x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: sines.COLOURS[cause], words: data.map.words[cause],
+    })) });
+    const seen = [...new Set(cells.map(({ cause }) => cause))], line = find(".map-keys");
+    line.replaceChildren(...(seen.length ? [html("span", "", "Sine from rest, simulated: ")] : []), ...seen.map((cause) => {
+      const item = html("span", "map-key", data.map.words[cause]);
+      if (cause !== "none") { const box = html("i"); box.style.background = `var(--${sines.COLOURS[cause]})`; item.prepend(box); }
+      return item;
+    }));
+    root.dataset.cells = JSON.stringify(cells.map(({ cause, ticks, tone, amplitude }) => [cause, ticks, tone.hertz, tone.count, amplitude]));
+  };
+  const timedPieces = (found) => data.loops.filter((name) => found.loops[name].waits).map((name) => () => {
+    view(x.p_at(), found.row.length).set(found.row);
+    found.loops[name] = figures(stageOf(name), 1);
+    state();
+  });
   const periodicPieces = (found) => Object.keys(data.points).filter((name) => found.points[name].n === BEHIND).map((name) => () => {
     view(x.p_at(), found.row.length).set(found.row);
     found.points[name] = figures(data.points[name], 0);
@@ -355,6 +404,10 @@
             row.append(html("td"));
             continue;
           }
+          if (own.waits && TIMED.includes(quantity)) {
+            row.append(html("td", "right", "…"));
+            continue;
+          }
           const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity);
           if (bad.has(name + " " + quantity)) td.classList.add("bad");
           row.append(td);
@@ -536,8 +589,10 @@
     for (let k = 0; k <= 90; k++) borderGrid.push(low * (0.98 * top / low) ** (k / 90));
     const part = borderOf(row, borderGrid);
     if (!part) { chart("border").closest(".four > div").hidden = true; return; }
+    if (data.map && Number.isFinite(band[PLACE.bandwidth])) mapGrid = sines.gridOf(Math.max(low, band[PLACE.bandwidth] / 25), Math.min(band[PLACE.bandwidth] * 8, 0.8 * top), data.map.full);
     const [, high] = range([...part.lowest.slice(0, 1), size / data.step.factor], 0, 1e30), [bottom] = range(part.lowest, 0, 1e30);
-    tell("border", "chart:axes", { panel: 0, x: [borderGrid[0], borderGrid[90]], y: [Math.max(bottom / 4, high / 1e7), high * 8] });
+    const ends = mapGrid ? mapGrid.amplitude.map((value) => value / data.step.factor) : [bottom];
+    tell("border", "chart:axes", { panel: 0, x: [borderGrid[0], borderGrid[90]], y: [Math.max(Math.min(bottom, ends[0]) / 4, high / 1e7), Math.max(high * 8, ends[ends.length - 1] * 2)] });
     drawBorder("as designed", part);
   };
 
@@ -666,7 +721,8 @@
     root.hidden = false;
     document.querySelectorAll(".to-hands").forEach((item) => (item.hidden = false));
     makePanel();
-    before = now = compute(start);
+    before = now = compute(start, true);
+    slow.clear(); // the first run pays for the compiler
     if (!before) throw new Error("the design as written is refused");
     const followed = data.loops.filter((name) => before.loops[name].figures);
     if (!followed.includes(shown)) shown = followed[followed.length - 1];
@@ -677,6 +733,12 @@
       button.addEventListener("click", () => choose(name));
       find(".tabs").append(button);
     }
+    sines = data.map ? sineMap({ x, view, data }) : null;
+    new IntersectionObserver(([entry]) => {
+      if (entry.isIntersecting === inView) return;
+      inView = entry.isIntersecting;
+      if (inView && root.dataset.ready) fillBehind();
+    }, { rootMargin: "200px" }).observe(chart("border"));
     runKeys();
     runStart();
     borderStart();

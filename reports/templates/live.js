@@ -133,7 +133,7 @@
       const [sx, tx] = map(this.x, this.drawn.x), [sy, ty] = map(this.y, this.drawn.y);
       const known = new Set(this.curves.map((curve) => curve.node));
       for (const node of this.world.children) {
-        if (known.has(node)) continue;
+        if (known.has(node) || node.classList.contains("cells")) continue; // these are drawn anew
         node.setAttribute("transform", `matrix(${sx} 0 0 ${sy} ${tx} ${ty})`);
         node.style.vectorEffect = "non-scaling-stroke";
       }
@@ -259,6 +259,7 @@
       this.plots.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
       this.plots.addEventListener("blur", () => this.hide());
       root.addEventListener("chart:redraw", (event) => this.redraw(event.detail));
+      root.addEventListener("chart:cells", (event) => this.cells(event.detail));
       root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
     }
     legend() {
@@ -506,6 +507,22 @@
         const label = [...p.group.querySelectorAll("text")].find((node) => node.textContent.startsWith(p.x.name + ", "));
         if (label) label.textContent = `${p.x.name}, ${words}`;
       }
+    }
+    // lays coloured cells behind the curves: {panel, cells: [{x: [from, to], y: [from, to], colour, words}]}
+    cells({ panel, cells }) {
+      const p = this.panels[panel];
+      let holder = p.world.querySelector(".cells");
+      if (!holder) {
+        holder = make("g", { class: "cells", opacity: 0.38 });
+        p.world.prepend(holder);
+      }
+      holder.replaceChildren(...cells.map(({ x, y, colour, words }) => {
+        const [left, right] = x.map((value) => p.x.px(value)), [bottom, top] = y.map((value) => p.y.px(value));
+        const made = make("rect", { x: left.toFixed(2), y: top.toFixed(2), width: Math.max(right - left, 0).toFixed(2), height: Math.max(bottom - top, 0).toFixed(2) });
+        made.style.fill = `var(--${colour})`;
+        make("title", {}, made).textContent = words;
+        return made;
+      }));
     }
     // gives a curve new values, in the units of its axes: {panel, curve (its label), x, y, parameter}
     redraw({ panel, curve, x, y, parameter }) {

@@ -81,6 +81,7 @@ _FILTERS: list[dict[str, Any]] = [
     {"kind": "lowpass", "frequency": "20 Hz", "order": 2, "damping": 0.7},
     {"kind": "lowpass", "frequency": {"value": "30 Hz", "source": "tuned", "tolerance": "5 %"}},
     {"kind": "notch", "frequency": "200 rad/s", "width": "50 rad/s", "depth": 0.1},
+    {"kind": "skewed-notch", "zero": "40 Hz", "pole": "50 Hz", "width": "30 Hz", "depth": 0.1},
     {"kind": "leadlag", "zero": "10 rad/s", "pole": "100 rad/s", "on": "speed"},
     {"kind": "biquad", "b": [0.5, 0.1, 0.2], "a": [-0.4, 0.2]},
 ]

@@ -120,3 +120,14 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         one.startswith("coupling.damping")
         for one in warnings_of(with_overrides(design, {"coupling.damping": "5 N*m*s/rad"}))
     )
+
+
+def test_gear_sheets_state_arc_minutes_and_torque_per_arc_minute() -> None:
+    """One arc minute is 1/60 deg: 10.3 kN m/rad are 3 N m/arcmin; 60 arcsec are an arcmin."""
+    spring = with_overrides(read_design_text(FLAT, "flat"), {"coupling.stiffness": "3 N*m/arcmin"})
+    assert spring.coupling is not None
+    assert spring.coupling.stiffness_Nm_rad == pytest.approx(3 * 60 * 180 / pi, rel=1e-14)
+    for text in ("1 arcmin", "60 arcsec"):
+        play = with_overrides(spring, {"coupling.play": text}).coupling
+        assert play is not None
+        assert play.play_rad == pytest.approx(pi / 180 / 60, rel=1e-14)

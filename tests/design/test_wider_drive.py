@@ -137,3 +137,21 @@ def test_the_current_of_an_ac_motor_is_explained() -> None:
         AMBER, {"motor.constants": "rms-line", "motor.torque_constant": f"{5.9e-3 * sqrt(3)!r} N*m/A"}
     )
     assert any("9.798 A rms" in line for line in warnings_of(design))
+
+
+def test_the_overload_time_of_stacked_designs_is_that_of_each() -> None:
+    """tau = t_peak/ln(r^2/(r^2 - 1)) by the exact numbers of each design."""
+    import numpy as np
+
+    from actuator_lti.design.access import stacked
+
+    base = with_overrides(AMBER, {"limits.peak_current": "12 A", "limits.continuous_current": "4 A",
+                                  "limits.peak_time": "1 s"})  # fmt: skip
+    peaks, times = np.array([8.0, 12.0, 20.0]), np.array([0.5, 1.0, 3.0])
+    many = stacked(base, {"limits.peak_current": peaks, "limits.peak_time": times}).limits.overload_time_s
+    assert many == pytest.approx(
+        [t / log((p / 4) ** 2 / ((p / 4) ** 2 - 1)) for p, t in zip(peaks, times, strict=True)]
+    )
+    assert stacked(base, {"limits.peak_time": times}).limits.overload_time_s == pytest.approx(
+        times * 8.490187, rel=1e-6
+    )

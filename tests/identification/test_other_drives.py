@@ -164,6 +164,29 @@ def test_a_drive_is_found_from_its_record(
     assert errors["found"] < case.met < errors["wrong"]
 
 
+@pytest.mark.parametrize("name", ["ballscrew", "fin"])
+@pytest.mark.parametrize("clock", [1.05, 0.95])
+def test_a_clock_that_is_off_shows_in_the_following_error(
+    name: str, clock: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
+    case = next(case for case in CASES if case.name == name)
+    design = _bare(name)
+    run = simulate(design, case.command, case.seconds, record_every=case.every)
+    table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
+    first = next(iter(table))
+    table[first] = clock * table[first]
+    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=";",
+               header=";".join(table), comments="", fmt="%.10g")  # fmt: skip
+    (tmp_path / "d.toml").write_text(write_design(design))
+    out = tmp_path / "o"
+    arguments = ["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--out", str(out)]
+    assert main([*arguments, "--json"]) == 1
+    checks = {one["id"]: one for one in json.loads(capsys.readouterr().out)["checks"]}
+    assert f"a clock about {100.0 * (clock - 1.0):+.1g}"[:15] in checks["following-r.csv"]["reason"]
+    assert not list(out.glob("*.toml"))
+
+
 def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
     base = _bare("ilr33-amber")

@@ -13,7 +13,7 @@ FINE = 4000
 def _current(a: float, T: float, d: float, w: float) -> tuple[np.ndarray, np.ndarray]:
     """Times within one tick and i(t) of 1/(1 + s/a) under exp(j w k T), switched d after each tick.
 
-    Settled; by superposition of every earlier step of the voltage, sum (u_k - u_(k-1)) (1 - exp(-a (t - t_k))).
+    Settled; the sum over every earlier step of the voltage, (u_k - u_(k-1)) (1 - exp(-a (t - t_k))).
     """
     t = (np.arange(FINE) + 0.5) * T / FINE
     back = np.arange(-round(60.0 / (a * T)) - 20, 1)

@@ -36,8 +36,8 @@ HERTZ = np.arange(2.0, 400.0, 2.0)
 def _design() -> Design:
     """One gear 10:1 without inertia of its own, the rest to be found.
 
-    Its tick is no part of the log's period, as of a recorder of its own: the records below are of a torque
-    without steps between the samples.
+    No friction grows with the load. Its tick is no part of the log's period, as of a recorder of its own:
+    the records below are of a torque without steps between the samples.
     """
     base = load_design("ilr33-amber")
     gear = replace(base.gears[0], name="gear", ratio=N, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
@@ -50,7 +50,7 @@ def _design() -> Design:
     load = replace(base.load, path="back-drivable", inertia_kgm2=1e-3, moment_max_Nm=0.0)
     design = replace(base, gears=(gear,), parameters=kept, limits=limits, load=load, requirements=())
     values = {"motor.torque_constant": KM, "motor.back_emf_constant": KM, "motor.rotor_inertia": 1e-5}
-    values["control.period"] = 7e-5
+    values |= {"control.period": 7e-5, "friction.load_coefficient": 0.0}
     return with_values(design, values, check=False)
 
 

@@ -21,6 +21,7 @@ from actuator_lti.design.model import (
     LoadFriction,
     Motor,
     PositionLoop,
+    Supply,
     Temperature,
     Validation,
 )
@@ -125,3 +126,24 @@ def test_the_speed_limit_belongs_to_the_position_stage() -> None:
     """The speed command is clamped where a position loop gives it; without a velocity loop there is none."""
     assert drive_figures(amber()).rate_limit == "speed limit"
     assert drive_figures(without(amber(), "velocity", gain=1.0)).rate_limit == "voltage"
+
+
+@pytest.mark.parametrize("load", [0.0, 4.0])
+def test_a_sagging_supply_slows_the_drive(load: float) -> None:
+    """At the voltage limit U_s = (R + R_s) i + kE w: by hand, and where the simulator ends up."""
+    from nonlinear import commands, simulate
+
+    base = amber()
+    design = replace(
+        base, supply=Supply(resistance_ohm=0.04), coupling=None,
+        limits=replace(base.limits, speed_rad_s=1e5, acceleration_rad_s2=float("inf"), peak_current_A=1e3),
+    )  # fmt: skip
+    motor, friction = design.motor, design.friction
+    dry = friction.dry_torque_Nm + friction.load_coefficient * load
+    kM, kE = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+    total = motor.resistance_ohm + 0.04
+    w = (kM * design.limits.voltage_V / total - dry) / (friction.viscous() + kM * kE / total)
+    assert capability(design, load).output_rate_rad_s * design.total_ratio == pytest.approx(w, rel=1e-12)
+    assert stall_torque_Nm(design) == pytest.approx(kM * design.limits.voltage_V / total)
+    ran = simulate(design, commands.step(1e3), load_Nm=-load, duration_s=0.5)
+    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)

@@ -84,6 +84,7 @@ def wide_designs(draw: st.DrawFn) -> Design:
     kinds = (
         Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=draw(st.sampled_from([1, 2]))),
         Filter(kind="notch", frequency_rad_s=0.8 / T, width_rad_s=0.3 / T, depth=0.2),
+        Filter(kind="skewed-notch", zero_rad_s=0.5 / T, pole_rad_s=0.7 / T, width_rad_s=0.4 / T, depth=0.1),
         Filter(kind="leadlag", zero_rad_s=0.1 / T, pole_rad_s=0.3 / T, on="speed"),
         Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(1.0, -0.9, 0.25)),
     )

@@ -53,6 +53,10 @@ def coefficients(item: Filter, T: float) -> tuple[list[float], list[float]]:
             top, bottom = [w0**2], [1.0, 2 * item.damping * w0, w0**2]
     elif item.kind == "notch":
         top, bottom = [1.0, item.depth * item.width_rad_s, w0**2], [1.0, item.width_rad_s, w0**2]
+    elif item.kind == "skewed-notch":
+        w0, wz, wp = (item.zero_rad_s * item.pole_rad_s) ** 0.5, item.zero_rad_s, item.pole_rad_s
+        top = [1 / wz**2, item.depth * item.width_rad_s / wz**2, 1.0]
+        bottom = [1 / wp**2, item.width_rad_s / wp**2, 1.0]
     else:
         w0 = (item.zero_rad_s * item.pole_rad_s) ** 0.5
         top, bottom = [1 / item.zero_rad_s, 1.0], [1 / item.pole_rad_s, 1.0]

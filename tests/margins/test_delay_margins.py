@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from actuator_lti.delay_system import DelaySystem
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.collocation import closed_loop_matrix
 from actuator_lti.margins.delay_form import border_values, delay_form, evaluate_intervals, from_rational
@@ -152,3 +152,28 @@ def test_default_band_ends_where_the_gain_stays_below_minus_40_db() -> None:
     step = 2 * math.pi / 0.005
     assert len(m.gain_margins) == 1 + int((1e4 - 0.25 * step) // step)
     assert any("not listed" in note for note in m.notes)
+
+
+@pytest.mark.parametrize("gain", [1.0, 1e100, 1e-100])
+def test_the_bound_between_two_frequencies_holds_or_is_infinite_where_it_overflows(gain: float) -> None:
+    """L = g exp(-s T)/s: |L(x) - L(m)| at the lower end is g (1/low - 1/m) and more; exactly known."""
+    integrator = control.ss([[0.0]], [[1.0]], [[gain]], [[0.0]])
+    form = delay_form(DelaySystem.from_system(integrator) * DelaySystem.delay(1e-3))
+    middle = 10.0 ** np.linspace(-100.0, 4.0, 105)
+    intervals = evaluate_intervals(form, 0.9 * middle, 1.1 * middle)
+    assert np.abs(intervals.L) == pytest.approx(gain / middle, rel=1e-9)
+    assert not np.isnan(intervals.spread).any()
+    for at in (0.9, 0.95, 1.05, 1.1):
+        there = gain / (at * middle) * np.exp(-1j * at * middle * 1e-3 - 0.5j * np.pi)
+        assert (np.abs(there - intervals.L) <= intervals.spread * (1.0 + 1e-9)).all()
+    close = evaluate_intervals(form, middle * (1.0 - 1e-7), middle * (1.0 + 1e-7))  # not a bound without end
+    assert gain != 1.0 or np.isfinite(close.spread).all()
+
+
+def test_what_overflows_and_a_pole_met_exactly_are_numerical_errors() -> None:
+    double = delay_form(DelaySystem.from_system(control.tf([1], [1, 0, 0])) * DelaySystem.delay(1e-3))
+    with pytest.raises(NumericalError, match=r"overflows|pole"):
+        evaluate_intervals(double, np.array([0.9e-200]), np.array([1.1e-200]))
+    undamped = delay_form(DelaySystem.from_system(control.tf([1], [1, 0, 4])) * DelaySystem.delay(1e-3))
+    with pytest.raises(NumericalError, match=r"overflows|pole"):
+        evaluate_intervals(undamped, np.array([1.5]), np.array([2.5]))

@@ -38,6 +38,11 @@ def digital(item: Filter, T: float, x0: float) -> Digital:
     if item.kind == "leadlag":
         w0 = sqrt(item.zero_rad_s * item.pole_rad_s)
         b, a = [1 / item.zero_rad_s, 1], [1 / item.pole_rad_s, 1]
+    elif item.kind == "skewed-notch":
+        wz, wp = item.zero_rad_s, item.pole_rad_s
+        w0 = sqrt(wz * wp)
+        b = [wp**2, wp**2 * item.depth * item.width_rad_s, (wz * wp) ** 2]
+        a = [wz**2, wz**2 * item.width_rad_s, (wz * wp) ** 2]
     else:
         w0 = item.frequency_rad_s
         if item.kind == "notch":

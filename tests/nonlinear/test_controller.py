@@ -38,6 +38,9 @@ def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
             kind="notch", on=on, frequency_rad_s=w(), width_rad_s=w(), depth=float(rng.uniform(0, 0.5))
         ),
         lambda on: Filter(kind="leadlag", on=on, zero_rad_s=w(), pole_rad_s=w()),
+        lambda on: Filter(
+            kind="skewed-notch", on=on, zero_rad_s=w(), pole_rad_s=w(), width_rad_s=w(), depth=0.2
+        ),
         lambda on: Filter(kind="biquad", on=on, b=(0.3, 0.1, 0.05), a=(2.0, -0.8, 0.3)),
         lambda on: Filter(kind="biquad", on=on, b=(0.5,), a=(1.0, -0.5)),
     ]

@@ -66,7 +66,8 @@ def type_value(page: Page, key: str, value: float) -> None:
 
 
 def read(page: Page) -> dict[str, dict[str, float]]:
-    """Read every figure of the page, to all digits."""
+    """Read every figure of the page, to all digits, once those have followed that come behind."""
+    page.wait_for_selector("#hands-on[data-behind=done]")
     cells = page.eval_on_selector_all(
         ".now td[data-figure]",
         "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from live_page import FIGURES, agree, command_line, opened, read, saved, settled, type_value, written
 
@@ -17,6 +19,8 @@ from actuator_lti.design import with_values
 from actuator_lti.design.access import parameter_value
 from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Friction, FrictionPoint
+from analyses.large_signal.classify import CAUSES, causes
+from nonlinear import Rows
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -144,3 +148,35 @@ def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
     assert "first piece" in page.inner_text("#hands-on")
     page.context.close()
     assert trouble == []
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "fin"])
+def test_cells_of_the_map_are_named_as_the_command_line_names_them(
+    browser: Browser, tmp_path: Path, name: str
+) -> None:
+    """Every cell again, as a sine from rest, by the simulator and the rule of the large-signal map."""
+    design = load_design(name)
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    page.locator('[data-chart="border"]').scroll_into_view_if_needed()
+    page.wait_for_function(
+        "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    )
+    page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
+    cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
+    page.context.close()
+    assert trouble == []
+    assert len(cells) == 18 * 12
+    every = design.controller.position_loop.every
+    ticks, hertz, updates, amplitude = (
+        np.array([cell[k] for cell in cells], dtype=float) for k in range(1, 5)
+    )
+    rows = Rows.of(design, len(cells))
+    rows.sine("command", amplitude, hertz)
+    rows.window(every * updates, np.round(hertz * updates * every * design.controller.period_s), 1)
+    rows["ticks"] = ticks + every * updates
+    path = assemble_loops(design).reference_to_output
+    linear = np.array([complex(path(np.exp(2j * np.pi * f * path.dt))) for f in hertz])
+    wanted = [CAUSES[k] for k in causes(rows.run(), linear, amplitude)]
+    assert [cell[0] for cell in cells] == wanted
+    assert len(set(wanted)) > 2

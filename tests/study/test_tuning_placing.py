@@ -140,7 +140,7 @@ def test_neutral_elements_change_nothing():
 
 
 def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
-    """A P loop of 80 deg falls by 3 dB far below the velocity loop, which the fed share of the rate reaches."""
+    """A P loop of 80 deg falls by 3 dB far below the velocity loop; feed-forward reaches that one."""
     asked = (
         need("bandwidth", 60.0, loop="position", unit="Hz"),
         need("phase_margin", 80.0, loop="position", unit="deg"),

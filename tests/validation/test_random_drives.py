@@ -15,14 +15,6 @@ RIGID = (1, 2, 3, 16)
 WIDER = (501, 504, 508)
 # feed-forward, filters, AC motors, couplings, supplies, torque drives, a mode that feed-forward hides
 FULL = (16, 24, 36, 47, 200, 201, 704)
-    16,
-    24,
-    36,
-    47,
-    200,
-    201,
-    704,
-)  # feed-forward, filters, AC motors, couplings, supplies, torque drives, ...
 
 
 @pytest.mark.parametrize(("seed", "wider"), [*((s, False) for s in RIGID), *((s, True) for s in WIDER)])

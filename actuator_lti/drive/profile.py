@@ -1,0 +1,77 @@
+"""The one part of the command's profile that is always linear: the mean that limits its jerk.
+
+Rate and acceleration limits leave a command alone that keeps them; the jerk limit is a mean over the last n
+samples of the position loop, n = 2 a/(j T) rounded up, and acts on every command (model.md section 7).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, inf, pi, sin, sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+
+@dataclass(frozen=True)
+class CommandMean:
+    """Mean over the last samples of the command.
+
+    Attributes
+    ----------
+    samples : int
+    period_s : float
+        Of the position loop.
+    """
+
+    samples: int
+    period_s: float
+
+    @property
+    def delay_s(self) -> float:
+        """By how much a slow command comes later: (n - 1) T/2, at every frequency below the first zero."""
+        return 0.5 * (self.samples - 1) * self.period_s
+
+    def response(self, omega_rad_s: np.ndarray) -> np.ndarray:
+        """``sin(n w T/2)/(n sin(w T/2)) exp(-j w (n - 1) T/2)``."""
+        half = 0.5 * np.asarray(omega_rad_s, dtype=float) * self.period_s
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gain = np.where(
+                np.sin(half) == 0.0, 1.0, np.sin(self.samples * half) / (self.samples * np.sin(half))
+            )
+        return np.asarray(gain * np.exp(-1j * half * (self.samples - 1)))
+
+    @property
+    def minus3db_rad_s(self) -> float:
+        """Where its gain is 1/sqrt(2): 2.783/(n T) for many samples."""
+        from scipy.optimize import brentq
+
+        def over(half: float) -> float:
+            return sin(self.samples * half) / (self.samples * sin(half)) - sqrt(0.5)
+
+        return 2.0 / self.period_s * float(brentq(over, 1e-9 / self.samples, pi / self.samples, xtol=1e-15))
+
+
+def command_mean(design: Design) -> CommandMean | None:
+    """The mean that limits the jerk; None where there is none."""
+    command, control = design.command, design.controller
+    if control.position is None or command.jerk_rad_s3 == inf or command.acceleration_rad_s2 == inf:
+        return None
+    period = control.position.every * control.period_s
+    samples = ceil(2.0 * command.acceleration_rad_s2 / (command.jerk_rad_s3 * period) - 1e-9)
+    return CommandMean(samples, period) if samples > 1 else None
+
+
+def profile_note(design: Design) -> str:
+    """What figures of the response to the command leave out; empty where they leave nothing out."""
+    mean = command_mean(design)
+    if mean is None:
+        return ""
+    return (
+        f"command.jerk: the drive takes the mean of its command over {mean.samples} samples. It comes before "
+        f"the response to the command and is not in its figures: {1e3 * mean.delay_s:.4g} ms later, "
+        f"-3 dB by itself at {mean.minus3db_rad_s / (2 * pi):.4g} Hz"
+    )
