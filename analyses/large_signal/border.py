@@ -110,8 +110,8 @@ def check_border(
         if left_out:
             design = _straight(design)
         if left_out or loops.design.command != design.command:
-            foreseen = on_the_bench(loops.design)  # need not be the drive that is simulated
-            loops = assemble_loops(_straight(foreseen) if left_out else foreseen)
+            model = on_the_bench(loops.design)  # need not be the drive that is simulated
+            loops = assemble_loops(_straight(model) if left_out else model)
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])

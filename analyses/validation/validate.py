@@ -455,9 +455,8 @@ class _Work:
             return []
         system, design = self.answer_loops.reference_to_output, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        slowest = settling_ticks_of(system, base, design.name, EVER_TICKS)
-        slowest = max(slowest, *self.settle.values()) / SETTLE_TIME_CONSTANTS
-        return [command_entry(design, sweep, system, slowest)]
+        settle = max(settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values())
+        return [command_entry(design, sweep, system, settle / SETTLE_TIME_CONSTANTS)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
