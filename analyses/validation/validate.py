@@ -427,7 +427,7 @@ class _Work:
         system = self.answer_loops.reference_to_output
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
         # feed-forward may cancel a slow mode of the loop, which the start moves all the same
-        settle = max(settling_ticks_of(system, base, design.name), *self.settle.values())
+        settle = max([settling_ticks_of(system, base, design.name), *self.settle.values()])
         top = HIGHEST / (base * design.controller.period_s)
         marks = [x for name in self.figures for x in self._marks(name)]
         marks += [1.0 / (2.0 * pi * design.command.filter_time_s)] if design.command.filter_time_s else []
@@ -455,7 +455,7 @@ class _Work:
             return []
         system, design = self.answer_loops.reference_to_output, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        settle = max(settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values())
+        settle = max([settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values()])
         return [command_entry(design, sweep, system, settle / SETTLE_TIME_CONSTANTS)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
