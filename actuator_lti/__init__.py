@@ -22,8 +22,7 @@ every loop is a python-control system: ``control.bode_plot(loops.position.open_l
 The public names are loaded on first use, so that ``import actuator_lti`` costs nothing.
 """
 
-from importlib import import_module
-from typing import Any
+from actuator_lti.on_first_use import on_first_use
 
 _PUBLIC = {
     "InputError": "actuator_lti.errors",
@@ -50,14 +49,4 @@ _PUBLIC = {
 __all__ = sorted(_PUBLIC)
 
 
-def __getattr__(name: str) -> Any:
-    """Load a public name on first use (PEP 562)."""
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'actuator_lti' has no attribute {name!r}")
-    value = getattr(import_module(_PUBLIC[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *_PUBLIC})
+__getattr__, __dir__ = on_first_use(__name__, _PUBLIC)

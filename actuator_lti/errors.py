@@ -1,4 +1,4 @@
-"""The two ways in which a calculation is refused."""
+"""The ways in which a calculation is refused."""
 
 LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
 
@@ -25,6 +25,10 @@ class InputError(ValueError):
         super().__init__("".join(c if c.isprintable() else "?" for c in line))
         self.message = message
         self.where = where
+
+
+class UnstableError(InputError):
+    """A question that only a stable closed loop answers; the input is sound, the drive fails (status 1)."""
 
 
 class NumericalError(ArithmeticError):

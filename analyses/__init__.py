@@ -10,8 +10,7 @@ Examples
 True
 """
 
-from importlib import import_module
-from typing import Any
+from actuator_lti.on_first_use import on_first_use
 
 _PUBLIC = {
     "LoopFigures": "analyses.loop_figures",
@@ -36,14 +35,4 @@ _PACKAGES = ("friction_effects", "monte_carlo", "specification", "stiffness")
 __all__ = sorted([*_PUBLIC, *_PACKAGES])
 
 
-def __getattr__(name: str) -> Any:
-    """Load a public name on first use (PEP 562)."""
-    if name in _PACKAGES:
-        return import_module(f"analyses.{name}")
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'analyses' has no attribute {name!r}")
-    return getattr(import_module(_PUBLIC[name]), name)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = on_first_use(__name__, _PUBLIC, _PACKAGES)

@@ -17,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -309,7 +310,6 @@ def _packages(held: Any) -> tuple[str, ...]:
 def code_version(packages: Sequence[str] = _CODE) -> str:
     """Content hash of the code that computes parts: workers must have the same."""
     import hashlib
-    from importlib import import_module
 
     digest = hashlib.sha256()
     for name in packages:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_json, shown_path
 from analyses.outer_loop import OuterLoop
 
 if TYPE_CHECKING:
@@ -34,7 +35,6 @@ def read_outer_loop(path: str | PathLike[str]) -> OuterLoop:
     InputError
         For anything else, naming file, key and what is allowed.
     """
-    from actuator_lti.reading import read_json, shown_path
 
     return outer_loop(read_json(path, "JSON file of an outer loop"), shown_path(path))
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design
+from actuator_lti.loops import assemble_loops
 from analyses.loop_figures import LoopFigures, all_loop_figures
 from analyses.verdicts import RequirementVerdict, all_pass, distance, judged, which_response
 
@@ -32,8 +33,6 @@ def evaluate_requirements(
         If a requirement names a quantity or a loop that is not known.
     """
     if figures is None:
-        from actuator_lti.loops import assemble_loops
-
         figures = all_loop_figures(assemble_loops(design))
     asked = _AskedOnce(design)
     return tuple(

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti.design import parameter_value
 from actuator_lti.quantities import LOOP_QUANTITIES, drive_cases
 from analyses.sampling import Factor
 
@@ -98,7 +99,6 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     >>> round(result.tornado("position.bandwidth")[0].per_percent, 2)
     0.38
     """
-    from actuator_lti.design import parameter_value
 
     chosen = tuple(p for p in (paths or variable_paths(design)) if _moves(design, p))
     nominal = {path: parameter_value(design, path) for path in chosen}
@@ -128,7 +128,6 @@ def _rise(low: float, high: float) -> float:
 
 def _moves(design: Design, path: str) -> bool:
     """Whether a parameter is a finite number that is not zero."""
-    from actuator_lti.design import parameter_value
 
     value = parameter_value(design, path)
     return value != 0.0 and bool(np.isfinite(value)) and not path.startswith("friction.breakaway")

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.atomic import write_bytes
+from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, read_bytes
@@ -53,7 +54,6 @@ class Store:
 
 def address(designs: tuple[Design | None, ...], settings: object) -> str:
     """Name of what is found of designs with settings (whose ``repr`` says all of them)."""
-    from actuator_lti.design import write_design
 
     texts = [None if design is None else write_design(design) for design in designs]
     return _digest(json.dumps([texts, repr(settings), _code()]))

@@ -10,11 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
+from actuator_lti.batch import Population, variable_paths
+from actuator_lti.design import design_tree, parameter_value
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import assemble_loops
 from analyses.engine import Engine
+from analyses.loop_figures import all_loop_figures
 from analyses.requirements import RequirementVerdict, evaluate_requirements
 from analyses.study import Study, Variant
+from analyses.validation import QUICK, validate
 from analyses.validation.ledger import Entry
 from analyses.variant_figures import FigureName, LargeSignal, figure_names, large_signal, small_signal
 from analyses.variant_store import Store, address
@@ -87,8 +93,6 @@ class Compared(Found):
     @cached_property
     def loops(self) -> Mapping[str, LoopFigures]:
         """The loops, for drawing; computed when they are first asked for, as few designs are drawn."""
-        from actuator_lti.loops import assemble_loops
-        from analyses.loop_figures import all_loop_figures
 
         assert self.variant.design is not None
         return all_loop_figures(assemble_loops(self.variant.design), certify=True)
@@ -222,7 +226,6 @@ class _Kept:
 @cache
 def _adapter() -> TypeAdapter[Found]:
     """Turns what is found into plain data and back."""
-    from pydantic import TypeAdapter
 
     return TypeAdapter(Found)
 
@@ -238,9 +241,6 @@ def _beside(
 
 
 def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
-    from actuator_lti.loops import assemble_loops
-    from analyses.loop_figures import all_loop_figures
-
     assert variant.design is not None
     loops = assemble_loops(variant.design)
     result = all_loop_figures(loops, certify=True)
@@ -252,7 +252,6 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 
 def _ledger(design: Design) -> tuple[tuple[Entry, ...], str]:
     """The validator's ledger, or why there is none."""
-    from analyses.validation import QUICK, validate
 
     try:
         return validate(design, QUICK).ledger, ""
@@ -276,7 +275,6 @@ def _against(one: Found, design: Design, base: Found, origin: Design) -> Found:
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:
     """Keys of the design file that differ; names and texts of the head do not count."""
-    from actuator_lti.design import design_tree
 
     flat, flat_other = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
     keys = [*flat, *(key for key in flat_other if key not in flat)]
@@ -322,8 +320,6 @@ def _moved_by(
 
 def _alone(base: Design, other: Design, changed: tuple[Changed, ...]) -> dict[str, dict[str, float]]:
     """What each changed number of the other design alone does to the figures of the base."""
-    from actuator_lti.batch import Population, variable_paths
-    from actuator_lti.design import parameter_value
     from analyses.sensitivity import population_figures
 
     both = set(variable_paths(base)) & set(variable_paths(other))

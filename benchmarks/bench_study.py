@@ -24,6 +24,7 @@ GROUP = "studies"
 def rows(quick: bool = False) -> Iterator[Row]:
     """Measure, warm: compiled code is in its cache."""
     yield from _margins(quick)
+    yield from _two_mass(quick)
     yield from _monte_carlo(quick)
     yield from _growth(quick)
     yield from _dask(quick)
@@ -74,6 +75,35 @@ def _margins(quick: bool) -> Iterator[Row]:
               unit="x", target=100.0, comparison=">=", note=note)  # fmt: skip
     yield Row(group=GROUP, name="largest relative difference to the margin engine", measured=worst, unit="",
               target=1e-6, note=f"every crossover of {compared} designs")  # fmt: skip
+
+
+def _two_mass(quick: bool) -> Iterator[Row]:
+    """Figures of many compliant drives over those of the rigid one, in processor time, the best of three."""
+    from actuator_lti import load_design
+    from actuator_lti.batch import Population, linear_figures
+    from actuator_lti.design import parameter_value
+
+    count = 300 if quick else 1000
+    rng = np.random.default_rng(0)
+    paths = ("motor.resistance", "friction.viscous", "control.velocity.gain", "control.position.gain")
+    spread = {path: 1.0 + 0.2 * rng.uniform(-1, 1, count) for path in paths}
+    for timed, words in ((False, "margins and bandwidths"), (True, "step figures too")):
+        best = []
+        for name in ("ilr33-amber", "ilr33-amber-compliant"):
+            design = load_design(name)
+            values = {path: parameter_value(design, path) * share for path, share in spread.items()}
+            population = Population(design, values, count)
+            linear_figures(population.part(slice(0, 3)), time_figures=timed)
+            seconds = []
+            for _ in range(3):
+                start = time.process_time()
+                linear_figures(population, time_figures=timed)
+                seconds.append(time.process_time() - start)
+            best.append(min(seconds) / count)
+        note = f"{1e6 * best[1]:.0f} us a design against {1e6 * best[0]:.0f} us"
+        name = f"a two-mass drive over the rigid one, {words}"
+        yield Row(group=GROUP, name=name, measured=best[1] / best[0],
+                  unit="x", target=3.0, note=note)  # fmt: skip
 
 
 def _difference(figures: Any, loop: str, k: int, truth: Any) -> float:

@@ -11,7 +11,9 @@ at once over the cores, `Drive` runs tick by tick inside a loop of your own.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from actuator_lti.on_first_use import on_first_use
 
 if TYPE_CHECKING:
     from nonlinear import commands, loads
@@ -51,11 +53,4 @@ _WHERE = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    from importlib import import_module
-
-    if name in ("commands", "loads"):
-        return import_module(f"nonlinear.{name}")
-    if name in _WHERE:
-        return getattr(import_module(_WHERE[name]), name)
-    raise AttributeError(f"module 'nonlinear' has no attribute {name!r}")
+__getattr__, __dir__ = on_first_use(__name__, _WHERE, ("commands", "loads"))

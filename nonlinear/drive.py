@@ -35,7 +35,7 @@ class Drive:
     initial : State, optional
         Default: everything at rest at zero.
     load_Nm : float
-        Constant hinge moment, beside slope and gravity of the design.
+        Constant load torque, beside slope and gravity of the design.
     friction_on, limits_on : bool
         As in `nonlinear.simulate`.
 
@@ -77,7 +77,7 @@ class Drive:
         command : float
             Of the outermost stage: rad or rad/s at the output shaft, A or V.
         load_Nm : float
-            Hinge moment added to the constant one, held over the tick.
+            Load torque added to the constant one, held over the tick.
         torque_Nm : float
             Extra torque at the motor shaft.
 

@@ -1,4 +1,4 @@
-"""Hinge moments at the output shaft: constant, a time series, or proportional to the output angle.
+"""Load torques at the output shaft: constant, a time series, or proportional to the output angle.
 
 The moment is held over each tick at its value at the tick.  Through a self-locking gear it only adds
 friction ``CM |M|``; through a back-drivable one it also turns the motor shaft with ``M/N``.
@@ -36,7 +36,7 @@ def constant(moment_Nm: float) -> LoadMoment:
 
 
 def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
-    """Hinge moment ``offset + slope * output angle``; a negative slope pulls the canard back."""
+    """Load torque ``offset + slope * output angle``; a negative slope pulls the canard back."""
     if not (np.isfinite(slope_Nm_rad) and np.isfinite(offset_Nm)):
         raise InputError(f"load slope = {slope_Nm_rad}, offset = {offset_Nm}: must be finite numbers")
     return LoadMoment(constant_Nm=float(offset_Nm), slope_Nm_rad=float(slope_Nm_rad))

@@ -91,7 +91,7 @@ def check_frequency(design: Design, command: Command) -> None:
 
 
 def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
-    """Write the hinge moment."""
+    """Write the load torque."""
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:

@@ -75,7 +75,7 @@ def simulate(
     duration_s : float
         Rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
     load_Nm : float or LoadMoment
-        Hinge moment at the output shaft, held over each tick; slope and gravity of the design add to it.
+        Load torque at the output shaft, held over each tick; slope and gravity of the design add to it.
     bias : Command, optional
         Motion added under the command, in the same unit.
     probes : sequence of Probe

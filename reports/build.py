@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.atomic import write_together
+from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from reports import document as doc
@@ -49,7 +51,6 @@ def design_report(
         From the computations. Whatever else fails leaves out its part only: a notice stands in its place, and
         `analyses.isolation.drain` gives it.
     """
-    from actuator_lti.design import design_hash, warnings_of
     from analyses.isolation import attempt, isolated
     from reports.live import live_model
     from reports.provenance import provenance
@@ -109,7 +110,6 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     InputError
         For a name that is none.
     """
-    from importlib import import_module
 
     from analyses.isolation import attempt, isolated
 

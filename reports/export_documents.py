@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
+from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.code_check import CodeCheck
 
@@ -15,7 +16,6 @@ def export_documents(design: Design, check: CodeCheck | None = None) -> dict[str
     index.html (the margin report), compiled_code.md (margins measured on the code), the design as TOML, the
     licence.
     """
-    from actuator_lti.design import write_design
     from reports.build import design_report
     from reports.export_check import check_text
     from reports.html import page

@@ -259,6 +259,7 @@ def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray)
 
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
+    from actuator_lti.batch.rest import at_rest
     from actuator_lti.batch.withheld import withhold
 
     from ._run import many_loops
@@ -272,6 +273,7 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     poles[~finite] = np.nan
     many_loops(A.copy(), B.copy(), C.copy(), poles, leads, time_figures, rows)
     if not np.isnan(leads).any():
+        at_rest(A, B, C, rows)
         withhold(A, B, C, poles, rows)
 
 

@@ -1,4 +1,4 @@
-"""Figures of the whole drive for many drives at once, at a hinge moment."""
+"""Figures of the whole drive for many drives at once, at a load torque."""
 
 from __future__ import annotations
 

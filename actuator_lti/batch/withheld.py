@@ -3,6 +3,8 @@
 An unstable inner loop that runs many times within one update of the outer one leaves entries of 1e12 and more
 in the outer loop's matrices, which nearly cancel in its response. Every crossover of such a design, and the
 response at some angles between, must stand out from its own rounding errors; else the design has no figures.
+Nor has it any where the number of its gain crossovers does not fit the gain at both ends, because one lies
+below the angles that were scanned.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from actuator_lti.batch._figures import (
+    DC_GAIN,
     FIRST_GAIN,
     FIRST_PHASE,
     GAIN_CROSSOVERS,
@@ -42,8 +45,26 @@ def withhold(A: np.ndarray, B: np.ndarray, C: np.ndarray, poles: np.ndarray, row
     if chosen.size:
         lost = chosen[_lost(A[chosen], B[chosen], C[chosen], rows[chosen])]
         rows[lost] = np.nan
+    rows[_odd_crossovers(A, B, C, rows)] = np.nan
     none = np.isnan(rows[:, STABLE])
     rows[np.ix_(none, [GAIN_CROSSOVERS, PHASE_CROSSOVERS])] = 0.0
+
+
+def _odd_crossovers(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Which designs have a number of gain crossovers that does not fit the gain at both ends."""
+    above_one = rows[:, DC_GAIN] > 0.5  # |L(0)| > 1 from T(0) = L(0)/(1 + L(0)), also with a pole there
+    suspect = np.flatnonzero((rows[:, GAIN_CROSSOVERS] % 2.0 == 1.0) != above_one)
+    suspect = suspect[np.isfinite(rows[suspect, DC_GAIN])]
+    at_nyquist = [abs(_response(A[k], B[k], C[k], -1.0)) for k in suspect]
+    return suspect[~(np.array(at_nyquist) > 1.0)]
+
+
+def _response(A: np.ndarray, b: np.ndarray, c: np.ndarray, z: float) -> float:
+    """L at a real z; infinite where it has a pole there."""
+    try:
+        return float(c @ np.linalg.solve(z * np.eye(len(A)) - A, b))
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def _lost(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -10,10 +10,13 @@ from typing import Any
 from actuator_lti.design import model
 from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
 from actuator_lti.design.model import Screw
+from actuator_lti.design.objects import check_objects
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
 from actuator_lti.design.refusals import nearest
 from actuator_lti.design.sections import Section, children
+from actuator_lti.design.settings_checks import checked_factor
+from actuator_lti.design.settings_file import object_from
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
@@ -191,9 +194,6 @@ class Builder:
 
     def objects(self) -> model.ControllerObjects:
         """The settings that the design was imported from."""
-        from actuator_lti.design.objects import check_objects
-        from actuator_lti.design.settings_checks import checked_factor
-        from actuator_lti.design.settings_file import object_from
 
         raw = self.document.objects
         if raw is None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import inf, isfinite, log
 
+import numpy as np
+
 from actuator_lti.design.checks_control import check_control
 from actuator_lti.design.checks_elastic import check_elastic
 from actuator_lti.design.model import Design
@@ -189,8 +191,6 @@ def _toleranced(design: Design) -> list[str]:
 
 
 def _check_definite(design: Design, index: dict[str, int], where: str) -> None:
-    import numpy as np
-
     matrix = np.eye(len(index))
     for item in design.correlations:
         i, j = index[item.first], index[item.second]

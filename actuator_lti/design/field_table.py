@@ -92,7 +92,7 @@ _GEAR = (
                   "inertia turning with the output shaft of the stage", example="5 g*cm^2"),
 )
 _LOAD = (
-    _not_negative("load.inertia", "inertia_kgm2", "{inertia}", "J_canard", "inertia at the output shaft",
+    _not_negative("load.inertia", "inertia_kgm2", "{inertia}", "J_load", "inertia at the output shaft",
                   example="2e-4 kg*m^2"),
     _choice("load.path", "path", ("self-locking", "back-drivable"),
             "whether the load moment only adds friction, or also drives the motor"),

@@ -183,7 +183,7 @@ class Friction:
         return tuple(sorted(chosen, key=lambda point: point.speed_rad_s))
 
     def dry_Nm(self, load_Nm: float, direction: int = 1) -> float:
-        """Dry friction torque Tc at a hinge moment (either sign), for motion forward (1) or backward (-1)."""
+        """Dry friction torque Tc at a load torque (either sign), for motion forward (1) or backward (-1)."""
         base = self.dry_torque_Nm
         if direction < 0 and self.dry_torque_reverse_Nm is not None:
             base = self.dry_torque_reverse_Nm
@@ -467,7 +467,7 @@ def default_deflection(axis: Axis) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Validation:
-    """What the validator and the report are to look at: deflections (output side) and hinge moments."""
+    """What the validator and the report are to look at: deflections (output side) and load torques."""
 
     full_deflection_rad: float
     amplitude_fractions: tuple[float, ...] = (0.05, 0.1, 0.25, 0.5, 1.0)
@@ -739,7 +739,7 @@ _EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
 
 
 def _times(value: float | None, factor: float) -> float | None:
-    return value if value is None or factor == 1.0 else value * factor
+    return None if value is None else value * factor
 
 
 def _train_inertia(gears: tuple[Gear, ...]) -> float:

@@ -161,6 +161,10 @@ def _import_notes(
             f"velocity gain 0x2344.01 read as A s {per} "
             f"(calibration factor {objects.velocity_gain_factor:.4g})"
         )
+    if given.get((0x2349, 1)):
+        notes.append(
+            "torque feed-forward 0x2349.01 read as the share of J/kM times the command's acceleration"
+        )
     if (0x232A, 2) in given or (0x232A, 3) in given:
         notes.append(
             "friction of 0x232A read as that of the whole drive at the motor; "

@@ -27,7 +27,7 @@ RATE_LIMITS = ("nothing", "speed limit", "force", "voltage")
 
 @dataclass(frozen=True)
 class Capability:
-    """Figures of the whole drive at one hinge moment, the worse of both directions; floats or arrays.
+    """Figures of the whole drive at one load torque, the worse of both directions; floats or arrays.
 
     Attributes
     ----------
@@ -230,7 +230,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
 
 
 def capability(design: Design, load_Nm: float = 0.0) -> Capability:
-    """Rate, current and acceleration at a hinge moment (either sign): the worse of both directions.
+    """Rate, current and acceleration at a load torque (either sign): the worse of both directions.
 
     Worse is the slower direction, then the weaker, then the one that needs more current. On a back-drivable
     path the moment is against the motion.

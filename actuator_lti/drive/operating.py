@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, isfinite, pi
+from math import isfinite, pi
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -32,7 +32,7 @@ class Operating:
         with the coupling's torque against or with the motion, which decides the sign of the load-dependent
         friction; ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
     load_Nm : float
-        Hinge moment at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
+        Load torque at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
     speed_amplitude_rad_s : float or None
         W (peak, motor side), for the describing function.
     direction : {1, -1}
@@ -159,4 +159,4 @@ def moment_slope(design: Design, at: Operating) -> Any:
     load = design.load
     if load.gravity is None:
         return load.moment_slope_Nm_rad
-    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * cos(at.angle_rad + load.gravity.offset_rad)
+    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * np.cos(at.angle_rad + load.gravity.offset_rad)

@@ -43,7 +43,7 @@ def assemble_loops(
     operating_point : {"sliding", "rest", "describing-function", "driving", "driven", "gap"}
         Slope of the friction and contact of the coupling, see `actuator_lti.drive.operating.Operating`.
     load_Nm : float
-        Hinge moment at the output shaft in N m: more dry friction.
+        Load torque at the output shaft in N m: more dry friction.
     speed_amplitude_rad_s : float, optional
         Amplitude (peak, motor side) for the describing function.
     direction : {1, -1}
@@ -76,7 +76,7 @@ def assemble_loops(
     -----
     With the rotor free, back-EMF gives the current loop a finite gain at DC although its controller
     integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them.
-    A hinge moment proportional to the angle acts through a back-drivable path as a stiffness.
+    A load torque proportional to the angle acts through a back-drivable path as a stiffness.
     """
     design = as_design(design)
     if form not in get_args(Form):

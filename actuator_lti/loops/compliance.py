@@ -1,4 +1,4 @@
-"""The compliance of a drive at its output: the response to a hinge moment held over every tick.
+"""The compliance of a drive at its output: the response to a load torque held over every tick.
 
 Slower stages make the drive periodically time-varying, with a period of M ticks.  A moment ``z^k`` leaves the
 states ``z^k p_k`` with p_k of period M, ``z p_(k+1) = A_k p_k + B_k``, and the fundamental of the output is

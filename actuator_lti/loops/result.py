@@ -174,7 +174,7 @@ class Loops:
 
     @property
     def load_Nm(self) -> float:
-        """Hinge moment at the output shaft."""
+        """Load torque at the output shaft."""
         return self.operating.load_Nm
 
     @property

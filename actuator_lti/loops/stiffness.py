@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
+BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
 _SLOW_HZ = 1e-5  # where the limit at zero frequency is read
 
 
@@ -29,7 +30,7 @@ class StiffnessFigures:
     ----------
     static_stiffness_Nm_rad, least_stiffness_Nm_rad : float or ndarray
         Powered, friction sliding: limit at zero frequency (0 of an output that runs away, inf of one that
-        comes back), and smallest size between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
+        comes back), and smallest size there and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
     lost_motion_rad : float or ndarray
         2 (b + C0_l/k)/N_r; 0 of a rigid drive train.
     """
@@ -51,12 +52,14 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
     """
     response = compliance(design)
     size = np.abs(stiffness_at(response, frequencies_hz(response)))
-    return StiffnessFigures(static_stiffness(response), _plain(size.min(axis=-1)), lost_motion_rad(design))
+    static = static_stiffness(response)
+    least = _plain(np.minimum(size.min(axis=-1), static))
+    return StiffnessFigures(static, least, lost_motion_rad(design))
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
     """Frequencies over which a stiffness is drawn and its least value sought."""
-    highest = np.minimum(HIGHEST_HZ, 0.5 / np.asarray(response.period_s))
+    highest = np.minimum(HIGHEST_HZ, BELOW_NYQUIST / np.asarray(response.period_s))
     return np.moveaxis(np.geomspace(LOWEST_HZ, highest, POINTS), 0, -1)
 
 

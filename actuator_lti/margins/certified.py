@@ -89,6 +89,8 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
 
 def _reason(result: Settled) -> str:
     moved = f"move a crossing by {result.moved:.1g}" if result.moved > _MOVED else "change nothing"
+    if result.border:
+        return "exact arithmetic on the given doubles: poles lie exactly on the border of stability"
     return f"exact arithmetic on the given doubles, certified roots; {ULP} ulp of the entries {moved}"
 
 

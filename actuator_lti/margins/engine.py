@@ -112,14 +112,18 @@ def _rational(given: Given, certify: bool) -> StabilityMargins:
 def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
     """In double precision, and by certified intervals where the two ways to stability do not both tell."""
     from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
+    from actuator_lti.margins.exact_axis import Undetermined
 
     try:
         margins = delayed_margins(form, band)
     except NumericalError as error:
         if form.sampled:
             raise
+        unknown = without_intervals(form, band)
         try:
-            return certified_delayed_margins(form, without_intervals(form, band), band)
+            return certified_delayed_margins(form, unknown, band)
+        except Undetermined as exact:
+            return withheld(unknown, str(exact))
         except (NumericalError, InputError):
             raise error from None
     told_twice = margins.agreement.agree and None not in (

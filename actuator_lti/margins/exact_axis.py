@@ -18,7 +18,12 @@ _PER_DECADE = 5
 _HIGHEST_ORDER = 16
 _ODD = 0.9137236158
 J = acb(0, 1)
+
 Taylor = tuple[acb, acb, acb]  # value and slope in the middle, second derivative over the interval, by x
+
+
+class Undetermined(NumericalError):
+    """The loop comes so near to a line, or to -1, that its side cannot be told."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +151,7 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
             result += _root(axis, q, low, high)
             continue
         if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
-            raise NumericalError(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
+            raise Undetermined(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]
     return result
@@ -244,7 +249,7 @@ def turn(axis: Axis, edges: list[float]) -> arb:
             last = here
             continue
         if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
-            raise NumericalError(f"1 + L could not be told from zero near {low:.10g} rad/s")
+            raise Undetermined(f"1 + L could not be told from zero near {low:.10g} rad/s")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]
     return total

@@ -120,6 +120,11 @@ class _Group:
         ]
         return min(low for low, _ in spans), max(high for _, high in spans)
 
+    def part(self, first: int, last: int) -> _Group:
+        """Only some of its intervals."""
+        chosen = slice(first - self.first, last + 1 - self.first)
+        return _Group(first, last, self.t0[chosen], self.t1[chosen])
+
     def text(self, omega: Real) -> str:
         """Where, in rad/s."""
         return f"between {omega[self.first]:.6g} and {omega[self.last + 1]:.6g} rad/s"
@@ -137,6 +142,26 @@ def _groups(strip: Strip, level: float) -> list[_Group]:
             start = None
         if open_here and start is None:
             start = k
+    return out
+
+
+def _single_passages(strip: Strip, level: float) -> list[_Group]:
+    """The groups, cut at points that surely lie off the level so that none holds two sure passages."""
+    out = []
+    for group in _groups(strip, level):
+        start, side = group.first, strip.side(group.first, 0, level)
+        cut: int | None = None  # where the level was surely passed last
+        for k in range(group.first, group.last + 1):
+            after = strip.side(k, 1, level)
+            if after == 0:
+                continue
+            if side and after != side:
+                if cut is not None:  # the second one: the group before it ends where the first had passed
+                    out.append(group.part(start, cut))
+                    start = cut + 1
+                cut = k
+            side = after
+        out.append(group.part(start, group.last))
     return out
 
 
@@ -159,7 +184,7 @@ def _passed(strip: Strip, level: float, group: _Group) -> tuple[int, float] | No
 def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
     out, notes = [], []
     gain, phase = result.log_gain, result.phase
-    for group in _groups(gain, 0.0):
+    for group in _single_passages(gain, 0.0):
         at = _passed(gain, 0.0, group)
         if at is None:
             if not result.unresolved[group.first : group.last + 1].all():  # told already
@@ -187,7 +212,7 @@ def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], 
         math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
     ):
         level = (2 * m + 1) * math.pi
-        for group in _groups(phase, level):
+        for group in _single_passages(phase, level):
             if result.lost[group.first : group.last + 2].any():
                 continue
             at = _passed(phase, level, group)

@@ -35,8 +35,9 @@ def slope_at_dc(response: Callable[[Real], Complex], start: float, most: int) ->
     """
     x = start * 10.0 ** (-0.5 * np.arange(20))
     L = response(x)
-    slope = 2.0 * np.log10(np.abs(L[1:]) / np.abs(L[:-1]))
-    whole = np.flatnonzero((np.abs(slope - np.round(slope)) < 0.01) & (np.round(slope) <= most))
+    with np.errstate(divide="ignore", invalid="ignore"):  # where L is 0 there is no slope
+        slope = 2.0 * np.log10(np.abs(L[1:]) / np.abs(L[:-1]))
+        whole = np.flatnonzero((np.abs(slope - np.round(slope)) < 0.01) & (np.round(slope) <= most))
     if not whole.size:
         raise InputError(
             "a pole at zero frequency is cancelled, all but completely: cancel it in the loop first"

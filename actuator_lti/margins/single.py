@@ -11,6 +11,14 @@ def frequency_text(omega_rad_s: float) -> str:
     return f"{omega_rad_s:.6g} rad/s ({omega_rad_s / (2.0 * math.pi):.6g} Hz)"
 
 
+def _known(values: tuple[float, float] | None, bracket: tuple[float, float] | None, unit: str) -> str:
+    """Where a measured figure and its frequency lie."""
+    if values is None or bracket is None:
+        return ""
+    within = f"{values[0]:.5g} to {values[1]:.5g}{unit}"
+    return f", in [{within}], between {bracket[0]:.6g} and {bracket[1]:.6g} rad/s"
+
+
 @dataclass(frozen=True)
 class GainMargin:
     """A real factor on the loop that brings a closed-loop pole to the border.
@@ -25,9 +33,9 @@ class GainMargin:
     tangent : bool
         The curve touches the negative real axis there without crossing it.
     bracket_rad_s : tuple of float or None
-        Measured data: the two neighbouring frequencies between which the crossing lies.
+        Measured data: the two frequencies between which the crossing lies.
     ratio_range : tuple of float or None
-        Measured data: the ratios at those two frequencies.
+        Measured data: where the ratio lies, between the points and within the noise.
     """
 
     ratio: float
@@ -48,7 +56,10 @@ class GainMargin:
 
     def __str__(self) -> str:
         limit = "upper" if self.ratio >= 1.0 else "lower"
-        return f"{self.ratio:.6g} ({self.db:+.4f} dB, {limit}) at {frequency_text(self.frequency_rad_s)}"
+        known = _known(self.ratio_range, self.bracket_rad_s, "")
+        return (
+            f"{self.ratio:.6g} ({self.db:+.4f} dB, {limit}) at {frequency_text(self.frequency_rad_s)}{known}"
+        )
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,7 @@ class PhaseMargin:
     tangent : bool
         The gain touches one there without crossing it.
     bracket_rad_s, deg_range : tuple of float or None
-        Measured data: the neighbouring frequencies, and the margins there.
+        Measured data: two frequencies between which the crossing lies, and where the margin does.
     """
 
     deg: float
@@ -79,7 +90,8 @@ class PhaseMargin:
         return self.frequency_rad_s / (2.0 * math.pi)
 
     def __str__(self) -> str:
-        return f"{self.deg:+.4f} deg at {frequency_text(self.frequency_rad_s)}"
+        known = _known(self.deg_range, self.bracket_rad_s, " deg")
+        return f"{self.deg:+.4f} deg at {frequency_text(self.frequency_rad_s)}{known}"
 
 
 @dataclass(frozen=True)

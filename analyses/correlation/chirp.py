@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
@@ -57,7 +58,6 @@ def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.0
     InputError
         If the beginning is no exponential chirp, to 1 % of its amplitude.
     """
-    from scipy.optimize import least_squares
 
     on = np.flatnonzero(signal != 0.0)
     if len(on) < 50 or on[0] == 0:

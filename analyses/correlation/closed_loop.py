@@ -96,7 +96,7 @@ def correlate_record(
         Needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
         axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
         voltage. The outermost one that is recorded drives the model, whose loops outside it do not act. A
-        ``torque`` signal is the hinge moment at the output, ``supply`` the bus voltage (see `supply_of`).
+        ``torque`` signal is the load torque at the output, ``supply`` the bus voltage (see `supply_of`).
         Compared are, where recorded: angle, output_angle or position, speed or velocity, current, voltage,
         force. The force of a drive with an ideal source is its gain times the voltage.
     derive_velocity : bool

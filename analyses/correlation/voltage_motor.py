@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.least_squares import by_record, correlated_covariance
@@ -103,7 +104,6 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
 
 def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
     """One motor for all steps, with the standard errors of this fit alone."""
-    from scipy.optimize import least_squares
 
     gain = float(np.mean([step.steady / step.level for step in steps]))
 

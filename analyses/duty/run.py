@@ -61,10 +61,10 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     """The sine until it is steady, and the ticks of a period."""
     Ts = design.controller.period_s
     every = design.controller.position_loop.every
-    ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
-    if (PERIODS + 1) * ticks > MOST_TICKS:
-        lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
+    lowest = (PERIODS + 1) / (MOST_TICKS * Ts)
+    if asked.frequency_hz < lowest:
         raise InputError(f"frequency {asked.frequency_hz:g} Hz: at least {lowest:.2g} Hz with this period")
+    ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
     sine = commands.sine(asked.amplitude_rad, 1.0 / (ticks * Ts))
     return simulate(design, sine, (PERIODS + 1) * ticks * Ts, asked.load_Nm), ticks
 

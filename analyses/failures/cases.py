@@ -16,6 +16,7 @@ from analyses.failures.result import Asked
 from analyses.failures.rig import Measured, Rig
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
+FLAT = 1.01  # a response that rises by less has no resonance
 OPEN = 1e4  # times the resistance: of a winding with an open phase
 
 Command = Callable[[float], float]
@@ -53,12 +54,12 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
     far, near = asked.stop_rad, asked.deflection_rad
     made = [
         Case("hard-over", "the power stage puts the whole bus on the motor", 0.0, _constant(0.0), _hard_over),
-        Case("open-phase", "the winding is open: no current, no torque", 0.0, _constant(0.0), _open),
+        Case("open-phase", _open_words(design), 0.0, _constant(0.0), _open),
     ]
     if design.controller.position is None:
         why = "the drive has no position loop"
         return tuple(made), dict.fromkeys(_LOOP_CASES, why)
-    frequency = _followed_most_hz(design)
+    frequency, where = _followed_most_hz(design)
     made += [
         Case("hard-over-command", "the command jumps to the stop", 0.0, _constant(far), _nothing),
         Case(
@@ -75,7 +76,7 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
         ),
         Case(
             "oscillatory-command",
-            f"a sine of {_size(design, near)} at {frequency:.3g} Hz, where the drive follows most", 0.0,
+            f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}", 0.0,
             lambda t: near * math.sin(2.0 * math.pi * frequency * t), _nothing, stops=False,
         ),
     ]  # fmt: skip
@@ -132,13 +133,28 @@ def _sense(rig: Rig, *, lose: bool) -> None:
     rig.sensing = output if loop.sensor == "output" else motor
 
 
-def _followed_most_hz(design: Design) -> float:
-    """Frequency from 0.1 Hz up at which the linear output is largest."""
+def _open_words(design: Design) -> str:
+    """What an open phase is taken for; a motor of three phases has two left, which one winding cannot say."""
+    words = "the winding is open: no current, no torque"
+    if design.motor.constants == "dc":
+        return words
+    return (
+        f"{words} (a DC equivalent has one winding; the pulsating torque of two phases left is not modelled)"
+    )
+
+
+def _followed_most_hz(design: Design) -> tuple[float, str]:
+    """Frequency from 0.1 Hz up at which the linear output is largest; without a resonance its bandwidth."""
     response = assemble_loops(design).reference_to_output
     assert response is not None
     period = design.controller.period_s * design.controller.position_loop.every
     f = np.geomspace(0.1, 0.5 / period, 400)
-    return float(f[np.argmax(np.abs(response(np.exp(2j * np.pi * f * period))))])
+    size = np.abs(response(np.exp(2j * np.pi * f * period)))
+    top = int(np.argmax(size))
+    if size[top] > FLAT * size[0]:
+        return float(f[top]), "where the drive follows most"
+    beyond = np.flatnonzero(size < math.sqrt(0.5) * size[0])
+    return float(f[beyond[0] if beyond.size else -1]), "its bandwidth, as it has no resonance"
 
 
 def _size(design: Design, value: float) -> str:

@@ -8,7 +8,7 @@ from math import ceil, log
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.compliance import compliance
 from analyses.drive_figures import drive_figures
 from analyses.failures.cases import Case, cases_of
@@ -58,7 +58,7 @@ def _settling_s(design: Design, asked: Asked) -> float:
     """Time to reach half the stop and settle."""
     slowest = float(compliance(design).slowest)
     if slowest > 1.0 + 1e-9:
-        raise InputError("failures: the closed loop is not stable")
+        raise UnstableError("failures: the closed loop is not stable")
     rate = min(drive_figures(design).output_rate_rad_s, design.command.rate_rad_s)
     travel = 0.5 * asked.stop_rad / rate if rate > 0.0 else LONGEST_S
     ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0

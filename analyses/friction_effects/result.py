@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.cycles import LimitCycles, described_cycles, limit_cycles
 from analyses.friction_effects.describing import ForeseenCycle, at_load
@@ -81,7 +82,6 @@ def friction_effects(
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-    from actuator_lti.loops import assemble_loops
 
     velocity = design.controller.velocity
     integrates = velocity is not None and velocity.integral_time_s is not None

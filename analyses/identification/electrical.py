@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
@@ -111,7 +112,6 @@ def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> Elec
 
 def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
-    from scipy.signal import butter, filtfilt
 
     for name in ("voltage", "current"):
         if name not in record.signals:

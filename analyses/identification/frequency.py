@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError
 from analyses.records.record import Record
@@ -148,7 +149,6 @@ def period_of_excitation(record: Record, name: str) -> float:
     InputError
         If it does not repeat itself at least five times.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
 
     values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
     n = len(values)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from actuator_lti.design.model import Design
 from analyses.identification.dynamic import Recipe
@@ -156,7 +157,6 @@ def _moved(
     chosen: Sequence[float], place: int, top: float, misfit: Callable[[Sequence[float]], float]
 ) -> float:
     """One break point, refined between the grid's neighbours."""
-    from scipy.optimize import minimize_scalar
 
     others = [v for k, v in enumerate(chosen) if k != place]
     here = float(np.log(chosen[place]))

@@ -1,4 +1,4 @@
-"""From runs to points: one steady speed, motor torque and hinge moment a run."""
+"""From runs to points: one steady speed, motor torque and load torque a run."""
 
 from __future__ import annotations
 

@@ -24,6 +24,7 @@ FloatArray = NDArray[np.float64]
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
 END_SHARE = 0.02
+SHORTEST_S = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,6 +184,10 @@ def record_rows(
         That moment after decimation, as found so far, for the load's share of the friction.
     """
     record = prepared(record)
+    lasts = len(record) * period_of(record)
+    if lasts < SHORTEST_S and not is_benchmark(record):
+        told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
+        raise InputError(f"{told}; is the unit of the time right?", where=record.name)
     recipe = recipe_for(record) if recipe is None else recipe
     motion, place = motion_of(design, record, recipe)
     drive, driven_by, told, back_emf = drive_of(design, record)

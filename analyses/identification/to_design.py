@@ -234,12 +234,9 @@ def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
     allowed = field_of(path)
     if allowed is None or allowed.accepts(value - TRUNCATION_STD * std):
         return Tolerance(kind="normal", std=std)
-    return Tolerance(
-        kind="truncated-normal",
-        std=std,
-        lower=max(allowed.low, 1e-6 * abs(value)),
-        upper=value + TRUNCATION_STD * std,
-    )
+    lower = max(allowed.low, 1e-6 * value) if value > 0.0 else allowed.low
+    upper = min(value + TRUNCATION_STD * std, allowed.high)
+    return Tolerance(kind="truncated-normal", std=std, lower=lower, upper=upper)
 
 
 def _correlations(paths: Sequence[str], covariance: FloatArray) -> list[Correlation]:

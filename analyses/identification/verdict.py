@@ -111,12 +111,22 @@ def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
 
 def size_item(design: Design, model: JointModel) -> Item:
     """Identified values against those that the design had: a common factor is no drive's doing."""
-    ratios = {}
+    ratios, behind = {}, _behind(design)
     for name in model.names:
+        kind = name.partition("_")[0]
         before = default_value(design, name)
-        if name.partition("_")[0] in ("inertia", "viscous", "dry") and before > 0.0:
-            ratios[name] = model[name] / before
+        if kind in ("inertia", "viscous", "dry") and before > 0.0:
+            ratios[name] = (model[name] + behind[kind]) / (before + behind[kind])
     return sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
+
+
+def _behind(design: Design) -> dict[str, float]:
+    """Friction behind the coupling, at the motor: it was taken off the torque that a wrong scale is in."""
+    ratio, friction = design.ratio_to_coupling, design.load.friction
+    if design.coupling is None or friction is None:
+        return {"inertia": 0.0, "viscous": 0.0, "dry": 0.0}
+    dry, viscous = friction.dry_torque_Nm / ratio, friction.viscous_Nms_rad / ratio**2
+    return {"inertia": 0.0, "viscous": viscous, "dry": dry}
 
 
 def sizes_item(ratios: Mapping[str, float], more: Mapping[float, str], leading: str) -> Item:

@@ -101,7 +101,9 @@ def check_border(
     friction_on : bool
         Without dry friction the border is that of the linear loop; with it, the shift is what is asked for.
         Encoder counts are left out together with the friction, and so is the drop of a soft supply, which
-        lowers the voltage limit by what the drive draws: neither is a part of the linear loop.
+        lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is an
+        overload protection (I2t) that is slow against the tones: at its border it acts after many of its time
+        constants.
     """
     left_out = ""
     if not friction_on:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design.model import Design
+from actuator_lti.loops import assemble_loops
 from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
 from analyses.large_signal.border import BorderCheck, check_border
 from analyses.large_signal.map import AMPLITUDES, FREQUENCIES, AmplitudeMap, amplitude_map
@@ -73,7 +74,6 @@ def large_signals(
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-    from actuator_lti.loops import assemble_loops
 
     def step(done: int) -> None:
         if progress is not None:

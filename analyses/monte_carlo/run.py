@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +14,7 @@ import numpy as np
 from actuator_lti.atomic import write_bytes
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
+from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.extras import need
 from actuator_lti.quantities import ANALYSIS_QUANTITIES, QUANTITIES
@@ -72,8 +75,6 @@ class MonteCarloSettings:
 
 def sample_folder(design: Design, settings: MonteCarloSettings, folder: Path) -> Path:
     """Folder of a study inside another: the same study always gets the same one, another never."""
-    import hashlib
-    import json
 
     identity = _task(design, settings).identity()
     digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
@@ -178,7 +179,6 @@ class _Tally:
 
 
 def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple[WorstCase, ...]:
-    from actuator_lti.design import with_values, write_design
     from analyses.slugs import slug
 
     result = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,10 @@ from actuator_lti.batch import (
     variable_paths,
 )
 from actuator_lti.batch.parameters import OperatingPoint
+from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
-from analyses.engine import Arrays
+from analyses.engine import Arrays, code_version
 from analyses.monte_carlo.judging import drive_column, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
 from analyses.sampling import Sampler, as_values
@@ -107,8 +109,6 @@ class SampleTask:
 
     def identity(self) -> dict[str, Any]:
         """Everything that decides the numbers, as plain JSON."""
-        from actuator_lti.design import design_hash
-        from analyses.engine import code_version
 
         table = self.sampler.table
         return {
@@ -126,8 +126,6 @@ class SampleTask:
 
 
 def _digest(rows: np.ndarray) -> str:
-    import hashlib
-
     return hashlib.sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()
 
 
@@ -142,7 +140,6 @@ def replay(design: Design, sampler: Sampler, number: int) -> Design:
     >>> replay(design, sampler_of(design, seed=3), 17).load.inertia_kgm2 == design.load.inertia_kgm2
     False
     """
-    from actuator_lti.design import with_values
 
     values = sampler.draw(number, 1)[0]
     changes = {path: float(v) for path, v in zip(sampler.paths, values, strict=True)}

@@ -22,7 +22,7 @@ from analyses.records.spec import RecordSpec
 class ImportedRun:
     """One run, on one clock, with the account of its files.
 
-    ``load_is_zero`` is true for a disconnected clutch: the hinge moment is then exactly zero, and no torque
+    ``load_is_zero`` is true for a disconnected clutch: the load torque is then exactly zero, and no torque
     is needed.
     """
 
@@ -122,7 +122,7 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
     zero = entry.load_Nm == 0.0
     join = None
     if zero:
-        note = "clutch disconnected: the hinge moment is zero, the torque record is not needed"
+        note = "clutch disconnected: the load torque is zero, the torque record is not needed"
         record = replace(drive, notes=(*drive.notes, note))
     elif "torque" in drive.signals:
         record = drive

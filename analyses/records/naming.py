@@ -53,7 +53,7 @@ SIGNALS = (
     Signal("voltage", "V", "motor voltage", ("motor_voltage", "u", "v", "uq", "u_q", "vir")),
     Signal("supply", "V", "supply voltage",
            ("supply_voltage", "bus", "bus_voltage", "udc", "u_dc", "vbus", "dc_link")),
-    Signal("torque", "N*m", "hinge moment at the output",
+    Signal("torque", "N*m", "load torque at the output",
            ("load", "moment", "hinge_moment", "load_torque", "output_torque", "m", "torque_sensor")),
     Signal("load_force", "N", "load force", ("load", "moment", "torque", "external_force")),
     Signal("force", "N", "drive force", ("drive_force",)),

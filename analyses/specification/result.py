@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.loops import assemble_loops
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.specification.capability import Capability, capability
 from analyses.specification.manoeuvres import Manoeuvre, manoeuvres
@@ -62,7 +63,6 @@ def specification(
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-    from actuator_lti.loops import assemble_loops
 
     def step(done: int) -> None:
         if progress is not None:

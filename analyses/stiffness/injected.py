@@ -9,7 +9,7 @@ from math import ceil, log
 import numpy as np
 
 from actuator_lti.design.model import Design, Instruments
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.compliance import compliance
 from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
 from analyses.stiffness.result import AtRest, Check, LostMotion
@@ -51,7 +51,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
         raise InputError("stiffness: the output of this drive does not answer a moment")
     slowest = float(response.slowest)
     if slowest >= 1.0:
-        raise InputError("stiffness: the closed loop is not stable")
+        raise UnstableError("stiffness: the closed loop is not stable")
     settle = min(ceil(log(_SETTLED) / log(slowest)), _MOST_TICKS) if slowest > 0.0 else 1
     made = []
     for asked in frequencies_hz:

@@ -36,9 +36,11 @@ class StiffnessCurve:
 
     @property
     def least(self) -> tuple[float, float]:
-        """Smallest |K| and its frequency in Hz."""
+        """Smallest |K| and its frequency in Hz; 0 Hz where the static one is below all others."""
         size = np.abs(self.stiffness_Nm_rad)
         k = int(np.argmin(size))
+        if self.static_Nm_rad < size[k]:
+            return self.static_Nm_rad, 0.0
         return float(size[k]), float(self.frequency_hz[k])
 
 

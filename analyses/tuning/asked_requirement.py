@@ -6,7 +6,9 @@ import re
 from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Requirement
+from actuator_lti.design.quantities import QUANTITIES, parse_limit
 from actuator_lti.errors import InputError
+from analyses.monte_carlo.judging import loops_of
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -29,8 +31,6 @@ def read_requirement(words: str, design: Design) -> Requirement:
     >>> result.id, result.minimum, result.unit
     ('position-bandwidth-wanted', 30.0, 'Hz')
     """
-    from actuator_lti.design.quantities import QUANTITIES, parse_limit
-    from analyses.monte_carlo.judging import loops_of
 
     match = _FORM.fullmatch(words)
     if match is None:

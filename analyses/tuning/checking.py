@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.batch import Population
+from actuator_lti.design import with_values
+from actuator_lti.loops import assemble_loops
 from actuator_lti.quantities import QUANTITIES
 from analyses.monte_carlo.stepping import StepCheck, step_columns
 from analyses.tuning.problem import Problem
@@ -36,8 +38,6 @@ def confirm(
     binding : tuple of BindingRequirement
         The same at their worst corners.
     """
-    from actuator_lti.design import with_values
-    from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
     from analyses.verdicts import judged
 
@@ -70,7 +70,9 @@ def nonlinear_checks(
 
     worst = int(np.argmin(result.min(axis=1)))
     plan = LargeSignal.plan(tuned)
-    rows = {"nominal": problem.all_corners[0], "worst corner": problem.all_corners[worst]}
+    rows = {"nominal": problem.all_corners[0]}
+    if worst:
+        rows["worst corner"] = problem.all_corners[worst]
     population = Population(
         tuned,
         {f.path: np.array([row[k] for row in rows.values()]) for k, f in enumerate(problem.factors)},

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.object_dictionary import OBJECTS, step_of
+
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.design.object_dictionary import KnownObject
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
 
 def object_of(design: Design, path: str) -> KnownObject | None:
     """The object that holds a gain; None where the drive is not that motion controller."""
-    from actuator_lti.design.object_dictionary import OBJECTS
 
     if not design.objects.named:
         return None
@@ -24,7 +25,6 @@ def object_of(design: Design, path: str) -> KnownObject | None:
 
 def step_of_gain(design: Design, path: str) -> float | None:
     """SI value of one step of the object that holds a gain."""
-    from actuator_lti.design.object_dictionary import step_of
 
     known = object_of(design, path)
     return None if known is None else step_of(known, design.objects.velocity_gain_factor)

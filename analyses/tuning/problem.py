@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.batch import Population, linear_figures
+from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import judge
@@ -30,6 +31,7 @@ GAINS = (
 )
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
+PLENTY = 10.0  # relative distance beyond which the search does not look
 MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor for a drive with two masses
 
 
@@ -106,8 +108,6 @@ class Problem:
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
         """All toleranced parameters that are no gain."""
-        from actuator_lti.batch import variable_paths
-        from actuator_lti.design import tolerances
 
         known = set(variable_paths(self.design)) - set(self.paths)
         return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
@@ -122,7 +122,7 @@ class Problem:
         points = np.tile(nominal, (2 * len(nominal) + 1, 1))
         for k in range(len(nominal)):
             points[2 * k + 1 : 2 * k + 3, k] = ends[k]
-        result = self._distances(self.start[None, :], points, self.toleranced)[0]
+        result = np.minimum(self._distances(self.start[None, :], points, self.toleranced)[0], PLENTY)
         moved = np.abs(result[1:] - result[0]).max(axis=1).reshape(-1, 2).max(axis=1)
         chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
         return tuple(self.toleranced[k] for k in chosen)
@@ -152,6 +152,10 @@ class Problem:
 
         Unstable designs get a number below -3 that falls with the distance of the poles from the circle.
         """
+        return np.minimum(self._distances(gains, corners, self.factors), PLENTY)
+
+    def exact_distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """The same where they are far from the limit too; inf where nothing bounds the figure."""
         return self._distances(gains, corners, self.factors)
 
     def _distances(self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...]) -> np.ndarray:
@@ -169,7 +173,7 @@ class Problem:
         for k, requirement in enumerate(self.requirements):
             result = judge(requirement, self.design, columns).distance / size_of(requirement)
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
-        return np.minimum(out, 10.0).reshape(count, many, len(self.requirements))
+        return out.reshape(count, many, len(self.requirements))
 
     def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """One figure of one loop, shape (candidates, corners)."""
@@ -224,7 +228,6 @@ def problem_of(
     most : int
         Designs that a search may look at.
     """
-    from actuator_lti.design import parameter_value, paths_of
     from analyses.tuning.objects import allowed_range
 
     variables = []

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design import parameter_value, paths_of, with_values
+from actuator_lti.design.fields import Structure, field_of
 from analyses.monte_carlo.judging import label
 from analyses.tuning.checking import confirm, nonlinear_checks
 from analyses.tuning.least import least_change
@@ -102,7 +104,7 @@ def tune(
     assert best is not None
     placed, problem, solution = best.placed, best.problem, best.solution
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
-    result = problem.distances(gains[None, :], problem.all_corners)[0]
+    result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     tuned = replace(_tuned(problem, gains), name=f"{design.name}-tuned")
     tell(len(choices) + 1, stages)
     requirements = _binding(problem, gains, result, settings.aim)
@@ -176,8 +178,6 @@ def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
 
 
 def _tuned(problem: Problem, gains: np.ndarray) -> Design:
-    from actuator_lti.design import with_values
-
     pairs = zip(problem.paths, map(float, gains), problem.variables, strict=True)
     # what did not move keeps its text and source
     moved = {path: value for path, value, v in pairs if v.home is None or value != v.home}
@@ -196,7 +196,7 @@ def _binding(
     for k, requirement in enumerate(problem.requirements):
         corner = int(np.argmin(result[:, k]))
         relative = float(result[corner, k])
-        known = -3.0 < relative < 10.0
+        known = -3.0 < relative < np.inf
         distance = relative * size_of(requirement) if known else None
         made.append(
             BindingRequirement(
@@ -220,9 +220,6 @@ def _value(requirement: Requirement, distance: float | None) -> float | None:
 def _settings(
     problem: Problem, before: Design, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
 ) -> tuple[GainSetting, ...]:
-    from actuator_lti.design import parameter_value, paths_of
-    from actuator_lti.design.fields import Structure, field_of
-
     known_before = set(paths_of(before))
     made = []
     for k, path in enumerate(problem.paths):

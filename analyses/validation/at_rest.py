@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating
 from actuator_lti.errors import InputError
 from analyses.validation.coherent import coherent
 from analyses.validation.response import linear_response
@@ -124,7 +125,6 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
     answer is the same but for the images of a held signal.
     """
-    from actuator_lti.drive.operating import Operating
     from actuator_lti.drive.wiring import wire
     from actuator_lti.loops.sampled import reference_to_output
 

@@ -146,4 +146,9 @@ class Validation:
             words += f"; a command within full deflection makes the drive {does}"
             if self.conditional.limiter:
                 words += f" ({self.conditional.limiter} limit)"
+        border = None if self.large_signals is None else self.large_signals.border
+        if border is not None and border.passed is False:
+            words += (
+                "; a limit first acts at another command, or is another one, than the linear loop foresees"
+            )
         return words

@@ -29,7 +29,7 @@ class ExportedDesign:
     Attributes
     ----------
     row : ndarray, shape (layout.SIZE,)
-        Parameters of a run: the design at rest, its hinge moment an input.
+        Parameters of a run: the design at rest, its load torque an input.
     p_size, s_size : int
         Lengths of the rows of parameters and state.
     derived : ndarray, shape (p_size,)
@@ -44,7 +44,7 @@ class ExportedDesign:
 
 
 def exported(design: Design) -> ExportedDesign:
-    """The row of a design whose hinge moment comes from outside, and the lengths that it needs."""
+    """The row of a design whose load torque comes from outside, and the lengths that it needs."""
     row = design_row(design)
     row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
     p, s = parameters(row)

@@ -22,6 +22,7 @@ class Axis:
     """One axis of a panel; limits that are not set follow the values drawn."""
 
     log: bool = False
+    days: bool = False  # values are days since 1970: read out as a date
     label: str = ""
     low: float | None = None
     high: float | None = None

@@ -46,7 +46,7 @@ def _data(panel: Panel, frame: Frame, hide_x: bool) -> str:
     ):
         low, high = axis.span()
         a, b = ends[::-1] if axis.reversed else ends
-        kind = "log" if axis.log else "lin"
+        kind = "log" if axis.log else "days" if axis.days else "lin"
         parts.append(f' data-{key}="{kind} {low:.9g} {high:.9g} {a:.2f} {b:.2f}"')
         parts.append(f' data-{key}l="{escape(axis.name or axis.label.replace(chr(10), " "))}"')
         if axis.ticks is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -87,4 +88,11 @@ def _register(app: typer.Typer, command: str, panel: str) -> None:
     if isinstance(group, typer.Typer):
         app.add_typer(group, name=command, rich_help_panel=panel)
     else:
-        app.command(command, rich_help_panel=panel)(getattr(module, command))
+        function = getattr(module, command)
+        app.command(command, rich_help_panel=panel, help=flowed(function.__doc__ or ""))(function)
+
+
+def flowed(text: str) -> str:
+    """Give a docstring as paragraphs of one line each: the terminal breaks them at its own width."""
+    paragraphs = inspect.cleandoc(text).split("\n\n")
+    return "\n\n".join(" ".join(part.split("\n")) for part in paragraphs)

@@ -47,7 +47,7 @@ def compare(
     quiet: QuietOption = False,
     example: ExampleOption = False,
 ) -> None:
-    """Compare variants with their base: margins, bandwidths, verdicts, large signals, what moved what.
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
 
     What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
     """

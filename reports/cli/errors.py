@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import typer
 
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, UnstableError
 from reports.cli import time_limit
 from reports.cli.crash import write_crash_file
 
@@ -26,6 +26,7 @@ INTERRUPTED = 130
 # typer's own usage errors, whichever click it carries: BadParameter -> UsageError -> ClickException.
 _USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 
+_LONGEST = 1000  # characters of a line on standard error
 _NO_NUMBER = "Input should be a valid number, unable to parse string as a number"
 
 
@@ -67,6 +68,8 @@ def _run(call: Callable[[], object]) -> int:
     try:
         status = call()
         sys.stdout.flush()
+    except UnstableError as error:
+        return _say(str(error), VERDICT_FAILED)
     except InputError as error:
         return _say(_by_option(error), BAD_INPUT)
     except NumericalError as error:
@@ -107,6 +110,7 @@ def _by_option(error: InputError) -> str:
 def _say(line: str, status: int) -> int:
     """Print one line on standard error and hand the status on."""
     words = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
+    words = words if len(words) <= _LONGEST else f"{words[: _LONGEST - 300]} ... {words[-295:]}"
     sys.stderr.write(f"actuator-lti: {words}\n")
     return status
 

@@ -9,7 +9,7 @@ import typer
 
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
-from reports.cli.targets import folder_for_results
+from reports.cli.targets import folder_for_results, refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -46,7 +46,6 @@ def c(
     from nonlinear.export import c_export
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
     from reports.export_check import check_text
 
     drive = load_drive(design, changes)
@@ -114,7 +113,6 @@ def fmu(
     from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
     from reports.export_documents import export_documents
     from reports.model_picture import model_png
     from reports.provenance import package_version

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,7 +75,6 @@ def bench(folder: Path, name: str, drive: Design, seed: int, force: bool, as_jso
 
 def as_data(result: FrequencyResult, written: Path | None) -> dict[str, Any]:
     """The result as plain data, in SI."""
-    from dataclasses import asdict
 
     from reports.identification_json import inputs_json, items_json
     from reports.sections.frequency_identification import values_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +42,6 @@ def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: 
 
 def named_apart(records: Sequence[Any], taken: Sequence[str] = ()) -> list[Any]:
     """Records with names of their own, where files of one name lie in several folders."""
-    from dataclasses import replace
 
     seen: list[str] = list(taken)
     out = []
@@ -56,7 +56,6 @@ def named_apart(records: Sequence[Any], taken: Sequence[str] = ()) -> list[Any]:
 
 def as_data(result: BenchResult, written: Path | None) -> dict[str, Any]:
     """The result as plain data, in SI."""
-    from dataclasses import asdict
 
     from reports.identification_json import inputs_json, items_json
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from reports.cli.options import JsonOption
+from reports.cli.targets import refuse_existing
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Design file to write.")]
 FromOption = Annotated[
@@ -34,7 +35,6 @@ def init(
     from actuator_lti.atomic import write_text
     from actuator_lti.design import read_design_text
     from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
 
     refuse_existing(file, force)
     text = _renamed(_source_text(source if kind is None else _of_kind(kind, source)), file.stem)

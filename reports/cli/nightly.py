@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from actuator_lti.bounds import JOB_MEMORY
+from actuator_lti.errors import InputError
 from reports.cli.options import JsonOption, QuietOption, SchedulerOption, TlsOption
 
 if TYPE_CHECKING:
@@ -121,7 +122,6 @@ def nightly(
 
 def _split(words: list[str]) -> tuple[bool, str]:
     """Tell ``STUDY`` from ``approve STUDY``."""
-    from actuator_lti.errors import InputError
 
     if len(words) == 2 and words[0] == "approve":
         return True, words[1]

@@ -9,6 +9,7 @@ import typer
 
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
+from reports.cli.targets import refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import ControllerObject
@@ -59,7 +60,6 @@ def export(
     from actuator_lti.design.settings_file import write_settings_toml
     from actuator_lti.design.settings_xml import settings_xml
     from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
 
     drive = load_drive(design, changes)
     if per is not None:
@@ -102,7 +102,6 @@ def import_settings(
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
     from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
 
     factor = None if per is None else calibration(per)
     result = import_objects(read_settings(settings, factor), load_design(base), str(settings))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+import unicodedata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+_OBEYED = ("Cc", "Cs")
 
 
 def print_json(data: Any) -> None:
@@ -16,7 +19,9 @@ def print_json(data: Any) -> None:
 
     from reports.document import plain
 
-    sys.stdout.write(json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2) + "\n")
+    text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2)
+    # what is no Unicode (a path of other bytes) stays an escape of JSON
+    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode() + "\n")
 
 
 def console() -> Console:
@@ -29,9 +34,22 @@ def console() -> Console:
 
 def print_warning(text: str) -> None:
     """Print one line about something suspicious on standard error."""
-    sys.stderr.write(f"warning: {' '.join(text.split())}\n")
+    sys.stderr.write(f"warning: {printable(' '.join(text.split()))}\n")
 
 
 def print_line(text: str) -> None:
-    """Print one line of plain text."""
-    sys.stdout.write(text + "\n")
+    """Print plain text; what a terminal would obey instead of showing it becomes a question mark."""
+    sys.stdout.write(printable(text) + "\n")
+
+
+def printable(text: str) -> str:
+    """The text without control characters but line breaks and tabs.
+
+    Examples
+    --------
+    >>> printable("a\\x1b[31mb")
+    'a?[31mb'
+    """
+    if text.isprintable():
+        return text
+    return "".join("?" if unicodedata.category(c) in _OBEYED and c not in "\n\t" else c for c in text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isfinite, isinf
 from typing import TYPE_CHECKING, Any
 
 from reports.cli.drive import SetOption, load_drive
@@ -49,7 +49,6 @@ def _verdict(result: Stiffness) -> str:
 
 def _rigid(result: Stiffness) -> bool:
     """Whether the output holds against any moment."""
-    from math import isinf
 
     return all(isinf(curve.static_Nm_rad) for curve in result.curves)
 

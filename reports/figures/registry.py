@@ -16,6 +16,7 @@ MODULES: dict[str, str] = {
     "bode": "reports.figures.bode",
     "closed_bode": "reports.figures.closed_bode",
     "nyquist": "reports.figures.nyquist",
+    "nichols": "reports.figures.nichols",
     "sensitivity": "reports.figures.sensitivity",
     "step": "reports.figures.step",
     "stiffness": "reports.figures.stiffness",

@@ -29,10 +29,10 @@ def draw(data: Data) -> Chart:
     chart = Chart(width=style.WIDE, height=420.0)
     top, bottom = chart.column(1.2, 1.0)
     f = data["frequency_hz"]
+    top.y.log, top.y.label = True, f"stiffness, {data['unit']}"
     for k, series in enumerate(data["series"]):
         top.curve(f, series["size"], series["label"], **style.series(k))
         bottom.curve(f, series["phase_deg"], series["label"], **style.series(k))
-    top.y.log, top.y.label = True, f"stiffness, {data['unit']}"
     bottom.y.label = "phase, deg"
     top.x.log = True
     style.frequency(bottom, f)

@@ -23,6 +23,7 @@ from analyses.engine import Engine
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.limits import die_with_parent, limit_memory
 from reports.nightly.pool import ONE_THREAD, Done, Task, ended
+from reports.nightly.worker import execute, resolve
 
 _CHILD = "from reports.nightly.apart import child; child()"
 
@@ -108,7 +109,6 @@ def build_apart(build: str, time_limit_s: float, memory_limit_bytes: int, task: 
 
 def child() -> None:
     """The other side of `build_apart`: question on standard input, answer on standard output."""
-    from reports.nightly.worker import execute, resolve
 
     die_with_parent()
     answer_to = os.dup(1)

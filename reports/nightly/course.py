@@ -94,7 +94,7 @@ class _Writer:
             "title": chart.title,
             "id": verdict.id if verdict is not None else "",
             "unit": figure.unit,
-            "svg": Markup(line_chart(chart)),
+            "svg": Markup(line_chart(chart, f"t{len(self.course.charts)}")),
             "points": [(self.days[p.index], p) for p in points],
         }
 

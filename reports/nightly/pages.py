@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from reports.document_schema import Row
-from reports.html import asset, environment, security_policy
+from reports.html import asset, environment, security_policy, show_signed
 from reports.nightly.course import Course, course_of
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
@@ -17,6 +17,7 @@ from reports.nightly.machines import STATE_WORDS, cause_lines
 from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line, visible
 from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
+from reports.numbers import MISSING, significant
 
 MAX_NIGHTS = 400
 MAX_HEADLINES = 12
@@ -83,7 +84,7 @@ def figures_csv(design: DesignView, history: History) -> str:
 
 
 def _render(template: str, **context: Any) -> str:
-    script = asset("nightly/nightly.js")
+    script = asset("nightly/nightly.js") + asset("live.js")
     counter = itertools.count(1)
     return (
         environment()
@@ -148,12 +149,8 @@ def _night(
 
 
 def _number(value: float | None, digits: int = 4) -> str:
-    from reports.numbers import MISSING, significant
-
     return MISSING if value is None else significant(value, digits)
 
 
 def _signed(value: float | None, digits: int = 3) -> str:
-    from reports.html import show_signed
-
     return show_signed(value, digits)

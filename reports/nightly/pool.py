@@ -14,6 +14,7 @@ from typing import Any
 
 from actuator_lti.bounds import JOB_MEMORY
 from reports.nightly import worker
+from reports.nightly.cache import Cache
 
 START_LIMIT_S = 180.0
 # One thread a worker: the jobs themselves are what runs in parallel.
@@ -99,8 +100,6 @@ class Pool:
             self._stop()
 
     def _inline(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        from reports.nightly.cache import Cache
-
         function = worker.resolve(self._build)
         for task in tasks:
             start = time.monotonic()

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.reading import read_toml, shown, shown_path
 from reports.nightly.job import Job
 from reports.nightly.night import Study
 from reports.nightly.tolerance import Tolerances, read_tolerances
@@ -71,7 +72,6 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
 
 
 def _read_file(path: Path) -> tuple[StudyFile, dict[str, Any]]:
-    from actuator_lti.reading import read_toml, shown, shown_path
     from analyses.study import study_from_tree
 
     where = shown_path(path)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from analyses.loop_figures import LoopFigures
+from analyses.responses import frequency_grid
 from reports import document as doc
 from reports.document_schema import Block, GlanceBlock, GlanceFigure, GlanceLoop, Section, Weakest
 from reports.findings import Finding, gathered, plain
@@ -91,7 +92,6 @@ def _nearness(item: Mapping[str, Any]) -> float:
 
 def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
     """Make one Bode and one step figure, of the outermost loop."""
-    from analyses.responses import frequency_grid
 
     name, result = list(figures.items())[-1]
     blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name)]

@@ -29,6 +29,7 @@ from reports.sections.names import LOOPS, hertz
 if TYPE_CHECKING:
     from reports.figures import bode as bode_figure
     from reports.figures import closed_bode as closed_bode_figure
+    from reports.figures import nichols as nichols_figure
     from reports.figures import nyquist as nyquist_figure
     from reports.figures import sensitivity as sensitivity_figure
     from reports.figures import step as step_figure
@@ -49,6 +50,7 @@ def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures
         blocks.append(sensitivity(title, design, name, figures, grid))
     if figures.step is not None:
         blocks.append(step(title, figures, locked, name=name))
+    blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
     notes = [*evidence_notes({title: figures}), *figures.margins.notes, *figures.notes]
     blocks += [doc.text(note) for note in notes]
     return doc.section(
@@ -188,6 +190,21 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
         "(modulus margin, 1 over the peak of S)."
     )
     return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
+
+
+def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
+    """Make the Nichols chart."""
+    open_loop = curve(figures.loop.open_loop, grid)
+    data: nichols_figure.Data = {
+        "frequency_hz": abscissa(open_loop.frequency_hz),
+        "magnitude_db": rounded(open_loop.magnitude_db),
+        "phase_deg": rounded(open_loop.phase_deg),
+    }
+    caption = (
+        f"{title}, Nichols chart: gain over phase. Inside the outlines about the critical points (+) the "
+        "peak of S or of T exceeds 6 dB."
+    )
+    return doc.figure("nichols", data, caption=caption, alt=f"{caption} {_margin_words(title, figures)}")
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> Block:

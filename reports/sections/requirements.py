@@ -34,9 +34,24 @@ def result(items: Sequence[Mapping[str, Any]]) -> str:
     unjudged = sum(item["passed"] is None for item in items)
     rest = f" {unjudged} cannot be judged." if unjudged else ""
     if failed:
-        return f"{len(failed)} of {len(items)} requirements are not met: {'; '.join(failed)}.{rest}"
+        return f"{counted(len(failed), len(items))} not met: {'; '.join(failed)}.{rest}"
     met = len(items) - unjudged
-    return f"{'All' if not unjudged else f'{met} of'} {len(items)} requirements are met.{rest}"
+    if not unjudged and met > 1:
+        return f"All {met} requirements are met."
+    return f"{counted(met, len(items))} met.{rest}"
+
+
+def counted(count: int, total: int) -> str:
+    """Say "1 of 9 requirements is", "2 of 9 requirements are", "The requirement is" (of one).
+
+    Examples
+    --------
+    >>> counted(1, 9), counted(2, 9), counted(1, 1)
+    ('1 of 9 requirements is', '2 of 9 requirements are', 'The requirement is')
+    """
+    if count == total == 1:
+        return "The requirement is"
+    return f"{count} of {total} requirement{'s' if total != 1 else ''} {'is' if count == 1 else 'are'}"
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:

@@ -427,7 +427,7 @@
     const unknown = data.loops.filter((name) => now.loops[name].n === DOUBT), words = [];
     if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now fail (as designed: ${old.length}).` : unknown.length ? "" : `All ${total} requirements on the loops are met.`);
+    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now ${fails.length === 1 ? "fails" : "fail"} (as designed: ${old.length}).` : unknown.length ? "" : total === 1 ? "The requirement on the loops is met." : `All ${total} requirements on the loops are met.`);
     if (data.others) words.push(`${data.others} on the whole drive: see the report.`);
     if (refused) words.push(refused);
     line.className = `state ${unstable.length || fails.length || unknown.length ? "fail" : "pass"}`;

@@ -31,6 +31,7 @@
     constructor(words, label, fixed) {
       const [kind, ...ends] = words.split(" ");
       this.log = kind === "log";
+      this.days = kind === "days"; // since 1970
       [this.low, this.high, this.from, this.to] = ends.map(Number);
       this.fixed = fixed;
       const cut = label.lastIndexOf(", ");
@@ -45,7 +46,10 @@
       const part = (px - this.from) / (this.to - this.from);
       return this.log ? this.low * (this.high / this.low) ** part : this.low + part * (this.high - this.low);
     }
-    words(value) { return reading(value, this.unit) + (this.unit ? " " + this.unit : ""); }
+    words(value) {
+      if (this.days) return new Date(Math.round(value * 1440) * 6e4).toISOString().slice(0, 10);
+      return reading(value, this.unit) + (this.unit ? " " + this.unit : "");
+    }
   }
 
   const linearTicks = (low, high, room) => {

@@ -275,3 +275,13 @@ def test_the_calibration_is_named_by_its_unit() -> None:
     assert calibration("rpm") == pytest.approx(9.549, abs=5e-4)
     with pytest.raises(InputError, match='"rad/s" or "rpm"'):
         calibration("Hz")
+
+
+def test_torque_feed_forward_comes_in_and_goes_out() -> None:
+    """0x2349.01 = 64 is half the torque J/kM times the command's acceleration."""
+    base = load_design("ilr33-amber")
+    settings_in = ControllerObjects(values=(ControllerObject(index=0x2349, subindex=1, value=64),))
+    result = import_objects(settings_in, base)
+    assert result.design.controller.position_loop.acceleration_feedforward == 0.5
+    assert any("0x2349.01" in note for note in result.notes)
+    assert export_objects(result.design).objects.values == settings_in.values

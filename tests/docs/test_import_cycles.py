@@ -84,3 +84,36 @@ def test_a_cycle_would_be_seen() -> None:
     result["actuator_lti.errors"].add("actuator_lti.margins.engine")
     with pytest.raises(CycleError):
         TopologicalSorter(result).prepare()
+
+
+LAZY = {"actuator_lti", "nonlinear", "analyses"}
+"""Packages whose names are loaded on first use (`actuator_lti.on_first_use`)."""
+
+
+def everything_loaded(module: str, direct: dict[str, set[str]]) -> set[str]:
+    """The project's modules that are there once this one is, packages above them too."""
+    result: set[str] = set()
+    waiting = [module]
+    while waiting:
+        one = waiting.pop()
+        parts = one.split(".")
+        above = {".".join(parts[:k]) for k in range(1, len(parts))} & MODULES.keys()
+        waiting += [name for name in direct.get(one, set()) | above if name not in result]
+        result.add(one)
+    return result
+
+
+def test_no_function_imports_what_is_loaded_anyway() -> None:
+    """An import in a function is for start-up or for an extra; else it stands at the top."""
+    direct, idle = graph(False), []
+    for module, path in MODULES.items():
+        if module in CONVENIENCES:
+            continue
+        there = everything_loaded(module, direct) - {module}
+        for node in later(ast.parse(path.read_text())):
+            named_ones = targets(node, module)
+            if not named_ones or named_ones & LAZY or not named_ones <= there:
+                continue
+            if not any(module in everything_loaded(name, direct) for name in named_ones):
+                idle.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
+    assert not idle, "\n".join(sorted(set(idle)))

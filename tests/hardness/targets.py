@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import random
+import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from command_lines import hostile, seeds
 from mutate import damaged, damaged_tree, extreme
 
 from actuator_lti.design import load_design, read_design_text, shipped_designs, with_overrides, write_design
@@ -188,20 +190,35 @@ def command(*words: str) -> Callable[[Path], None]:
     """Run a command on the file (``FILE`` among the words); its status and its words are looked at."""
 
     def run(path: Path) -> None:
-        from reports.cli.main import main
-
         given = [str(path) if word == "FILE" else word.replace("FOLDER", str(path.parent)) for word in words]
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            status = main(given)
-        said = err.getvalue()
-        lines = [line for line in said.splitlines() if line.startswith("actuator-lti:")]
-        assert "unforeseen" not in said, said
-        assert "Traceback" not in said, said
-        assert status in (0, 1, 2, 3), (status, said)
-        assert len(lines) == (1 if status in (2, 3) else 0), (status, said)
+        called(given)
 
     return run
+
+
+def command_line(path: Path) -> None:
+    """Run the command whose words the file holds, in the file's folder."""
+    words = json.loads(path.read_bytes())
+    with contextlib.chdir(path.parent):
+        called([word.replace("OUT", str(path.parent)).replace("FILE", str(path)) for word in words])
+
+
+def called(given: list[str]) -> None:
+    """Run a command; its status and its words are looked at."""
+    from reports.cli.main import main
+
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        status = main(given)
+    said = err.getvalue()
+    lines = [line for line in said.splitlines() if line.startswith("actuator-lti:")]
+    for text in (out.getvalue(), said):
+        assert all(c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cs") for c in text), text
+    assert all(len(line) <= 1100 for line in said.splitlines()), said
+    assert "unforeseen" not in said, said
+    assert "Traceback" not in said, said
+    assert status in (0, 1, 2, 3), (status, said)
+    assert len(lines) == (1 if status in (2, 3) else 0), (status, said)
 
 
 @cache
@@ -334,6 +351,7 @@ def targets() -> tuple[Target, ...]:
         Target("site", (SUMMARY,), summary, ".json", tree_fault, share=1000),
         Target("history", (history_file(),), history, ".sqlite", share=100),
         Target("cache entry", (entry_file(),), entry, ".entry", share=1000),
+        Target("command line", seeds(), command_line, ".json", hostile, share=6),
         Target("command margins", designs, command(*linear), fault=extreme, share=1),
         Target("command simulate", designs, command(*move), fault=extreme, share=4),
         Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme, share=4),

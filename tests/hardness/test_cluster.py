@@ -158,9 +158,8 @@ def cluster(tmp_path, monkeypatch):
     import distributed
     from distributed.security import Security
 
-    monkeypatch.setenv(
-        "PYTHONPATH", os.pathsep.join([str(Path(__file__).parents[1] / "nightly"), os.getcwd()])
-    )
+    tests = Path(__file__).parents[1]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "nightly", tests.parent))))
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()

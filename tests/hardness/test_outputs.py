@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import stat
@@ -24,6 +25,29 @@ def simulate(*options: str, **named: object) -> subprocess.CompletedProcess[str]
     code = "import sys; from reports.cli.main import main; sys.exit(main())"
     command = [sys.executable, "-c", code, *SIMULATE, *options]
     return subprocess.run(command, text=True, timeout=120, check=False, **{"capture_output": True, **named})
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31mb.toml", "a\x9bb.toml", "a\udc80b.toml"])
+def test_a_terminal_is_told_of_no_file_in_its_own_commands(name, tmp_path, monkeypatch, capsys) -> None:
+    from reports.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", name]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("wrote a?")
+    assert said.rstrip("\n").isprintable()
+    assert main(["init", name, "--force", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["file"] == name
+
+
+def test_a_line_on_standard_error_is_one_that_can_be_read(capsys) -> None:
+    from reports.cli.main import main
+
+    for words in (["init", "9" * 5000], ["margins", "--load", "9" * 5000], ["keys", "--x" + "y" * 9000]):
+        assert main(words) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert len(said) < 1100
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")

@@ -187,6 +187,35 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     assert not list(out.glob("*.toml"))
 
 
+@pytest.mark.parametrize(
+    ("change", "status", "reason"),
+    [
+        ({"Irms [A]": ("current_A", 1.0)}, 1, "root 3/2 (rms of AC read as the equivalent DC"),
+        ({"position [mm]": ("position [mm]", -1.0)}, 1, "the sign is turned"),
+        ({"time [ms]": ("time [ms]", 1e-3)}, 2, "is the unit of the time right?"),
+    ],
+)
+def test_a_fault_on_a_linear_axis_is_named(
+    change: dict[str, tuple[str, float]],
+    status: int,
+    reason: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
+    case = next(case for case in CASES if case.name == "ballscrew")
+    run = simulate(_bare("ballscrew"), case.command, case.seconds, record_every=case.every)
+    table = _linear(run, np.random.default_rng(7))
+    changed = {change.get(k, (k, 1.0))[0]: change.get(k, (k, 1.0))[1] * v for k, v in table.items()}
+    np.savetxt(tmp_path / "r.csv", np.column_stack(list(changed.values())), delimiter=";",
+               header=";".join(changed), comments="", fmt="%.10g")  # fmt: skip
+    arguments = ["identify", str(tmp_path / "r.csv"), "--design", "ballscrew", "--out", str(tmp_path / "o")]
+    assert main([*arguments, "--json"]) == status
+    out, err = capsys.readouterr()
+    assert reason in (err if status == 2 else json.dumps(json.loads(out)["checks"]))
+    assert not list((tmp_path / "o").glob("*.toml"))
+
+
 def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
     base = _bare("ilr33-amber")

@@ -10,6 +10,7 @@ import pytest
 from loop_designs import amber, emps, without
 from two_mass import drive_d, drive_e
 
+from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value
 from actuator_lti.design.access import stacked
@@ -119,7 +120,7 @@ def same(blocks: list[Any], k: int) -> None:
 
 def test_many_designs_figures_know_the_wide_drive() -> None:
     """The figures of one stacked design are those of its loops, notch and output sensor and all."""
-    from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
+    from actuator_lti import closed_loop_bandwidth, step_figures
 
     design = everything()
     figures = linear_figures(Population(design, {}, 1))
@@ -136,3 +137,39 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
     for quantity, expected in pairs.items():
         result = figures.quantity(quantity, "position")[0]
         assert result == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity
+
+
+def pushed(base: str, slope: float) -> Design:
+    design = load_design(base)
+    return replace(design, load=replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope))
+
+
+@pytest.mark.parametrize(
+    ("design", "k", "loop", "told"),
+    [
+        (DRIVES["speed drive"], 6, "current", False),  # a crossover at 2e-5 rad/s, 5e8 samples a turn
+        (load_design("fin"), 6, "velocity", True),  # nearest to -1 at zero frequency itself
+        (pushed("ilr33-amber", 3000.0), 4, "velocity", True),  # L(0) from two slow poles
+    ],
+)
+def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
+    design: Design, k: int, loop: str, told: bool
+) -> None:
+    values = scattered(design, 12)
+    ticks = design.controller.computing_delay_s / design.controller.period_s
+    values["control.computing_delay"] = ticks * values["control.period"]
+    figures = linear_figures(Population(design, values, 12), time_figures=False)
+    alone = stacked(design, {path: float(array[k]) for path, array in values.items()})
+    truth = stability_margins(assemble_loops(alone).present[loop].open_loop, certify=True)
+    assert truth.evidence == "certified"
+    assert bool(figures.withheld(loop)[k]) is not told
+    if not told:
+        return
+    assert bool(figures.stable(loop)[k]) is truth.stable
+    pairs = {
+        "gain_margin": truth.gain_margin_db,
+        "phase_margin": truth.phase_margin_deg,
+        "modulus_margin": truth.modulus_margin,
+    }
+    for quantity, expected in pairs.items():
+        assert figures.quantity(quantity, loop)[k] == pytest.approx(expected, rel=1e-7), quantity

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from margin_families import poly, roots_of, uniform
 from margin_truth import Truth, truth_of
+from mpmath import mp, mpf
 
 from actuator_lti import DelaySystem
 from actuator_lti.margins import stability_margins
@@ -115,3 +116,16 @@ def test_determinants_of_a_loop_with_a_delay_in_series_are_its_coefficients() ->
     assert [float(c.p) / float(c.q) for c in num.coeffs()] == [5.0, 3.0]
     assert [float(c.p) / float(c.q) for c in den.coeffs()] == [7.0, 4.0, 1.0]
     assert (float(delay.p) / float(delay.q), none) == (0.25, 0)
+
+
+@pytest.mark.parametrize("certify", [False, True])
+@pytest.mark.parametrize("shift", [0.0, 1e-14, -1e-14, 1e-13, -1e-13, 1e-11, -1e-11, 1e-9, -1e-9])
+def test_a_delayed_loop_at_its_border_is_told_or_withheld(shift: float, certify: bool) -> None:
+    """k exp(-s)/s is stable for k < pi/2, which no double is: never "on the border", never an error."""
+    k = 0.5 * math.pi * (1.0 + shift)
+    m = stability_margins(control.tf([k], [1, 0]), delay_s=1.0, certify=certify)
+    assert not m.agreement.border_poles
+    if m.evidence != "withheld":
+        with mp.workdps(40):
+            assert m.stable is bool(mpf(k) < mp.pi / 2)
+    assert m.evidence != "withheld" or abs(shift) < 1e-13

@@ -10,6 +10,7 @@ import pytest
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import stability_margins
+from actuator_lti.margins.nyquist import slope_at_dc
 from actuator_lti.margins.results import Agreement, StabilityMargins
 
 s = control.tf("s")
@@ -179,3 +180,21 @@ def test_band_limits_the_lists_and_not_the_verdict() -> None:
 def test_unspecified_period_counts_as_one_second() -> None:
     m = stability_margins(control.tf([0.5], [1, 0], True))
     assert m.gain_margins[0].frequency_rad_s == pytest.approx(math.pi)
+
+
+def test_on_the_border_is_what_lies_there_exactly() -> None:
+    """k/(s (s + 1)^2) has poles at +-j for k = 2; the next double is no answer, 1e-12 away it is one."""
+    answers = []
+    for k in (2.0, np.nextafter(2.0, 3.0), np.nextafter(2.0, 1.0), 2.0 * (1 + 1e-12), 2.0 * (1 - 1e-12)):
+        for certify in (False, True):
+            m = stability_margins(control.tf([k], [1, 2, 1, 0]), certify=certify)
+            answers.append((m.verdict, m.evidence == "withheld", m.agreement.border_poles))
+    assert answers[:2] == [("on the border", False, 2)] * 2
+    assert answers[2:6] == [("undecided", True, 0)] * 4
+    assert answers[6:] == [("unstable", False, 0)] * 2 + [("stable", False, 0)] * 2
+
+
+def test_a_response_that_vanishes_below_some_frequency_has_no_slope_there() -> None:
+    """L = 1/x above 1e-4 and 0 below, as rounding cuts it: one pole, and no warning."""
+    order, _ = slope_at_dc(lambda x: np.where(x < 1e-4, 0.0, 1.0 / x).astype(complex), 1.0, 3)
+    assert order == 1

@@ -290,3 +290,27 @@ def test_noise_widens_the_ranges_of_modulus_and_disk_margin() -> None:
     assert none < 0.01
     assert one > 0.02
     assert two > 1.7 * one
+
+
+def test_crossings_that_a_coarse_measurement_tells_apart_are_listed_apart() -> None:
+    """Twelve points of a two-mass drive: the gain passes one three times, surely, between known points."""
+
+    def L(w: np.ndarray) -> np.ndarray:
+        s, wr, wa = 1j * w, 632.0, 447.0
+        mode = (1 + 0.01 * s / wa + (s / wa) ** 2) / (1 + 0.01 * s / wr + (s / wr) ** 2)
+        return 300 / s * mode * np.exp(-3e-4 * s) / (1 + s / 3000)
+
+    omega = np.geomspace(20.0, 3000.0, 12)
+    m = stability_margins(control.frd(L(omega), omega))
+    side = np.abs(L(omega)) > 1.0
+    passed = np.flatnonzero(side[1:] != side[:-1])
+    assert len(m.phase_margins) == len(passed) == 3
+    for margin, k in zip(m.phase_margins, passed, strict=True):
+        assert margin.bracket_rad_s is not None
+        assert margin.bracket_rad_s[0] <= omega[k] < omega[k + 1] <= margin.bracket_rad_s[1]
+        assert f"between {margin.bracket_rad_s[0]:.6g} and" in str(margin)
+    fine = np.geomspace(20.0, 3000.0, 300_001)
+    y = L(fine)
+    for k in np.flatnonzero((np.abs(y[1:]) > 1) != (np.abs(y[:-1]) > 1)):
+        (margin,) = (p for p in m.phase_margins if p.bracket_rad_s[0] <= fine[k] <= p.bracket_rad_s[1])
+        assert _holds(margin, math.degrees(np.angle(-y[k])))

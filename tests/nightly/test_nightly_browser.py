@@ -106,11 +106,25 @@ def test_a_design_page_shows_trends_changes_and_every_night(page) -> None:
     page.locator("#designs").get_by_role("link", name="gear 30:1", exact=True).click()
     assert page.get_by_role("heading", level=1).inner_text() == "gear 30:1"
     assert page.get_by_role("img", name="gain margin: 7.000 dB in the last night").is_visible()
-    assert "1 change(s) of level" in page.locator("svg.chart").first.get_attribute("aria-label")
+    assert "1 change(s) of level" in page.locator("svg.plot").first.get_attribute("aria-label")
     assert page.get_by_text("control.position.gain 8 → 7 1/s").first.is_visible()
     assert page.locator("table.nights tbody tr").count() == 6
     page.get_by_role("link", name="Report of 2026-01-02").click()
     page.wait_for_url("**/report.html")
+
+
+def test_trends_are_live_figures(page) -> None:
+    """The night and its value are read off at the pointer; the figure zooms."""
+    page.locator("#designs").get_by_role("link", name="gear 30:1", exact=True).click()
+    plot = page.locator("svg.plot").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"])
+    words = page.locator(".chart .readout").first.inner_text()
+    assert "2026-01-0" in words
+    assert "8.00 dB" in words
+    page.locator(".chart").first.get_by_role("button", name="Zoom in").click()
+    assert plot.locator(".panel.zoomed").count() == 1
 
 
 def test_a_broken_design_says_why(page) -> None:

@@ -71,3 +71,25 @@ def test_the_program_runs_as_a_module() -> None:
     )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
+
+
+def test_one_requirement_of_many_is_one() -> None:
+    """Number and verb agree: 1 is, 2 are, the only one is."""
+    from reports.sections.requirements import result
+
+    def said(*passed: bool | None) -> str:
+        return result([{"label": f"R{k}", "passed": each} for k, each in enumerate(passed)])
+
+    assert said(True, False, True) == "1 of 3 requirements is not met: R1."
+    assert said(False, False, True) == "2 of 3 requirements are not met: R0; R1."
+    assert said(False) == "The requirement is not met: R0."
+    assert said(True) == "The requirement is met."
+    assert said(True, True) == "All 2 requirements are met."
+    assert said(True, True, None) == "2 of 3 requirements are met. 1 cannot be judged."
+
+
+def test_help_breaks_lines_at_the_width_of_the_terminal() -> None:
+    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
+    from reports.cli.app import flowed
+
+    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."

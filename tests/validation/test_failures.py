@@ -16,6 +16,7 @@ from actuator_lti.design.model import Design, Load
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.failures import Asked, failures
+from analyses.failures.cases import _followed_most_hz, cases_of
 from analyses.failures.rig import Rig
 from nonlinear import commands, simulate
 from reports.cli.main import main
@@ -164,3 +165,29 @@ def load_position(design: Design):  # type: ignore[no-untyped-def]
     from actuator_lti.design.model import PositionLoop
 
     return replace(design.controller, position=PositionLoop(gain=150.0, every=2))
+
+
+def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
+    """A follower that falls from zero frequency on would be asked to creep at 0.1 Hz, which moves nothing."""
+    design = load_design("ilr33-amber")
+    slow = replace(design, controller=replace(design.controller, position=replace(
+        design.controller.position_loop, gain=40.0)))  # fmt: skip
+    frequency, words = _followed_most_hz(slow)
+    response = assemble_loops(slow).reference_to_output
+    size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))  # type: ignore[misc]
+    assert size == pytest.approx(np.sqrt(0.5), rel=0.02)
+    assert "bandwidth" in words
+
+
+def test_an_open_phase_of_three_says_what_one_winding_leaves_out() -> None:
+    result = failures(load_design("ballscrew"), Asked.of(load_design("ballscrew"), watched_s=0.1))
+    assert "two phases left" in result.case("open-phase").words
+    assert "two phases" not in cases_of(load_design("fin"), Asked.of(load_design("fin")))[0][1].words
+
+
+@pytest.mark.parametrize("command", ["stiffness", "failures"])
+def test_an_unstable_drive_is_a_verdict_and_no_bad_input(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "fin", "--set", "control.velocity.gain=5 V*s/rad"]) == 1
+    assert "not stable" in capsys.readouterr().err

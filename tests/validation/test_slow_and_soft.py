@@ -62,6 +62,19 @@ def test_the_border_is_that_of_a_stiff_supply() -> None:
     np.testing.assert_array_equal(found[0].simulated_rad, found[1].simulated_rad)
 
 
+def test_the_border_is_that_of_limits_that_act_at_once() -> None:
+    """I2t acts where the mean square passes the continuous current, after many of its time constants."""
+    design = load_design("ilr33-amber")
+    limits = replace(design.limits, speed_rad_s=1e5, acceleration_rad_s2=1e9, voltage_V=200.0)
+    plain = replace(design, limits=replace(limits, peak_current_A=12.0, continuous_current_A=4.0))
+    guarded = replace(plain, limits=replace(plain.limits, peak_time_s=1.0))
+    assert "overload" in assemble_loops(guarded).limiters
+    found = [check_border(one, assemble_loops(one), count=4) for one in (plain, guarded)]
+    assert all(one is not None and one.passed for one in found)
+    np.testing.assert_array_equal(found[0].predicted_rad, found[1].predicted_rad)
+    np.testing.assert_array_equal(found[0].simulated_rad, found[1].simulated_rad)
+
+
 def arm() -> Design:
     """A motor of 28 mN m/A behind 100:1 lifts 2 kg on 0.25 m, upright: gravity pushes it away."""
     return Design(

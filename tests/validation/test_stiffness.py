@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design
+from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load
 from actuator_lti.errors import InputError
 from actuator_lti.loops.compliance import compliance
@@ -131,3 +131,30 @@ def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg("stiffness", figure["data"], page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
+
+
+def test_the_least_stiffness_is_never_above_the_static_one() -> None:
+    """A shorted winding damps a spring of 40 N m/rad: stiffer at every frequency than at rest."""
+    design = load_design("fin")
+    _, shorted, _ = stiffness_curves(design)
+    assert abs(design.load.moment_slope_Nm_rad) == pytest.approx(shorted.static_Nm_rad, rel=1e-3)
+    assert shorted.least == (shorted.static_Nm_rad, 0.0)
+    for curve in stiffness_curves(drive_e()):
+        assert curve.least[0] <= curve.static_Nm_rad
+
+
+def test_a_slow_tick_ends_the_curve_below_nyquist() -> None:
+    """A free mass under a held moment has its sampled zero at z = -1: an infinite stiffness there is none."""
+    design = with_overrides(load_design("fin"), {"control.period": "3 ms"})
+    design = replace(design, load=Load(inertia_kgm2=1e-3, path="back-drivable"), coupling=None,
+                     friction=replace(design.friction, viscous_Nms_rad=0.0))  # fmt: skip
+    rate = 1.0 / design.controller.period_s
+    for curve in stiffness_curves(design):
+        assert curve.frequency_hz[-1] == pytest.approx(0.45 * rate)
+    open_winding = stiffness_curves(design)[2]
+    w = 2 * np.pi * open_winding.frequency_hz[0]
+    inertia = 1e-3 + design.total_ratio**2 * design.motor_side_inertia_kgm2
+    assert abs(open_winding.stiffness_Nm_rad[0]) == pytest.approx(inertia * w**2, rel=1e-3)
+    made = section(stiffness(design))
+    (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
+    assert "unpowered" in draw_svg("stiffness", figure["data"], page=False)

@@ -1,0 +1,45 @@
+"""Public names of a package that are loaded on first use (PEP 562): one way for all packages."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Collection, Mapping
+from importlib import import_module
+from typing import Any
+
+
+def on_first_use(
+    package: str, names: Mapping[str, str], modules: Collection[str] = ()
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """What a package defines as ``__getattr__`` and ``__dir__``.
+
+    Parameters
+    ----------
+    package : str
+        Its ``__name__``.
+    names : mapping of str to str
+        The module that defines each public name.
+    modules : collection of str
+        Modules of the package that are public themselves.
+
+    Examples
+    --------
+    >>> load, _ = on_first_use("math_of_mine", {"sqrt": "math"})
+    >>> load("sqrt")(9.0)
+    3.0
+    """
+
+    def load(name: str) -> Any:
+        if name in modules:
+            return import_module(f"{package}.{name}")
+        if name not in names:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(names[name]), name)
+        if package in sys.modules:
+            setattr(sys.modules[package], name, value)
+        return value
+
+    def known() -> list[str]:
+        return sorted({*vars(sys.modules[package]), *names, *modules})
+
+    return load, known
