@@ -111,7 +111,9 @@ def check_border(
         left_out = ", ".join([*_bent(design), *_slow(design, loops)])
         if left_out:
             design = _straight(design)
-            loops = assemble_loops(_straight(loops.design))  # of what is foreseen, which need not be it
+        if left_out or loops.design.command != design.command:
+            model = on_the_bench(loops.design)  # need not be the drive that is simulated
+            loops = assemble_loops(_straight(model) if left_out else model)
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])

@@ -132,6 +132,7 @@ class _Work:
     settle: dict[str, int] = field(default_factory=dict)
     held: Loop | None = None
     answer_loops: Any = None
+    at: dict[str, Any] = field(default_factory=dict)
     done: int = 0
     STEPS = 12
 
@@ -257,6 +258,7 @@ class _Work:
         at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
         model = on_the_bench(self.model)
         model = on_its_stand(model) if has_to_stand(self.linear) else model
+        self.at = at
         loops = assemble_loops(replace(model, command=self.model.command), **at)  # type: ignore[arg-type]
         self.held = None
         if "current" in loops.present:
@@ -420,10 +422,12 @@ class _Work:
         if response is None:
             return None
         # where it stands here, it has the slope of friction at rest, not that of its bias motion
-        self.answer_loops = assemble_loops(self._model_steered) if may_stand(design) else self.loops
+        at = {} if may_stand(design) else self.at
+        self.answer_loops = assemble_loops(self._model_steered, **at)
         system = self.answer_loops.reference_to_output
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        settle = settling_ticks_of(system, base, design.name)
+        # feed-forward may cancel a slow mode of the loop, which the start moves all the same
+        settle = max([settling_ticks_of(system, base, design.name), *self.settle.values()])
         top = HIGHEST / (base * design.controller.period_s)
         marks = [x for name in self.figures for x in self._marks(name)]
         marks += [1.0 / (2.0 * pi * design.command.filter_time_s)] if design.command.filter_time_s else []
@@ -451,8 +455,8 @@ class _Work:
             return []
         system, design = self.answer_loops.reference_to_output, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        slowest = settling_ticks_of(system, base, design.name, EVER_TICKS) / SETTLE_TIME_CONSTANTS
-        return [command_entry(design, sweep, system, slowest)]
+        settle = max([settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values()])
+        return [command_entry(design, sweep, system, settle / SETTLE_TIME_CONSTANTS)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""

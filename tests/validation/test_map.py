@@ -102,6 +102,14 @@ def test_encoder_counts_are_no_part_of_the_border(amber: Design) -> None:
     assert border.passed
 
 
+def test_a_filter_of_the_command_moves_no_border(amber: Design) -> None:
+    """The bench commands without a filter, so the prediction must too."""
+    slow = replace(amber, command=replace(amber.command, filter_time_s=5e-3))
+    borders = [check_border(one, assemble_loops(one), count=4) for one in (amber, slow)]
+    assert all(one is not None and one.passed for one in borders)
+    np.testing.assert_array_equal(borders[0].predicted_rad, borders[1].predicted_rad)
+
+
 def test_viscous_friction_by_direction_is_left_out_and_said() -> None:
     emps = load_design("emps")
     design = replace(emps, friction=replace(emps.friction, viscous_reverse_Nms_rad=240.0))

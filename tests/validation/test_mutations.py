@@ -50,6 +50,11 @@ def dry_friction_doubled(design: Design) -> Design:
     return replace(design, friction=replace(friction, dry_torque_Nm=2.0 * friction.dry_torque_Nm))
 
 
+def breakaway_ratio(design: Design) -> Design:
+    friction = design.friction
+    return replace(design, friction=replace(friction, breakaway_ratio=1.01 * friction.breakaway_ratio))
+
+
 def command_filter(design: Design) -> Design:
     return replace(design, command=replace(design.command, filter_time_s=1e-4))
 
@@ -80,6 +85,7 @@ CAUGHT_BY: tuple[tuple[Callable[[Design], Design], set[str]], ...] = (
     (sign_of_back_emf, {"bandwidth", "computing_delay_margin", "resonance"}),
     (integral_time, {"overshoot", "delay_margin"}),
     (dry_friction_doubled, {"steady_current"}),
+    (breakaway_ratio, {"breakaway_torque"}),
     (command_filter, {"response_command"}),
     (feedforward, {"response_command"}),
 )
