@@ -137,7 +137,7 @@ def measure_figures(
     except OutOfTime:  # the sweep stands as it is
         cut = ", ".join([*([cut] if cut else []), "points about each figure"])
     f = fine.frequency_hz
-    own = point_errors(setup, fine, settle_ticks, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
+    own = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
     error = float(own[fine.valid].max())
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
@@ -167,9 +167,10 @@ def measure_figures(
 
 
 BESIDE = 2  # points on either side
+FEW_BITS = 8.0  # a motion beyond so many last bits of the angle spreads its rounding
 
 
-def point_errors(setup: Rig, sweep: Sweep, settle_ticks: float, slowest_ticks: float) -> Floats:
+def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
     """Relative error of each point: the change between its windows, carried on, and rounding."""
     from scipy.ndimage import maximum_filter1d
 
@@ -180,7 +181,7 @@ def point_errors(setup: Rig, sweep: Sweep, settle_ticks: float, slowest_ticks: f
     if own.size > 2 * BESIDE:  # a transient that swings may hide from one point, not from those beside it
         own = maximum_filter1d(np.where(np.isfinite(own), own, 0.0), 2 * BESIDE + 1)
     seen = np.maximum(np.abs(sweep.closed_loop * sweep.amplitude), 1e-300)
-    rounding = angle_rounding(setup, window, settle_ticks) / seen
+    rounding = angle_rounding(setup, window, sweep.ticks, seen) / seen
     return carried_on(own, window, slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
 
 
@@ -192,11 +193,19 @@ def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
     return change / -np.expm1(-np.asarray(window) / slowest)
 
 
-def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], waited_ticks: float) -> Floats:
+def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], ticks: Floats, seen: Floats) -> Floats:
     """What rounding of the growing angle leaves in a fundamental in front of the instrument.
 
     A speed made from angles divides their last bit by the time between them; over the samples of a window
-    that is noise, of which the fundamental keeps ``sqrt(2/N)``.
+    that is noise, of which the fundamental keeps ``sqrt(2/N)``.  A motion of few such bits does not spread
+    its rounding: it may be lost whole, alike in every window.
+
+    Parameters
+    ----------
+    window, ticks : ndarray, shape (K,)
+        Length of a window and of the whole run.
+    seen : ndarray, shape (K,)
+        The fundamental, in the unit of the point.
     """
     control, encoder = setup.design.controller, setup.design.encoder
     velocity = control.velocity
@@ -205,13 +214,14 @@ def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], waited_ticks: floa
     tick_s = control.period_s
     span = encoder.difference_samples * velocity.every * tick_s
     per_angle = 1.0 / span if encoder.speed == "difference" else 2.0 * (encoder.bandwidth_rad_s or 0.0)
-    angle = abs(setup.bias.speed_rad_s) * (waited_ticks + 2.0 * window) * tick_s
+    angle = abs(setup.bias.speed_rad_s) * ticks * tick_s
     speed = np.spacing(np.maximum(angle, 1e-300)) * per_angle
     stage = producer(setup.design, setup.point)
     gain = 1.0 if stage == "position" else velocity.gain
     if stage == "current" and control.current is not None:
         gain *= control.current.gain_V_A
-    return speed * gain * np.sqrt(2.0 * setup.hold_ticks / window)
+    bit = speed * gain
+    return np.where(seen > FEW_BITS * bit, bit * np.sqrt(2.0 * setup.hold_ticks / window), bit)
 
 
 def _decibel(value: Reading, more_db: float = 0.0) -> Reading:

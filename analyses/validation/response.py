@@ -36,6 +36,8 @@ class Sweep:
         time-varying loop are).
     unsteadiness : ndarray, shape (K,)
         Relative change of the fundamental between the last two windows.
+    ticks : ndarray, shape (K,)
+        Length of each run, waiting and windows.
     reason : tuple of str
         Empty where the point is valid; otherwise ``"not steady"``, the limiter that acted, or ``"speed
         reversal"``.
@@ -55,6 +57,7 @@ class Sweep:
     amplitude: Floats
     distortion: Floats
     unsteadiness: Floats
+    ticks: Floats
     reason: tuple[str, ...]
     speed_rad_s: float
 
@@ -82,6 +85,7 @@ ARRAYS = (
     "amplitude",
     "distortion",
     "unsteadiness",
+    "ticks",
 )
 
 

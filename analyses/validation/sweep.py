@@ -282,6 +282,7 @@ def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult)
         amplitude=amplitude,
         distortion=_distortion(setup, result, held),
         unsteadiness=unsteadiness(setup, result),
+        ticks=result.column("ticks"),
         reason=tuple(reasons),
         speed_rad_s=setup.bias.speed_rad_s,
     )
