@@ -68,7 +68,7 @@ def command_sweep(design: Design, frequency_hz: Floats, settle_ticks: int) -> Sw
         amplitude=np.array([point.amplitude for point in points]),
         distortion=np.zeros(len(points)),
         unsteadiness=np.array([point.unsteadiness for point in points]),
-        ticks=settle_ticks + 2.0 * window.ticks,
+        ticks=np.asarray(settle_ticks + 2 * window.ticks, dtype=float),
         reason=tuple(point.reason for point in points),
         speed_rad_s=motion.speed_rad_s,
     )
