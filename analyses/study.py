@@ -190,7 +190,7 @@ def _required(design: Design, extra: list[dict[str, Any]], reader: Reader) -> De
 
     if not extra:
         return design
-    replaced = {item.get("id") for item in extra}
+    replaced = [item.get("id") for item in extra]  # as written: what is no text is refused with its place
     kept = [item for item in design_tree(design).get("requirement", []) if item.get("id") not in replaced]
     return reader.located("requirement", lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
 

@@ -37,6 +37,13 @@ def test_numbers_of_samples_beyond_floats() -> None:
     assert "no number" in line
 
 
+@pytest.mark.parametrize("written_id", ["{}", "[1]", "3", "true"])
+def test_an_id_of_a_requirement_that_is_no_text(written_id: str) -> None:
+    study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
+    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
+    assert "id" in refused("study", (study + limit).encode())
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
