@@ -149,5 +149,6 @@ def _delay_border(wired: Drive, longest_ticks: float) -> float:
     def excess(ticks: float) -> float:
         return _radius(point_blocks(wired.later(ticks * Ts), "u"), 1.0) - 1
 
-    grid = np.arange(0, longest_ticks, 1 / _DELAY_STEPS_A_TICK)
-    return _first_border(excess, list(grid), float("inf")) * Ts
+    step = 1 / _DELAY_STEPS_A_TICK
+    grid = [0.0, *np.arange(step, longest_ticks, step)]
+    return _first_border(excess, grid, float("inf")) * Ts

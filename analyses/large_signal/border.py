@@ -21,7 +21,7 @@ from nonlinear import LIMITERS
 FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)
 TOLERANCE = 0.01
-LONG = 0.1  # periods of the lowest tone
+LONG = 0.1  # periods of the highest tone
 
 
 @dataclass(frozen=True)
@@ -177,8 +177,8 @@ def _slow(design: Design, loops: Loops) -> list[str]:
     limits = design.limits
     if limits.peak_time_s is None or limits.overload_time_s is None:
         return []
-    low, _ = frequency_range_hz(design, loops)
-    return ["overload protection"] if limits.overload_time_s * low > LONG else []
+    _, high = frequency_range_hz(design, loops)
+    return ["overload protection"] if limits.overload_time_s * high > LONG else []
 
 
 def _straight(design: Design) -> Design:

@@ -245,6 +245,8 @@ def test_exact_margins_are_those_of_the_exact_polynomial_where_the_loop_is_time_
     whole = int(exact.delay_s / loop.dt)  # a delay of the hold and of the samples are the same in whole ticks
     assert exactly_stable(loop, 1.0, whole)
     assert not exactly_stable(loop, 1.0, whole + 1)
+    without_search = exact_margins(loops, "u", 0.0)
+    assert (without_search.gain_upper, without_search.delay_s) == (exact.gain_upper, float("inf"))
 
 
 def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:

@@ -75,6 +75,15 @@ def test_the_border_is_that_of_limits_that_act_at_once() -> None:
     np.testing.assert_array_equal(found[0].simulated_rad, found[1].simulated_rad)
 
 
+def test_a_protection_that_only_the_fast_tones_outrun_is_left_out_too() -> None:
+    """I2t of 5 s, tones from 0.01 to 4 Hz: fast against the lowest, slow against the highest."""
+    design = full_drive(2003)
+    found = check_border(design, assemble_loops(design), count=5)
+    assert found is not None
+    assert found.left_out == "overload protection"
+    assert found.passed
+
+
 def arm() -> Design:
     """A motor of 28 mN m/A behind 100:1 lifts 2 kg on 0.25 m, upright: gravity pushes it away."""
     return Design(
