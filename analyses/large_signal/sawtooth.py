@@ -133,21 +133,24 @@ def sawtooth(
         return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
     chosen = tone(wanted, design, least_updates=400)
-    runs = tuple(
-        _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
-        for load in design.validation.loads_Nm
-    )
+    runs = []
+    for load in design.validation.loads_Nm:
+        result = _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
+        if result is None:
+            reason = f"at a load of {load:g} N m the output stands still"
+            return Sawtooth(amplitude, chosen.frequency_hz, rate, 0.0, 0.0, False, (), reason)
+        runs.append(result)
     swift = design.controller.position_loop.gain / chosen.omega_rad_s
     push = min(result.acceleration_rad_s2 for result in figures)
     reversal = math.degrees(2.0 * rate / push * chosen.omega_rad_s)
     electric = design.motor.has_electrical_dynamics
-    return Sawtooth(amplitude, chosen.frequency_hz, rate, swift, reversal, electric, runs)
+    return Sawtooth(amplitude, chosen.frequency_hz, rate, swift, reversal, electric, tuple(runs))
 
 
 def _run(
     design: Design, amplitude: float, frequency_hz: float, period_ticks: int, load_Nm: float, rate: float
-) -> SawtoothRun:
-    """Simulate from the flank of the triangle on, and keep the last periods."""
+) -> SawtoothRun | None:
+    """Simulate from the flank of the triangle on, and keep the last periods; none of a drive that stands."""
     formula = rate_limited(amplitude, 2.0 * math.pi * frequency_hz, rate)
     periods = 2 + PERIODS_SHOWN
     ticks = periods * period_ticks
@@ -169,6 +172,8 @@ def _run(
     phasor = 2j * np.mean(y * turn)
     fundamental = abs(phasor)
     rms = float(np.sqrt(np.mean(y**2)))
+    if rms == 0.0 or fundamental == 0.0:
+        return None
     shown = slice(-PERIODS_SHOWN * period_ticks, None, max(1, PERIODS_SHOWN * period_ticks // POINTS))
     time = run.time_s[shown]
     return SawtoothRun(

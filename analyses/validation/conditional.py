@@ -107,6 +107,8 @@ class Conditional:
     ending : {"diverges", "keeps oscillating", "is held by a limit", ""}
     end_rad : float or None
         Half of the output's span at that end.
+    lasting_rad : float
+        Half of the span of an output that goes on moving after a step although no limit acts; 0 if none does.
     """
 
     margins: dict[str, ExactMargins]
@@ -120,6 +122,7 @@ class Conditional:
     limiter_share: float = 0.0
     ending: Ending | Literal[""] = ""
     end_rad: float | None = None
+    lasting_rad: float = 0.0
 
     @property
     def diverges(self) -> bool:
@@ -200,6 +203,7 @@ def conditional_stability(
         limiter_share=0.0 if end is None else end.share,
         ending="" if end is None else end.words,
         end_rad=None if end is None else end.output_rad,
+        lasting_rad=lasting_rad(design, settle_ticks),
     )
 
 
@@ -299,7 +303,8 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
     """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
 
     A controller without an integral comes to rest beside its target where the load has a slope; a drive that
-    stands because a limit holds it has not settled.
+    stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
+    is kept going by something else (`lasting_rad`).
     """
     result = step_rows(design, sizes_rad, settle_ticks).run()
     errors = []
@@ -309,8 +314,25 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design))
     low, high = result.span("output_angle_rad")
     rests = high - low <= RESTING * sizes_rad
-    held = rests & (np.max([result.window_limit_fraction(name) for name in OWN], axis=0) > HELD)
-    return result.ok & ~held & (near | rests | (errors[0] < LASTING * errors[1]))
+    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
+    held = rests & (limited > HELD)
+    alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
+    return result.ok & ~held & (near | rests | alone | (errors[0] < LASTING * errors[1]))
+
+
+def lasting_rad(design: Design, settle_ticks: int) -> float:
+    """Half of the output's span at the end of a step that goes on moving although no limit acts; 0 if none.
+
+    Dry friction under an integral (hunting), play or gravity keep such a motion up, at small steps as well as
+    at large ones: it is no conditional stability.
+    """
+    full = design.validation.full_deflection_rad
+    sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, 3)
+    result = step_rows(design, sizes, AGAIN[1] * settle_ticks).run()
+    spans = [np.subtract(*result.span("output_angle_rad", last)[::-1]) for last in (0, 1)]
+    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
+    goes_on = result.ok & (limited == 0.0) & (spans[0] > RESTING * sizes) & (spans[0] > LASTING * spans[1])
+    return float(0.5 * np.max(spans[0], where=goes_on, initial=0.0))
 
 
 def _standing(design: Design) -> float:

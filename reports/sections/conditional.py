@@ -24,11 +24,31 @@ def section(conditional: Conditional, axis: str = "rotary") -> Section:
         "commands, although every linear margin is sufficient."
     )
     status: Status = "fail" if conditional.diverges else "pass"
-    findings = [Finding(severity="fail", text=result, where="conditional")] if conditional.diverges else []
+    findings = findings_of(conditional, axis)
     return doc.section(
         "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
         status=status, findings=findings,
     )  # fmt: skip
+
+
+def findings_of(conditional: Conditional, axis: str = "rotary") -> list[Finding]:
+    """What a reader must know of large commands."""
+    scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
+    findings = []
+    if conditional.diverges:
+        findings.append(Finding(severity="fail", text=sentence(conditional, axis), where="conditional"))
+    if conditional.lasting_rad:
+        text = _lasting(conditional, scale, unit)
+        findings.append(Finding(severity="warn", text=text, where="conditional"))
+    return findings
+
+
+def _lasting(conditional: Conditional, scale: float, unit: str) -> str:
+    """Say what goes on after a step without any limit."""
+    return (
+        f"After a step the output goes on moving by ±{conditional.lasting_rad * scale:.3g} {unit} although "
+        "no limit acts: dry friction under an integral, play or gravity keep it up."
+    )
 
 
 def sentence(conditional: Conditional, axis: str = "rotary") -> str:
@@ -40,6 +60,9 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     """Say in some sentences what was found, the result first."""
     full = f"{conditional.full_deflection_rad * scale:.4g} {unit}"
     if not conditional.diverges:
+        if conditional.lasting_rad:
+            words = f"No step from rest up to full deflection ({full}) is made to oscillate by a limit."
+            return [words, _lasting(conditional, scale, unit)]
         return [f"Every step from rest up to full deflection ({full}) settles."]
     threshold = conditional.threshold_rad or 0.0
     beyond = f"beyond {threshold * scale:.4g} {unit}" if threshold else "of any size"

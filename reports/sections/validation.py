@@ -9,7 +9,7 @@ from analyses.validation.result import Validation
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.findings import Finding
-from reports.sections.conditional import sentence
+from reports.sections.conditional import findings_of
 from reports.sections.names import LOOPS, POINTS, QUANTITIES
 
 MORE = {
@@ -113,10 +113,7 @@ def findings(validation: Validation) -> list[Finding]:
 def _large(validation: Validation) -> list[Finding]:
     """A step within full deflection that does not settle."""
     conditional = validation.conditional
-    if conditional is None or not conditional.diverges:
-        return []
-    text = sentence(conditional, validation.design.axis)
-    return [Finding(severity="fail", text=text, where="conditional")]
+    return [] if conditional is None else findings_of(conditional, validation.design.axis)
 
 
 def _unknown(validation: Validation) -> list[Finding]:

@@ -277,7 +277,7 @@ def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
     assert document["verdict"]["failed"] > 0
     rows = {row["loop"]: row for row in rows_of(document, "margins", "Stability margins")}
     assert rows["Velocity loop"]["stable"] == {"text": "unstable", "status": "fail"}
-    assert rows["Velocity loop"]["delay_margin_ms"] == 0.0
+    assert rows["Velocity loop"]["delay_margin_ms"] is None  # an unstable loop has no margins
     assert "unstable" in page(document)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sqrt
+from math import radians, sqrt
 
 import numpy as np
 import pytest
@@ -23,7 +23,13 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
-from analyses.validation.conditional import Conditional, conditional_stability, step_rows
+from analyses.validation.conditional import (
+    Conditional,
+    conditional_stability,
+    lasting_rad,
+    step_rows,
+    step_threshold,
+)
 from analyses.validation.sweep import settling_ticks_of
 from tests.validation.random_drives import full_drive
 
@@ -110,3 +116,15 @@ def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
 def test_standing_beside_the_target_is_no_divergence(seed: int) -> None:
     """A spring against P controllers (361); a step below one count of the output's encoder (372)."""
     assert not look(full_drive(seed))[0].diverges
+
+
+def test_hunting_is_no_conditional_stability() -> None:
+    """A PI position controller against dry friction never rests; no limit does it, and no limit stops it."""
+    design = full_drive(1020)
+    settle = 20_000
+    assert design.controller.position_loop.integral_time_s is not None
+    assert step_threshold(design, settle) == (None, None)
+    smooth = replace(design.friction, dry_torque_Nm=0.0, dry_torque_reverse_Nm=None, breakaway_ratio=1.0)
+    moves, rests = (lasting_rad(one, settle) for one in (design, replace(design, friction=smooth)))
+    assert moves > radians(0.1)
+    assert rests == 0.0
