@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_lti.batch._figures import DC_GAIN, FIRST_PHASE, LISTED, MODULUS, MODULUS_X
+from actuator_lti.batch._figures import DC_GAIN, FINAL, FIRST_PHASE, LISTED, MODULUS, MODULUS_X
 from actuator_lti.rest_mode import without_rest_mode
 
 
@@ -28,7 +28,9 @@ def at_rest(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> No
         if L0 is not None and L0 < 0.0:
             rows[k, FIRST_PHASE + 2 * j + 1] = -1.0 / L0
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = 1.0 / np.abs(1.0 - rows[:, DC_GAIN])
+        # a gain that is nothing beside the peak is not quoted, and its final value is zero: L(0) is zero too
+        closed = np.where(np.isnan(rows[:, DC_GAIN]) & (rows[:, FINAL] == 0.0), 0.0, rows[:, DC_GAIN])
+        distance = 1.0 / np.abs(1.0 - closed)
         nearer = distance < rows[:, MODULUS]
     rows[nearer, MODULUS], rows[nearer, MODULUS_X] = distance[nearer], 0.0
 
