@@ -103,7 +103,8 @@ def check_border(
         Encoder counts are left out together with the friction, and so is the drop of a soft supply, which
         lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is an
         overload protection (I2t) that is slow against the tones: at its border it acts after many of its time
-        constants.
+        constants.  So is the clamp of an integral (anti-windup): the integral may reach the limit before its
+        controller's output does.
     """
     left_out = ""
     if not friction_on:
@@ -114,6 +115,9 @@ def check_border(
         if left_out or loops.design.command != design.command:
             model = on_the_bench(loops.design)  # need not be the drive that is simulated
             loops = assemble_loops(_straight(model) if left_out else model)
+        free = _unclamped(design)
+        if free != design:
+            design, left_out = free, ", ".join(filter(None, [left_out, "clamp of an integral"]))
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])
@@ -179,6 +183,16 @@ def _slow(design: Design, loops: Loops) -> list[str]:
         return []
     _, high = frequency_range_hz(design, loops)
     return ["overload protection"] if limits.overload_time_s * high > LONG else []
+
+
+def _unclamped(design: Design) -> Design:
+    """The drive whose integrals stop only where a limit acts; below it, this law and a clamp are one loop."""
+    velocity, current = design.controller.velocity, design.controller.current
+    if velocity is not None and velocity.anti_windup == "clamped":
+        velocity = replace(velocity, anti_windup="conditional")
+    if current is not None and current.anti_windup == "clamped":
+        current = replace(current, anti_windup="conditional")
+    return replace(design, controller=replace(design.controller, velocity=velocity, current=current))
 
 
 def _straight(design: Design) -> Design:

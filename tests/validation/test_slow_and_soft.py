@@ -84,6 +84,18 @@ def test_a_protection_that_only_the_fast_tones_outrun_is_left_out_too() -> None:
     assert found.passed
 
 
+def test_an_integral_that_is_clamped_before_its_controller_s_output() -> None:
+    """Proportional part against the integral: the clamp acts at 0.9 of the border, and no limit does."""
+    design = full_drive(2026)
+    velocity = design.controller.velocity
+    assert velocity is not None
+    assert velocity.anti_windup == "clamped"
+    found = check_border(design, assemble_loops(design))
+    assert found is not None
+    assert found.passed
+    assert "clamp of an integral" in found.left_out
+
+
 def arm() -> Design:
     """A motor of 28 mN m/A behind 100:1 lifts 2 kg on 0.25 m, upright: gravity pushes it away."""
     return Design(
