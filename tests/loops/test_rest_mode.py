@@ -12,6 +12,7 @@ import pytest
 from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
+from actuator_lti.loops import exact_margins
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.rest_mode import without_rest_mode
@@ -114,3 +115,20 @@ def test_both_sides_and_values_that_are_not_finite() -> None:
     before = (C @ np.linalg.solve(z * np.eye(3) - A, B))[0, 0]
     assert (c @ np.linalg.solve(z * np.eye(2) - a, b))[0, 0] == pytest.approx(before, rel=1e-12)
     assert without_rest_mode(A * np.nan, B, C, 1.0)[3].all()
+
+
+@pytest.mark.parametrize("slope", SLOPES)
+def test_the_mode_at_rest_is_no_border_of_stability(slope: float) -> None:
+    """Eigenvalues at 1 + 1e-16 whatever the gain; certified margins of the loop say where the border is."""
+    design = sprung("ilr33-amber", slope)
+    design = replace(design, controller=replace(design.controller, position=None))
+    loops = assemble_loops(design)
+    exact = exact_margins(loops, "u")
+    certified = stability_margins(loops.break_points["u"].open_loop, certify=True)
+    assert exact.stable is certified.stable
+    if not exact.stable:
+        return
+    above = [one.ratio for one in certified.gain_margins if one.ratio > 1.0]
+    below = [one.ratio for one in certified.gain_margins if 1e-4 < one.ratio < 1.0]  # so far it looks
+    assert exact.gain_upper == pytest.approx(min(above, default=np.inf), rel=1e-9)
+    assert exact.gain_lower == pytest.approx(max(below, default=0.0), rel=1e-9)
