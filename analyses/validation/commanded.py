@@ -23,6 +23,7 @@ from nonlinear import Rows, Trajectory
 Floats = npt.NDArray[np.float64]
 FAINT = 1e-3  # of full deflection, speed, current or voltage
 STEADY = 1e-5  # relative change of the fundamental from one window to the next
+FINE = 1e-6  # beyond it a point is waited for once more: a swinging transient shows little of itself
 TRIES = 5
 SMALL_ANGLE_RAD = 1e-3  # of the output, with gravity
 SIGNAL = {"position": "output_angle_rad", "velocity": "motor_speed_rad_s", "current": "current_A"}
@@ -88,14 +89,15 @@ def _point(
     design: Design, motion: BiasMotion, ticks: int, hertz: float, base: int, settle_ticks: int
 ) -> _Point:
     """Run one frequency, again with less amplitude or more time where it asks for it."""
-    amplitude = FAINT * _full(design)
+    amplitude, waited = FAINT * _full(design), False
     for attempt in range(TRIES):
         run = _run(design, motion, amplitude, hertz, settle_ticks + 2 * ticks, base)
         point = _read(design, motion, run, amplitude, hertz, ticks // base)
-        if not point.reason or attempt == TRIES - 1:
+        hiding = not point.reason and not waited and point.unsteadiness > FINE
+        if (not point.reason and not hiding) or attempt == TRIES - 1:
             break
-        if point.reason == "not steady":
-            settle_ticks *= 3
+        if hiding or point.reason == "not steady":
+            settle_ticks, waited = 3 * settle_ticks, True
         else:
             amplitude *= 0.03
     return point

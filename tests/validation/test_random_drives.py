@@ -13,8 +13,9 @@ from tests.validation.random_drives import TRIAL, full_drive, random_drive
 
 RIGID = (1, 2, 3, 16)
 WIDER = (501, 504, 508)
-# feed-forward, filters, AC motors, couplings, supplies, torque drives, a mode that feed-forward hides
-FULL = (16, 24, 36, 47, 200, 201, 704)
+# feed-forward, filters, AC motors, couplings, supplies, torque drives
+# 704: a mode that feed-forward hides; 1049: one that it kicks
+FULL = (16, 24, 36, 47, 200, 201, 704, 1049)
 
 
 @pytest.mark.parametrize(("seed", "wider"), [*((s, False) for s in RIGID), *((s, True) for s in WIDER)])
