@@ -137,13 +137,17 @@ class Engine:
         if not self.distributed:
             _threads(partial(call, held), todo, sink, self.threads or os.cpu_count() or 1)
             return
+        finished = False
         try:
             with self._client() as client:
                 _submit(client, call, held, todo, sink)
+                finished = True
         except (OSError, TimeoutError) as error:
             if isinstance(error, InputError):
                 raise
-            raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {error}") from error
+            if not finished:  # a cluster too slow to close takes no result back
+                said = str(error) or "no answer in time"
+                raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {said}") from error
 
     @contextmanager
     def _client(self) -> Iterator[Client]:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -62,6 +63,31 @@ def test_a_scheduler_that_is_not_there_is_a_clear_failure(monkeypatch):
     monkeypatch.setattr("analyses.engine.CONNECT_S", 0.5)
     with pytest.raises(NumericalError, match="127"):
         Engine(scheduler="tcp://127.0.0.1:9").run(None, [(0, 1)], lambda c, a: None)
+
+
+def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
+    """Time-outs while the workers stop, after the last result: the study is whole all the same."""
+
+    @contextmanager
+    def slow_to_close(self):
+        yield None
+        raise TimeoutError
+
+    def in_place(client, call, held, todo, sink):
+        for part in todo:
+            sink(part, call(held, part))
+
+    monkeypatch.setattr(Engine, "_client", slow_to_close)
+    monkeypatch.setattr("analyses.engine._submit", in_place)
+    sums = {}
+    Engine(workers=1).map(sum, [(1, 2), (3, 4)], sums.__setitem__)
+    assert sums == {(1, 2): 3, (3, 4): 7}
+
+    def lost(item, result):
+        raise TimeoutError
+
+    with pytest.raises(NumericalError, match="no answer in time"):
+        Engine(workers=1).map(sum, [(1, 2)], lost)
 
 
 def test_impossible_engines_are_refused():
