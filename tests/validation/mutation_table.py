@@ -15,19 +15,9 @@ from dataclasses import replace
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design, Limits
 from analyses.large_signal.border import check_border
-from analyses.validation import Settings, validate
+from analyses.validation import validate
+from tests.validation.small_settings import SMALL
 
-FEW = Settings(
-    frequencies=12,
-    point_frequencies=0,
-    multisine=False,
-    amplitude_margins=False,
-    rest_frequencies=4,
-    large_signals=False,
-    friction_effects=False,
-    specification=False,
-    seconds=60.0,
-)
 SIZES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1e-2)
 LIMIT_SIZES = (1e-3, 3e-3, 0.01, 0.015, 0.02, 0.05)
 Change = Callable[[Design, float], Design]
@@ -109,7 +99,7 @@ def main() -> None:
     design = load_design("ilr33-amber")
     for name, change in CHANGES.items():
         for size in SIZES:
-            found = validate(design, FEW, model=change(design, size))
+            found = validate(design, SMALL, model=change(design, size))
             if found.failed:
                 over = sorted(found.failed, key=lambda row: -abs(row.difference or 0.0) / row.tolerance)
                 first = ", ".join(dict.fromkeys(f"{row.loop} {row.quantity}" for row in over[:3]))
