@@ -31,6 +31,7 @@ from nonlinear import LIMITERS, Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
+    from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
@@ -314,10 +315,15 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design))
     low, high = result.span("output_angle_rad")
     rests = high - low <= RESTING * sizes_rad
-    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
+    limited = _limited(result)
     held = rests & (limited > HELD)
     alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
     return result.ok & ~held & (near | rests | alone | (errors[0] < LASTING * errors[1]))
+
+
+def _limited(result: BatchResult) -> Floats:
+    """Part of the last window in which a limit of the drive acts: the one that acts longest."""
+    return np.asarray(np.max([result.window_limit_fraction(name) for name in OWN], axis=0))
 
 
 def lasting_rad(design: Design, settle_ticks: int) -> float:
@@ -330,7 +336,7 @@ def lasting_rad(design: Design, settle_ticks: int) -> float:
     sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, 3)
     result = step_rows(design, sizes, AGAIN[1] * settle_ticks).run()
     spans = [np.subtract(*result.span("output_angle_rad", last)[::-1]) for last in (0, 1)]
-    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
+    limited = _limited(result)
     goes_on = result.ok & (limited == 0.0) & (spans[0] > RESTING * sizes) & (spans[0] > LASTING * spans[1])
     return float(0.5 * np.max(spans[0], where=goes_on, initial=0.0))
 
