@@ -180,7 +180,7 @@ def _continuous(wired: Drive, stage: str, delays: frozenset[str], omega: np.ndar
 def _sampled(wired: Drive, stage: str, omega: np.ndarray) -> np.ndarray:
     from actuator_lti.loops.sampled import stage_loop
 
-    loop = stage_loop(wired, stage).open_loop
+    loop = stage_loop(wired, stage).plain_open
     return np.asarray(loop(np.exp(1j * omega * loop.dt)))
 
 

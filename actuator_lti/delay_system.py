@@ -22,6 +22,7 @@ from control.iosys import InputOutputSystem
 
 from actuator_lti.control_face import ControlFace
 from actuator_lti.errors import InputError
+from actuator_lti.plain_delays import PlainDelaySystem, descriptor, in_parallel, in_series, response
 
 
 def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:
@@ -93,6 +94,21 @@ class DelaySystem(ControlFace):
             _matrix(D21, k, m, "D21"),
             _matrix(D22, k, k, "D22"),
         )
+
+    @classmethod
+    def of(cls, plain: PlainDelaySystem, **names: Any) -> DelaySystem:
+        """The python-control system of matrices and names."""
+        if plain.states:
+            names["states"] = list(plain.states)
+        inner = (plain.A, plain.B1, plain.B2, plain.C1, plain.C2)
+        return cls(*inner, plain.D11, plain.D12, plain.D21, plain.D22, plain.delays_s, **names)
+
+    @property
+    def plain(self) -> PlainDelaySystem:
+        """The same as matrices."""
+        parts = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
+        labels = tuple(self.state_labels) if self.nstates else ()
+        return PlainDelaySystem(**{part: getattr(self, part) for part in parts}, states=labels)
 
     @classmethod
     def from_system(cls, system: Any, **names: Any) -> DelaySystem:
@@ -197,43 +213,21 @@ class DelaySystem(ControlFace):
             **({"states": states} if states else {}),
         )
 
-    def _descriptor(self, s: np.ndarray) -> np.ndarray:
-        """[[sI - A, -B2 E], [-C2, I - D22 E]] with E = diag(exp(-s delays)), stacked over s."""
-        n, k = self.A.shape[0], len(self.delays_s)
-        E = np.exp(-s[:, None] * self.delays_s)
-        M = np.empty((len(s), n + k, n + k), dtype=complex)
-        M[:, :n, :n] = s[:, None, None] * np.eye(n) - self.A
-        M[:, :n, n:] = -self.B2 * E[:, None, :]
-        M[:, n:, :n] = -self.C2
-        M[:, n:, n:] = np.eye(k) - self.D22 * E[:, None, :]
-        return M
-
     def characteristic(self, s: Any) -> np.ndarray:
         """Characteristic quasi-polynomial det [[sI - A, -B2 E], [-C2, I - D22 E]] at complex s.
 
         Its zeros are the poles of the system. Shape of ``s``.
         """
         points = np.asarray(s, dtype=complex)
-        return np.linalg.det(self._descriptor(points.reshape(-1))).reshape(points.shape)
+        return np.linalg.det(descriptor(self, points.reshape(-1))).reshape(points.shape)
 
     def __call__(self, x: Any, squeeze: bool | None = None, warn_infinite: bool = True) -> Any:
         """Frequency response at complex s, exactly, as `control.StateSpace.__call__` shapes it."""
         points = np.atleast_1d(np.asarray(x, dtype=complex))
         if points.ndim != 1:
             raise InputError("a system is evaluated at a number or a 1D array of complex frequencies")
-        E = np.exp(-points[:, None] * self.delays_s)
-        M = self._descriptor(points)
-        right = np.broadcast_to(np.vstack([self.B1, self.D21]), (len(points), M.shape[1], self.ninputs))
-        try:
-            inner = np.linalg.solve(M, right)
-            singular = np.zeros(len(points), dtype=bool)
-        except np.linalg.LinAlgError:
-            singular = np.array([np.linalg.det(each) == 0 for each in M])
-            inner = np.linalg.solve(np.where(singular[:, None, None], np.eye(M.shape[1]), M), right)
-        n = self.A.shape[0]
-        y = self.D11 + self.C1 @ inner[:, :n] + (self.D12 * E[:, None, :]) @ inner[:, n:]
-        y[singular] = complex(np.inf, np.nan)
-        return control.lti._process_frequency_response(self, x, np.moveaxis(y, 0, -1), squeeze=squeeze)
+        y = response(self, points)
+        return control.lti._process_frequency_response(self, x, y, squeeze=squeeze)
 
     def dcgain(self, warn_infinite: bool = False) -> Any:
         """Gain at s = 0 (delays play no part there)."""
@@ -256,13 +250,7 @@ class DelaySystem(ControlFace):
 
     def __add__(self, other: Any) -> DelaySystem:
         """Parallel connection."""
-        a, b = self, DelaySystem.from_system(other)
-        if (a.ninputs, a.noutputs) != (b.ninputs, b.noutputs):
-            raise InputError("parallel connection: both systems need the same numbers of signals")
-        source = np.vstack([np.eye(a.ninputs)] * 2)
-        return _rearrange(
-            a, b, source, np.hstack([np.eye(a.noutputs)] * 2), np.zeros((2 * a.ninputs, 2 * a.noutputs))
-        )
+        return DelaySystem.of(in_parallel(self.plain, DelaySystem.from_system(other).plain))
 
     __radd__ = __add__
 
@@ -274,10 +262,10 @@ class DelaySystem(ControlFace):
 
     def __mul__(self, other: Any) -> DelaySystem:
         """Series connection: ``other`` first, then this system."""
-        return _series(DelaySystem.from_system(other), self)
+        return DelaySystem.of(in_series(DelaySystem.from_system(other).plain, self.plain))
 
     def __rmul__(self, other: Any) -> DelaySystem:
-        return _series(self, DelaySystem.from_system(other))
+        return DelaySystem.of(in_series(self.plain, DelaySystem.from_system(other).plain))
 
     def __truediv__(self, other: Any) -> DelaySystem:
         if not isinstance(other, int | float | np.number):
@@ -292,15 +280,7 @@ class DelaySystem(ControlFace):
         InputError
             If the delay-free path round the loop is algebraic and without a solution.
         """
-        a, b = self, DelaySystem.from_system(other)
-        m, p = a.ninputs, a.noutputs
-        if (b.ninputs, b.noutputs) != (p, m):
-            raise InputError(f"feedback: {p} outputs into {b.ninputs} inputs, {b.noutputs} back into {m}")
-        source = np.vstack([np.eye(m), np.zeros((b.ninputs, m))])
-        sink = np.hstack([np.eye(p), np.zeros((p, b.noutputs))])
-        loop = np.zeros((m + b.ninputs, p + b.noutputs))
-        loop[:m, p:], loop[m:, :p] = sign * np.eye(m, b.noutputs), np.eye(b.ninputs, p)
-        return _rearrange(a, b, source, sink, loop)
+        return DelaySystem.of(self.plain.feedback(DelaySystem.from_system(other).plain, sign))
 
     def __repr__(self) -> str:
         n = self.A.shape[0]
@@ -311,50 +291,3 @@ class DelaySystem(ControlFace):
 
     def _repr_html_(self) -> str:
         return repr(self).replace("&", "&amp;").replace("<", "&lt;")
-
-
-def _block(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    out = np.zeros((a.shape[0] + b.shape[0], a.shape[1] + b.shape[1]))
-    out[: a.shape[0], : a.shape[1]], out[a.shape[0] :, a.shape[1] :] = a, b
-    return out
-
-
-def _series(first: DelaySystem, second: DelaySystem) -> DelaySystem:
-    if first.noutputs != second.ninputs:
-        raise InputError(f"series: {first.noutputs} outputs into {second.ninputs} inputs")
-    m, q = first.ninputs, first.noutputs
-    source = np.vstack([np.eye(m), np.zeros((second.ninputs, m))])
-    sink = np.hstack([np.zeros((second.noutputs, q)), np.eye(second.noutputs)])
-    loop = np.zeros((m + second.ninputs, q + second.noutputs))
-    loop[m:, :q] = np.eye(q)
-    return _rearrange(first, second, source, sink, loop)
-
-
-def _rearrange(
-    a: DelaySystem, b: DelaySystem, source: np.ndarray, sink: np.ndarray, loop: np.ndarray
-) -> DelaySystem:
-    """Both systems side by side, their inputs ``e = source u + loop y``, the output ``sink y``."""
-    A, B1, B2 = _block(a.A, b.A), _block(a.B1, b.B1), _block(a.B2, b.B2)
-    C1, C2 = _block(a.C1, b.C1), _block(a.C2, b.C2)
-    D11, D12 = _block(a.D11, b.D11), _block(a.D12, b.D12)
-    D21, D22 = _block(a.D21, b.D21), _block(a.D22, b.D22)
-    labels = [*(a.state_labels if a.nstates else ()), *(b.state_labels if b.nstates else ())]
-    algebra = np.eye(D11.shape[0]) - D11 @ loop
-    if np.linalg.cond(algebra) > 1e12:
-        raise InputError("feedback: an algebraic loop without a solution (1 + L(infinity) = 0)")
-    # y = (I - D11 loop)^-1 (C1 x + D11 source u + D12 z)
-    Cy, Dy, Zy = (np.linalg.solve(algebra, M) for M in (C1, D11 @ source, D12))
-    Ce, De, Ze = loop @ Cy, source + loop @ Dy, loop @ Zy
-    return DelaySystem(
-        A + B1 @ Ce,
-        B1 @ De,
-        B2 + B1 @ Ze,
-        sink @ Cy,
-        C2 + D21 @ Ce,
-        sink @ Dy,
-        sink @ Zy,
-        D21 @ De,
-        D22 + D21 @ Ze,
-        np.concatenate([a.delays_s, b.delays_s]),
-        **({"states": labels} if labels and len(set(labels)) == len(labels) else {}),
-    )

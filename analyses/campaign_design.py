@@ -169,7 +169,7 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
             loop = getattr(loops, name)
             if loop is None:
                 continue
-            margins = stability_margins(loop.open_loop)
+            margins = stability_margins(loop.plain_open)
             for what, unit, value in (
                 ("gain margin", "dB", margins.gain_margin_db),
                 ("phase margin", "deg", margins.phase_margin_deg),

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.drive.wiring import ERRORS, MEASURED, Drive
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import whole_path
+from actuator_lti.plain_delays import PlainDelaySystem, static
 from actuator_lti.rest_mode import without_rest_mode
 
 RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")}
 """An input and its derivatives, as the ideal form has them."""
 
 
-def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **names: Any) -> DelaySystem:
+def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0) -> PlainDelaySystem:
     """SISO system from one input of a flow to one of its signals, of the states between both."""
     n, k = len(flow.states), len(flow.delays_s)
     row = scale * flow.signals[signal]
@@ -30,17 +31,16 @@ def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0, **nam
     used = seen(depends, row[: n + k] != 0) & seen(depends.T, np.any(every[:, driven] != 0, axis=1))
     x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
     dx, v, y = every[x], every[z], row[None, :]
-    if len(x):
-        names["states"] = [flow.states[i].replace(".", "_") for i in x]
-    return DelaySystem(
-        *(dx[:, x], dx[:, u], dx[:, z]),
-        *(y[:, x], v[:, x], y[:, u], y[:, z], v[:, u], v[:, z]),
-        flow.delays_s[z - n],
-        **names,
-    )
+    return PlainDelaySystem(
+        A=dx[:, x], B1=dx[:, u], B2=dx[:, z],
+        C1=y[:, x], C2=v[:, x],
+        D11=y[:, u], D12=y[:, z], D21=v[:, u], D22=v[:, z],
+        delays_s=np.asarray(flow.delays_s, dtype=float)[z - n],
+        states=tuple(flow.states[i].replace(".", "_") for i in x),
+    )  # fmt: skip
 
 
-def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[DelaySystem]:
+def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[PlainDelaySystem]:
     """The system from an input, and from its derivatives where the flow has them (ideal form)."""
     result = [delay_system(flow, name, signal, scale) for name in RATES.get(source, (source,))]
     while len(result) > 1 and not (np.any(result[-1].B1) or np.any(result[-1].D11)):
@@ -48,7 +48,7 @@ def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[De
     return result
 
 
-def joined(parts: list[DelaySystem]) -> DelaySystem:
+def joined(parts: list[PlainDelaySystem]) -> PlainDelaySystem:
     """``sum_j s^j G_j`` as one proper system: s (s I - A)^-1 B is B + (s I - A)^-1 A B.
 
     Raises
@@ -69,38 +69,34 @@ def joined(parts: list[DelaySystem]) -> DelaySystem:
         B, D[j] = B + power, D[j] + part.D11
     if any(np.any(np.abs(more) > 1e-12) for more in D[1:]):
         raise InputError("form = 'ideal': a derivative without a filter is no proper system; give it a time")
-    return DelaySystem(A, B, [], C, [], D[0], [], [], [], [], states=first.state_labels)
+    return replace(static(D[0]), A=A, B1=B, B2=first.B2, C1=C, C2=first.C2, states=first.states)
 
 
-def finished(system: DelaySystem, **names: Any) -> Any:
-    """The system under its names; `control.StateSpace` where it has no delay.
+def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> Any:
+    """The system under its names; a `PlainSystem` where it has no delay.
 
     That one without a mode at zero frequency that it does not show, see `rest_mode`.
     """
-    if system.delay_free:
-        plain = system.to_state_space()
-        A, B, C, kept = without_rest_mode(plain.A, plain.B, plain.C, 0.0)
-        if not kept.all():
-            labels = [name for name, there in zip(system.state_labels, kept, strict=True) if there]
-            system = DelaySystem(A, B, [], C, [], plain.D, [], [], [], [], states=labels)
-    system.update_names(**names)
-    return system.to_state_space() if system.delay_free else system
+    system = system.named(name, source, signal)
+    if not system.delay_free:
+        return system
+    A, B, C, kept = without_rest_mode(system.A, system.B1, system.C1, 0.0)
+    if not kept.all():
+        labels = tuple(label for label, there in zip(system.states, kept, strict=False) if there)
+        system = replace(system, A=A, B1=B, B2=B[:, :0], C1=C, C2=C[:0], states=labels)
+    return system.to_state_space()
 
 
-def _loop(wired: Drive, loop: DelaySystem, name: str, point: str, signals: tuple[str, str]) -> Loop:
+def _loop(wired: Drive, loop: PlainDelaySystem, name: str, point: str, signals: tuple[str, str]) -> Loop:
     error, measured = signals
     label, unit = name.replace(" ", "_"), wired.unit(error)
-    one = DelaySystem.from_system(1.0)
+    one = static(np.eye(1))
     return Loop(
         name=name,
         break_point=point,
-        plain_open=finished(loop, name=f"{label}_open_loop", inputs=[error], outputs=[measured]),
-        plain_closed=finished(
-            loop.feedback(), name=f"{label}_closed_loop", inputs=["reference"], outputs=[measured]
-        ),
-        plain_sensitivity=finished(
-            one.feedback(loop), name=f"{label}_sensitivity", inputs=["reference"], outputs=[error]
-        ),
+        plain_open=finished(loop, f"{label}_open_loop", error, measured),
+        plain_closed=finished(loop.feedback(), f"{label}_closed_loop", "reference", measured),
+        plain_sensitivity=finished(one.feedback(loop), f"{label}_sensitivity", "reference", error),
         period_s=None,
         unit_in=unit,
         unit_out=unit,
@@ -109,7 +105,7 @@ def _loop(wired: Drive, loop: DelaySystem, name: str, point: str, signals: tuple
 
 def stage_system(
     wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()
-) -> DelaySystem:
+) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent."""
     flow = FlowProgram(wired, stage, ERRORS[stage], opened, delays).flow()
     measured = "output" if stage == "position" else MEASURED[stage]
@@ -137,10 +133,10 @@ def reference_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     """Command to what the outermost stage moves, its feed-forward included."""
     source, signal, _, label = whole_path(wired)
     total = joined(systems(_whole(wired, delays), "ref", signal))
-    return finished(total, name="reference_to_output", inputs=[source], outputs=[label])
+    return finished(total, "reference_to_output", source, label)
 
 
 def moment_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     """Moment on the output shaft to the output angle, all loops closed."""
     system = delay_system(_whole(wired, delays), "moment", "output_angle")
-    return finished(system, name="moment_to_output", inputs=["moment"], outputs=["output_angle"])
+    return finished(system, "moment_to_output", "moment", "output_angle")

@@ -34,7 +34,7 @@ class Loop:
     break_point : str
         Where it is cut: ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``. Cutting a loop at its own error
         gives the same L, as all is in series.
-    plain_open, plain_closed, plain_sensitivity : PlainSystem, or python-control systems
+    plain_open, plain_closed, plain_sensitivity : PlainSystem or PlainDelaySystem
         What `open_loop`, `closed_loop` and `sensitivity` are made of when they are first asked for; all
         figures take these as well.
     period_s : float or None
@@ -124,7 +124,7 @@ class Loops:
     limiters : mapping of str to LimiterPath
         By the names of `actuator_lti.drive.signals.LIMITERS`, as far as they exist: from the command to what
         each limiter sees.
-    plain_response : PlainSystem, python-control system or None
+    plain_response : PlainSystem, PlainDelaySystem or None
         What `reference_to_output` is made of when it is first asked for.
     moment_system : callable or None
         Makes `moment_to_output`.

@@ -145,7 +145,7 @@ def _open_words(design: Design) -> str:
 
 def _followed_most_hz(design: Design) -> tuple[float, str]:
     """Frequency from 0.1 Hz up at which the linear output is largest; without a resonance its bandwidth."""
-    response = assemble_loops(design).reference_to_output
+    response = assemble_loops(design).plain_response
     assert response is not None
     period = design.controller.period_s * design.controller.position_loop.every
     f = np.geomspace(0.1, 0.5 / period, 400)

@@ -52,7 +52,7 @@ def frequency_range_hz(design: Design, loops: Loops) -> tuple[float, float]:
     T = design.controller.position_loop.every * design.controller.period_s
     nyquist = 0.5 / T
     grid = np.geomspace(nyquist * 1e-5, nyquist * 0.999, 400)
-    magnitude = np.abs(response_at(loops.reference_to_output, 2.0 * np.pi * grid))
+    magnitude = np.abs(response_at(loops.plain_response, 2.0 * np.pi * grid))
     below = np.flatnonzero(magnitude < math.sqrt(0.5))
     bandwidth = float(grid[below[0]]) if below.size else nyquist
     high = min(bandwidth * FACTOR_ABOVE, HIGHEST * nyquist)

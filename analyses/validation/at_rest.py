@@ -131,7 +131,7 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     point = "sliding" if speed_rad_s is None else "describing-function"
     at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
     wired = wire(design, at)
-    return linear_response(reference_to_output(wired).to_control(), frequency_hz)
+    return linear_response(reference_to_output(wired), frequency_hz)
 
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:

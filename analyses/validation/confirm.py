@@ -185,7 +185,7 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     delay = margins.delay_margin
     if delay is not None and delay.samples is not None and isfinite(delay.samples):
         hertz = delay.frequency_rad_s / (2.0 * pi)
-        best = instrument_delay(loop.open_loop, delay.samples, delay.frequency_rad_s * loop.period_s)
+        best = instrument_delay(loop.plain_open, delay.samples, delay.frequency_rad_s * loop.period_s)
         search = Search(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
         result.append(Question(search, "delay", delay.samples, hertz, best))
     return result
@@ -233,7 +233,7 @@ def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
         omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
-        return np.abs(1.0 + gain * response_at(loop.open_loop, omega) * np.exp(-1j * omega * delay_s))
+        return np.abs(1.0 + gain * response_at(loop.plain_open, omega) * np.exp(-1j * omega * delay_s))
 
     grid = np.log(np.geomspace(SLOWEST, 0.999, GRID) * 0.5 / loop.period_s)
     values = distance(grid)
@@ -276,7 +276,7 @@ def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
     On its way there a loop may swing more slowly than it ever does at its nominal gain, and a window shorter
     than the swing takes a part of it for growth.
     """
-    system, slowest = loop.open_loop, 0.0
+    system, slowest = loop.plain_open, 0.0
     A, B, C, D = (np.asarray(x) for x in (system.A, system.B, system.C, system.D))
     for gain in np.geomspace(1.0, ratio, WAY)[1:-1]:
         sizes = np.abs(np.linalg.eigvals(A - gain / (1.0 + gain * D[0, 0]) * B @ C))

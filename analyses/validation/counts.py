@@ -222,12 +222,12 @@ def _linearity(
     from analyses.limit_cycles.foreseen import without_nonlinearities
     from analyses.validation.response import linear_response
 
-    band = loop_figures(loops.present["position"], loops.reference_to_output).bandwidth
+    band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
         return np.full(TRIED.size, inf)
     base = design.controller.position_loop.every
     window = coherent([band.minus3db_hz], design.controller.period_s, base, least_cycles=8)
-    gain = abs(complex(linear_response(loops.reference_to_output, window.frequency_hz)[0]))
+    gain = abs(complex(linear_response(loops.plain_response, window.frequency_hz)[0]))
     wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
     amplitude = wanted * TRIED
     seen = []

@@ -88,6 +88,9 @@ ARRAYS = (
     "ticks",
 )
 
+PLAIN = {"open_loop": "plain_open", "closed_loop": "plain_closed", "sensitivity": "plain_sensitivity"}
+"""What a loop holds of each measured response."""
+
 
 @dataclass(frozen=True)
 class SweepErrors:
@@ -114,12 +117,12 @@ def sweep_errors(sweep: Any, loop: Any, response: str = "open_loop") -> SweepErr
     ----------
     response : {"open_loop", "closed_loop", "sensitivity"}
     """
-    expected = linear_response(getattr(loop, response), sweep.frequency_hz)
+    expected = linear_response(getattr(loop, PLAIN[response]), sweep.frequency_hz)
     ratio = getattr(sweep, response) / expected
     return SweepErrors(20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio)))
 
 
 def linear_response(system: Any, frequency_hz: npt.ArrayLike) -> Complexes:
-    """Response of a sampled python-control system at frequencies in Hz."""
+    """Response of a sampled system at frequencies in Hz."""
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     return response_at(system, omega)

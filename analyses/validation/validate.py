@@ -268,7 +268,7 @@ class _Work:
             self.figures[name] = loop_figures(loop)
             if self.figures[name].stable:
                 held = rig(self.linear, name).hold_ticks
-                self.settle[name] = settling_ticks_of(loop.closed_loop, held, self.design.name)
+                self.settle[name] = settling_ticks_of(loop.plain_closed, held, self.design.name)
         position = self.design.controller.position
         if position is not None and position.feedforward != 0.0:
             self.notes.append("the loops are tested without the feed-forward, which is no part of them")
@@ -294,8 +294,8 @@ class _Work:
         figures = self.figures[name]
         setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
         sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
-        whole = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
-        ever = settling_ticks_of(loop.closed_loop, setup.hold_ticks, self.design.name, EVER_TICKS)
+        whole = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
+        ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, EVER_TICKS)
         measured = measure_figures(setup, sweep, settle, whole, ever / SETTLE_TIME_CONSTANTS)
         fine = measured.sweep
         if measured.cut:
@@ -311,8 +311,8 @@ class _Work:
             name=name,
             figures=figures,
             measured=measured,
-            open_loop=linear_response(loop.open_loop, fine.frequency_hz),
-            closed_loop=linear_response(loop.closed_loop, fine.frequency_hz),
+            open_loop=linear_response(loop.plain_open, fine.frequency_hz),
+            closed_loop=linear_response(loop.plain_closed, fine.frequency_hz),
             open_errors=sweep_errors(fine, loop),
             closed_errors=sweep_errors(fine, loop, "closed_loop"),
             tones=tones,
@@ -406,7 +406,7 @@ class _Work:
     @cached_property
     def _commanded(self) -> LoopFigures:
         """Figures of the response to the command, with feed-forward and filters."""
-        return loop_figures(self.loops.present["position"], self.loops.reference_to_output)
+        return loop_figures(self.loops.present["position"], self.loops.plain_response)
 
     @cached_property
     def _steered(self) -> Design:
@@ -418,13 +418,13 @@ class _Work:
         """The response to the command at frequencies about its own figures."""
         from actuator_lti.loops import assemble_loops
 
-        design, response = self._steered, self.loops.reference_to_output
+        design, response = self._steered, self.loops.plain_response
         if response is None:
             return None
         # where it stands here, it has the slope of friction at rest, not that of its bias motion
         at = {} if may_stand(design) else self.at
         self.answer_loops = assemble_loops(self._model_steered, **at)
-        system = self.answer_loops.reference_to_output
+        system = self.answer_loops.plain_response
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
         # feed-forward may cancel a slow mode of the loop, which the start moves all the same
         settle = max([settling_ticks_of(system, base, design.name), *self.settle.values()])
@@ -453,7 +453,7 @@ class _Work:
         """The worst point of the response to the command."""
         if sweep is None:
             return []
-        system, design = self.answer_loops.reference_to_output, self.design
+        system, design = self.answer_loops.plain_response, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
         settle = max([settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values()])
         return [command_entry(design, sweep, system, settle / SETTLE_TIME_CONSTANTS)]
@@ -478,7 +478,7 @@ class _Work:
 
     def _conditional(self) -> Conditional:
         slow = settling_ticks_of(
-            self.loops.present["position"].closed_loop,
+            self.loops.present["position"].plain_closed,
             rig(self.linear, "position").hold_ticks,
             self.design.name,
             LONGEST_STEP_TICKS,

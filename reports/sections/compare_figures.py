@@ -54,7 +54,7 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         if result is None or (closed and not result.stable):
             continue
         grid = frequency_grid(result, 140)
-        made = curve(result.response if closed else result.loop.open_loop, grid)
+        made = curve(result.plain_response if closed else result.loop.plain_open, grid)
         series.append({
             "label": one.variant.name[:60], "frequency_hz": abscissa(made.frequency_hz),
             "magnitude_db": rounded(made.magnitude_db - (_dc_db(result) if closed else 0.0)),

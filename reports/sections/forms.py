@@ -84,7 +84,7 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
         series = [
-            (FORMS[form], curve(result[name].loop.open_loop, grid))
+            (FORMS[form], curve(result[name].loop.plain_open, grid))
             for form, result in forms.items()
             if name in result
         ]

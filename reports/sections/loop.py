@@ -109,7 +109,7 @@ def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str =
     """Make the open-loop Bode figure with every margin on it."""
     margins = figures.margins
     data: bode_figure.Data = {
-        **bode_data([("open loop", curve(figures.loop.open_loop, grid))]),
+        **bode_data([("open loop", curve(figures.loop.plain_open, grid))]),
         "loop": name,
         "nyquist_hz": nyquist_hz(figures),
         "gain_margins": [
@@ -134,9 +134,9 @@ def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> Block:
     """Make the closed-loop Bode figure with the bandwidths."""
-    series = [("rotor free" if locked else "closed loop", curve(figures.response, grid))]
+    series = [("rotor free" if locked else "closed loop", curve(figures.plain_response, grid))]
     if locked is not None and locked.stable:
-        series.append(("rotor locked", curve(locked.response, grid)))
+        series.append(("rotor locked", curve(locked.plain_response, grid)))
     band = _bandwidths(figures)
     data: closed_bode_figure.Data = {
         **bode_data(series),
@@ -165,7 +165,7 @@ def _bandwidths(figures: LoopFigures) -> closed_bode_figure.Bandwidth:
 
 def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     """Make the Nyquist figure."""
-    margins, system = figures.margins, figures.loop.open_loop
+    margins, system = figures.margins, figures.loop.plain_open
     omega, points = nyquist_curve(system, grid, FRAME)
     closest = margins.modulus_frequency_rad_s
     at = None
@@ -194,7 +194,7 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
 
 def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     """Make the Nichols chart."""
-    open_loop = curve(figures.loop.open_loop, grid)
+    open_loop = curve(figures.loop.plain_open, grid)
     data: nichols_figure.Data = {
         "frequency_hz": abscissa(open_loop.frequency_hz),
         "magnitude_db": rounded(open_loop.magnitude_db),
@@ -220,8 +220,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
     ]
     data: sensitivity_figure.Data = {
         "frequency_hz": abscissa(grid / (2 * np.pi)),
-        "s_db": rounded(_db(response_at(figures.loop.sensitivity, grid)), 4),
-        "t_db": rounded(_db(response_at(figures.loop.closed_loop, grid)), 4),
+        "s_db": rounded(_db(response_at(figures.loop.plain_sensitivity, grid)), 4),
+        "t_db": rounded(_db(response_at(figures.loop.plain_closed, grid)), 4),
         "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
         "t_peak": _peak(peaks.complementary_db, peaks.complementary_rad_s),
         "limit_db": min(limits, default=None),
@@ -291,7 +291,7 @@ def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = No
         end_s = 2.2 * settled
     period = loop_figures.loop.period_s
     if end_s is not None and period is not None and end_s / period < STEP_POINTS:
-        response = sampled_step(loop_figures.response, math.ceil(end_s / period) + 1)
+        response = sampled_step(loop_figures.plain_response, math.ceil(end_s / period) + 1)
         time = period * np.arange(len(response))
     if end_s is not None:
         keep = max(int(np.searchsorted(time, end_s, side="right")), 8)
