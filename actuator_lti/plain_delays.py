@@ -106,7 +106,9 @@ class PlainDelaySystem:
         back = static(np.eye(self.ninputs, self.noutputs)) if other is None else other
         m, p = self.ninputs, self.noutputs
         if (back.ninputs, back.noutputs) != (p, m):
-            raise InputError(f"feedback: {p} outputs into {back.ninputs} inputs, {back.noutputs} back into {m}")
+            raise InputError(
+                f"feedback: {p} outputs into {back.ninputs} inputs, {back.noutputs} back into {m}"
+            )
         source = np.vstack([np.eye(m), np.zeros((back.ninputs, m))])
         sink = np.hstack([np.eye(p), np.zeros((p, back.noutputs))])
         loop = np.zeros((m + back.ninputs, p + back.noutputs))
@@ -201,7 +203,9 @@ def response(system: Any, points: np.ndarray) -> np.ndarray:
     """Response at complex s, shape (outputs, inputs, points); inf + nan j at a pole."""
     E = np.exp(-points[:, None] * system.delays_s)
     M = descriptor(system, points)
-    right = np.broadcast_to(np.vstack([system.B1, system.D21]), (len(points), M.shape[1], system.D11.shape[1]))
+    right = np.broadcast_to(
+        np.vstack([system.B1, system.D21]), (len(points), M.shape[1], system.D11.shape[1])
+    )
     inner = solved_at(M, right)
     n = system.A.shape[0]
     y = system.D11 + system.C1 @ inner[:, :n] + (system.D12 * E[:, None, :]) @ inner[:, n:]

@@ -13,19 +13,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numba
+from actuator_lti.compiled_late import CompiledLate
 
 
 @cache
 def source_stamp() -> str:
     """Digest of every Python file of this folder."""
+    import numba
+
     digest = hashlib.sha256(numba.__version__.encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-njit: Any = numba.njit  # some of the options are not in its published signature
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
@@ -34,22 +35,32 @@ def entry(function: Callable[..., Any]) -> Any:
 
     No kernel makes arrays, so none needs reference counts.
     """
-    return _stamped(njit(**OPTIONS, _nrt=False)(function))
+    return _late(function, _nrt=False)
 
 
 def scalar(function: Callable[..., Any]) -> Any:
     """The same for a function that only kernels call."""
-    return _stamped(njit(**OPTIONS, _nrt=False, no_cpython_wrapper=True)(function))
+    return _late(function, _nrt=False, no_cpython_wrapper=True)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """The same for a small function of the tick loop: its code is copied into its callers."""
-    return _stamped(njit(**OPTIONS, _nrt=False, forceinline=True, no_cpython_wrapper=True)(function))
+    return _late(function, _nrt=False, forceinline=True, no_cpython_wrapper=True)
 
 
 def woven(function: Callable[..., Any]) -> Any:
     """Copied into its callers before anything is compiled: for what the tick loop runs through once."""
-    return njit(inline="always")(function)
+    return CompiledLate(function, lambda python: _njit()(inline="always")(python))
+
+
+def _njit() -> Any:
+    import numba
+
+    return numba.njit  # some of the options are not in its published signature
+
+
+def _late(function: Callable[..., Any], **options: bool) -> CompiledLate:
+    return CompiledLate(function, lambda python: _stamped(_njit()(**OPTIONS, **options)(python)))
 
 
 def _stamped(dispatcher: Any) -> Any:

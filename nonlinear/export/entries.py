@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-import numba
-
+from actuator_lti.compiled_late import CompiledLate
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
@@ -13,7 +13,16 @@ from nonlinear._kernels.prepare import prepare, prepare_run_sizes
 from nonlinear._kernels.smooth import prepare_tanh
 from nonlinear._kernels.tick import init_elastic, init_run, retune_elastic, retune_rigid
 
-emitted: Any = numba.njit(error_model="numpy")  # compiled by numba in tests alone
+
+def emitted(function: Callable[..., Any]) -> CompiledLate:
+    """Declare a function that is emitted; compiled by numba in tests alone."""
+    return CompiledLate(function, _declared)
+
+
+def _declared(function: Callable[..., Any]) -> Any:
+    import numba
+
+    return numba.njit(error_model="numpy")(function)
 
 
 @emitted
