@@ -11,10 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import dry_torque, segments
-from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
@@ -64,7 +62,7 @@ def stall_torque_Nm(design: Design) -> Any:
     assert motor.resistance_ohm is not None
     current = limits.voltage_V / circuit_resistance_ohm(design)
     if design.controller.current is not None:
-        current = np.minimum(current, limits.peak_current_A)
+        current = smaller(current, limits.peak_current_A)
     return motor.torque_constant_Nm_A * current
 
 
@@ -116,7 +114,7 @@ def breakaway_torque_Nm(design: Design, load_Nm: float, direction: int) -> Any:
     The breakaway ratio acts on the dry part only, not on the offset and not on the load (model.md section 6).
     """
     needed = _held_torque(design, load_Nm, direction) - direction * passed_moment_Nm(design, load_Nm)
-    return np.maximum(needed, 0.0) if np.ndim(needed) else max(float(needed), 0.0)
+    return larger(needed, 0.0)
 
 
 def _held_torque(design: Design, load_Nm: float, direction: int) -> Any:
@@ -152,7 +150,7 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     pieces: list[tuple[float, Any]]
     pieces = list(segments(points)) if points else [(0.0, design.friction.viscous(direction))]
     behind = design.load.friction
-    if behind is None or design.coupling is None or not present(behind.viscous_Nms_rad):
+    if behind is None or design.coupling is None:
         return pieces
     more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     return [(start, slope + more) for start, slope in pieces]
@@ -161,48 +159,50 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
 def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:
     """Largest steady motor speed, what sets it, and the torque against motion there."""
     motor, limits, stall = design.effective_motor, design.limits, stall_torque_Nm(design)
-    kinds, bounds = [NOTHING], [np.asarray(math.inf)]
+    bounds: list[tuple[int, Any]] = []
     if design.controller.velocity is not None and "position" in design.controller.stages:
-        kinds.append(SPEED_LIMIT)
-        bounds.append(np.asarray(limits.speed_rad_s, dtype=float))
-    kinds.append(FORCE)
-    bounds.append(_first_root(against - stall, slopes, 0.0))
+        bounds.append((SPEED_LIMIT, limits.speed_rad_s))
+    bounds.append((FORCE, _first_root(against - stall, slopes, 0.0)))
     if motor.source_gain_Nm_V is None:
         R, kM, kE = circuit_resistance_ohm(design), motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
         assert R is not None
         assert kM is not None
         assert kE is not None
-        kinds.append(VOLTAGE)
-        bounds.append(_first_root(against - kM * limits.voltage_V / R, slopes, kM * kE / R))
-    stacked = np.stack(np.broadcast_arrays(*bounds))
-    which = np.argmin(stacked, axis=0)
-    speed = np.min(stacked, axis=0)
-    moves = np.asarray(stall > against)
-    speed, cause = np.where(moves, speed, 0.0), np.where(moves, np.array(kinds)[which], FORCE)
+        bounds.append((VOLTAGE, _first_root(against - kM * limits.voltage_V / R, slopes, kM * kE / R)))
+    speed: Any = math.inf
+    cause: Any = NOTHING
+    for kind, bound in bounds:
+        nearer = bound < speed
+        speed, cause = where(nearer, bound, speed), where(nearer, kind, cause)
+    moves = stall > against
+    speed, cause = where(moves, speed, 0.0), where(moves, cause, FORCE)
     return speed, cause, against + _speed_torque(slopes, speed)
 
 
 def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
     """Torque of the speed-dependent part at a speed (0 at an unbounded one, where it has no meaning)."""
-    finite, total, last = np.where(np.isfinite(speed), speed, 0.0), 0.0, 0.0
+    bounded = where(finite(speed), speed, 0.0)
+    total, last = 0.0, 0.0
     for start, slope in slopes:
-        total = total + (slope - last) * np.maximum(finite - start, 0.0)
+        total = total + (slope - last) * larger(bounded - start, 0.0)
         last = slope
     return total
 
 
 def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) -> Any:
     """First speed where ``start_value + friction(w) + more w`` rises through 0; inf where it does not."""
-    result: Any = np.asarray(math.inf)
-    value = np.asarray(start_value, dtype=float)
-    ends = [start for start, _ in slopes[1:]] + [math.inf]
+    result: Any = math.inf
+    value = start_value
+    ends = [*(start for start, _ in slopes[1:]), None]
     for (start, slope), end in zip(slopes, ends, strict=True):
-        rise = np.asarray(slope + more, dtype=float)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            root = np.where(rise > 0, start - value / rise, math.inf)
-        hit = (root <= end) & (root >= start) & np.isinf(result)
-        result = np.where(hit, root, result)
-        value = value + rise * (end - start) if math.isfinite(end) else value
+        rise = slope + more
+        rises = rise > 0.0
+        root = where(rises, start - value / where(rises, rise, 1.0), math.inf)
+        hit = (root >= start) & (result == math.inf)
+        if end is not None:
+            hit = hit & (root <= end)
+            value = value + rise * (end - start)
+        result = where(hit, root, result)
     return result
 
 
@@ -213,17 +213,17 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
     needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
     starts = (stall > needed) & (stall > against)
-    gain = np.where(starts, (stall - against) / design.inertia_kgm2, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        held = np.maximum(needed, against)
-        margin = np.where(held > 0.0, stall / held, math.inf)
+    gain = where(starts, (stall - against) / design.inertia_kgm2, 0.0)
+    held = larger(needed, against)
+    holds = held > 0.0
+    margin = where(holds, stall / where(holds, held, 1.0), math.inf)
     limit = design.limits.acceleration_rad_s2
-    current = np.where(np.isfinite(speed), torque / kM, np.nan) if kM is not None else np.nan
+    current = math.nan if kM is None else where(finite(speed), torque / kM, math.nan)
     return Capability(
         output_rate_rad_s=speed / design.total_ratio,
         rate_limit=cause,
         motor_current_A=current,
-        acceleration_rad_s2=np.minimum(gain, limit) / design.total_ratio,
+        acceleration_rad_s2=smaller(gain, limit) / design.total_ratio,
         accelerates_to_limit=limit < gain,
         torque_margin=margin,
     )
@@ -243,15 +243,17 @@ def capability(design: Design, load_Nm: float = 0.0) -> Capability:
     if not math.isfinite(load_Nm):
         raise InputError(f"load_Nm = {load_Nm}: must be finite")
     ahead, back = (_one_way(design, load_Nm, direction) for direction in (1, -1))
-    with np.errstate(invalid="ignore"):
-        rate = np.where(
-            np.equal(ahead.output_rate_rad_s, back.output_rate_rad_s),
-            0.0,
-            back.output_rate_rad_s - ahead.output_rate_rad_s,
-        )
-        acceleration = back.acceleration_rad_s2 - ahead.acceleration_rad_s2
-        current = np.nan_to_num(back.motor_current_A) - np.nan_to_num(ahead.motor_current_A)
-    worse = (rate < 0) | ((rate == 0) & ((acceleration < 0) | ((acceleration == 0) & (current > 0))))
+    slower = back.output_rate_rad_s < ahead.output_rate_rad_s
+    weaker = back.acceleration_rad_s2 < ahead.acceleration_rad_s2
+    as_strong = back.acceleration_rad_s2 == ahead.acceleration_rad_s2
+    hungrier = _or_zero(back.motor_current_A) > _or_zero(ahead.motor_current_A)
+    as_fast = back.output_rate_rad_s == ahead.output_rate_rad_s
+    worse = slower | (as_fast & (weaker | (as_strong & hungrier)))
     names = Capability.__dataclass_fields__
-    figures = {n: np.where(worse, getattr(back, n), getattr(ahead, n)) for n in names}
-    return Capability(**{**figures, "torque_margin": np.minimum(ahead.torque_margin, back.torque_margin)})
+    figures = {n: where(worse, getattr(back, n), getattr(ahead, n)) for n in names}
+    return Capability(**{**figures, "torque_margin": smaller(ahead.torque_margin, back.torque_margin)})
+
+
+def _or_zero(current: Any) -> Any:
+    """A current, 0 where there is none (NaN)."""
+    return where(current == current, current, 0.0)

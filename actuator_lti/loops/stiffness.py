@@ -6,6 +6,7 @@ K = M_ext / output angle, the inverse of the compliance.  One design or stacked 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,24 +25,41 @@ _SLOW_HZ = 1e-5  # where the limit at zero frequency is read
 
 @dataclass(frozen=True)
 class StiffnessFigures:
-    """What a requirement may limit; floats or arrays.
+    """What a requirement may limit, each worked out where it is read; floats or arrays.
+
+    No load changes them, as friction slides.
 
     Attributes
     ----------
-    static_stiffness_Nm_rad, least_stiffness_Nm_rad : float or ndarray
-        Powered, friction sliding: limit at zero frequency (0 of an output that runs away, inf of one that
-        comes back), and smallest size there and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist).
-    lost_motion_rad : float or ndarray
-        2 (b + C0_l/k)/N_r; 0 of a rigid drive train.
+    design : Design
+        One design or stacked ones.
     """
 
-    static_stiffness_Nm_rad: Any
-    least_stiffness_Nm_rad: Any
-    lost_motion_rad: Any
+    design: Design
+
+    @cached_property
+    def static_stiffness_Nm_rad(self) -> Any:
+        """Powered, at zero frequency: 0 of an output that runs away, inf of one that comes back."""
+        return static_stiffness(self._response)
+
+    @cached_property
+    def least_stiffness_Nm_rad(self) -> Any:
+        """Powered, the smallest size at rest and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist)."""
+        size = np.abs(stiffness_at(self._response, frequencies_hz(self._response)))
+        return _plain(np.minimum(size.min(axis=-1), self.static_stiffness_Nm_rad))
+
+    @property
+    def lost_motion_rad(self) -> Any:
+        """2 (b + C0_l/k)/N_r; 0 of a rigid drive train."""
+        return lost_motion_rad(self.design)
+
+    @cached_property
+    def _response(self) -> Compliance:
+        return compliance(self.design)
 
 
 def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
-    """The figures of a design or of stacked ones; no load changes them, as friction slides.
+    """The figures of a design or of stacked ones, the same at every load.
 
     Examples
     --------
@@ -50,11 +68,7 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
     >>> f"{result.static_stiffness_Nm_rad:.0f} N m/rad, {1e3 * result.lost_motion_rad:.3f} mrad"
     '1324 N m/rad, 1.625 mrad'
     """
-    response = compliance(design)
-    size = np.abs(stiffness_at(response, frequencies_hz(response)))
-    static = static_stiffness(response)
-    least = _plain(np.minimum(size.min(axis=-1), static))
-    return StiffnessFigures(static, least, lost_motion_rad(design))
+    return StiffnessFigures(design)
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:

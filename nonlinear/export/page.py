@@ -1,4 +1,4 @@
-"""What the live page must know of the rows: places, limiters, and how the row follows from the keys."""
+"""What the live page must know: places of the rows, limiters, how rows and figures follow from keys."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import Any
 
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design
+from actuator_lti.drive_figure import drive_figure
 from nonlinear._kernels import layout as at
-from nonlinear.export.trace import Tape, Traced
+from nonlinear.emit.kinds import c_float
+from nonlinear.export.trace import Tape, Traced, used_statements
 from nonlinear.parameters import design_row
 
 PLACES = {
@@ -24,18 +26,45 @@ LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in
 
 def changes_row(design: Design, path: str) -> bool | None:
     """Whether a key has an influence on the row; None where it cannot be followed."""
-    traced = Traced(Tape(rounding=True), "k", parameter_value(design, path))
     try:
-        row: Any = design_row(stacked(design, {path: traced}), kind=object)
+        row: Any = design_row(_followed(design, {path: parameter_value(design, path)})[1], kind=object)
     except TypeError:
         return None
     return any(isinstance(item, Traced) for item in row)
 
 
+def changes_figure(design: Design, path: str, name: str, load_Nm: float) -> bool:
+    """Whether a key has an influence on a figure of the whole drive."""
+    try:
+        changed = _followed(design, {path: parameter_value(design, path)})[1]
+        return isinstance(drive_figure(changed, name, load_Nm), Traced)
+    except TypeError:
+        return False
+
+
 def row_statements(design: Design, keys: Mapping[str, float]) -> list[str]:
     """The statements from keys, ``k[0]``, ``k[1]``, ... in their order, to the row, in C."""
-    tape = Tape(rounding=True)
-    values = {path: Traced(tape, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
-    row = design_row(stacked(design, values), kind=object)
+    tape, changed = _followed(design, keys)
+    row = design_row(changed, kind=object)
     stored = [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
-    return [*tape.lines, *stored]
+    return list(used_statements([*tape.lines, *stored]))
+
+
+def figure_statements(
+    design: Design, keys: Mapping[str, float], name: str, load_Nm: float
+) -> list[str] | None:
+    """The statements from keys to a figure of the whole drive, ``p[0]``; None where it cannot be followed."""
+    tape, changed = _followed(design, keys)
+    try:
+        figure = drive_figure(changed, name, load_Nm)
+    except TypeError:
+        return None
+    stored = figure.name if isinstance(figure, Traced) else c_float(float(figure))
+    return list(used_statements([*tape.lines, f"p[0] = {stored};"]))
+
+
+def _followed(design: Design, keys: Mapping[str, float]) -> tuple[Tape, Design]:
+    """A tape, and the design whose keys write down on it what is done with them."""
+    tape = Tape(interpreted=True)
+    values = {path: Traced(tape, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
+    return tape, stacked(design, values)

@@ -31,11 +31,11 @@ class NotTraceable(TypeError):
 class Tape:
     """Statements in the order in which they were made.
 
-    With ``rounding`` the whole number below a value is a value too (an interpreter of the statements may
-    change it); without, it is a condition.
+    Where the statements are ``interpreted``, the whole number below a value and the outcome of a comparison
+    are values too; else they are conditions.
     """
 
-    rounding: bool = False
+    interpreted: bool = False
     lines: list[str] = field(default_factory=list)
     count: int = 0
 
@@ -73,12 +73,12 @@ def _binary(sign: str, function: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
 
 
 def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
-    def compare(self: Traced, other: Any) -> bool:
+    def compare(self: Traced, other: Any) -> Any:
         if not isinstance(other, int | float | Traced):
             return False
-        return self.tape.condition(
-            f"{self.name} {sign} {_text(other)}", function(self.number, _number(other))
-        )
+        text, outcome = f"{self.name} {sign} {_text(other)}", function(self.number, _number(other))
+        made = self.tape.value if self.tape.interpreted else self.tape.condition
+        return made(text, outcome)
 
     return compare
 
@@ -93,7 +93,7 @@ def _function(name: str) -> Any:
 def _rounded(name: str) -> Any:
     def rounded(self: Traced) -> Any:
         result = np.float64(getattr(math, name)(self.number))
-        if self.tape.rounding:
+        if self.tape.interpreted:
             return self.tape.value(f"{name}({self.name})", float(result))
         self.tape.condition(f"{name}({self.name}) == {c_number(float(result))}", True)
         return result
@@ -120,9 +120,26 @@ class Traced:
     __floor__, __ceil__ = floor, ceil
     tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
 
+    def __and__(self, other: Any) -> Any:
+        """Both; of comparisons that are values."""
+        both = bool(self.number) and bool(_number(other))
+        return self.tape.value(f"{self.name} && {_text(other)}", both)
+
+    def __or__(self, other: Any) -> Any:
+        """One at least."""
+        one = bool(self.number) or bool(_number(other))
+        return self.tape.value(f"{self.name} || {_text(other)}", one)
+
+    __rand__, __ror__ = __and__, __or__
+
+    def either(self, yes: Any, no: Any) -> Traced:
+        """One value where this comparison holds, else the other."""
+        number = _number(yes if self.number else no)
+        return self.tape.value(f"where({self.name}, {_text(yes)}, {_text(no)})", number)
+
     def zero_below(self, least: Any) -> Traced:
         """The value, or 0 where its size is less."""
-        if not self.tape.rounding:
+        if not self.tape.interpreted:
             return self if abs(self) >= least else self.tape.value("0.0", 0.0)
         kept = self.number if abs(self.number) >= _number(least) else 0.0
         return self.tape.value(f"zero_below({self.name}, {_text(least)})", kept)
@@ -208,10 +225,10 @@ def trace_keys(design: Design) -> KeyTrace:
     row = design_row(stacked(design, values), kind=object)
     lines = [*tape.lines]
     lines += [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
-    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=_used(lines))
+    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=used_statements(lines))
 
 
-def _used(lines: list[str]) -> tuple[str, ...]:
+def used_statements(lines: list[str]) -> tuple[str, ...]:
     """Statements without the values that nothing asks for."""
     kept: list[str] = []
     wanted: set[str] = set()

@@ -1,19 +1,23 @@
 """The keys of a design as sliders: value, unit, range, tolerance; those that stay fixed, and why.
 
 How the row of the simulator follows from the keys is found by `nonlinear.export.trace` on `design_row`, as
-for an export in C: the page interprets the same statements.
+for an export in C: the page interprets the same statements. Figures of the whole drive follow likewise, out
+of `actuator_lti.drive_figure`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
-from nonlinear.export.page import changes_row, row_statements
+from nonlinear.export.page import changes_figure, changes_row, figure_statements, row_statements
+
+Figure = tuple[str, float]  # of the whole drive: name, load in N m
 
 SLIDER_FACTOR = 5.0  # a slider goes from a fifth of the value to five times it
 UNUSED = "has no influence on the loops or the run that this page follows"
@@ -34,30 +38,41 @@ class Followed:
         As they stand in the page's data.
     lines : list of str
         Statements in the C of `nonlinear.export.trace`: ``k[n]`` is the n-th free key.
+    figures : dict
+        Statements from the keys to each figure of the whole drive, by name and load; without those that
+        cannot be followed.
     """
 
     free: list[dict[str, Any]]
     fixed: list[dict[str, Any]]
     lines: list[str]
+    figures: dict[Figure, list[str]]
 
 
-def followed(design: Design) -> Followed:
-    """Follow every numeric key of a design into its row."""
+def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
+    """Follow every numeric key of a design into its row, and into some figures of the whole drive."""
+    asked = tuple(dict.fromkeys(figures))
     free: list[dict[str, Any]] = []
     fixed: list[dict[str, Any]] = []
     for path in paths_of(design):
         if path.startswith("validation."):
             continue
-        reason = _reason(design, path)
+        reason = _reason(design, path, asked)
         if reason:
             fixed.append({**_named(design, path), "why": reason})
         else:
             free.append(_slider(design, path))
-    lines = row_statements(design, {key["path"]: key["value"] for key in free})
-    return Followed(free=free, fixed=fixed, lines=lines)
+    values = {key["path"]: key["value"] for key in free}
+    made = {each: figure_statements(design, values, *each) for each in asked}
+    return Followed(
+        free=free,
+        fixed=fixed,
+        lines=row_statements(design, values),
+        figures={each: lines for each, lines in made.items() if lines is not None},
+    )
 
 
-def _reason(design: Design, path: str) -> str:
+def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
     """Say why a key has no slider; empty where it has one."""
     value = parameter_value(design, path)
     if value == 0.0 and not _top(design, path):
@@ -65,7 +80,7 @@ def _reason(design: Design, path: str) -> str:
     changes = changes_row(design, path)
     if changes is None:
         return UNFOLLOWED
-    return "" if changes else UNUSED
+    return "" if changes or any(changes_figure(design, path, *each) for each in figures) else UNUSED
 
 
 def _top(design: Design, path: str) -> float:

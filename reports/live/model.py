@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
-from actuator_lti.design.model import Design
-from actuator_lti.drive_figure import drive_figure
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
@@ -14,7 +14,7 @@ from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, linear_limiters, page
 from nonlinear.export.c_files import exported
 from reports.figures.map import WORDS
-from reports.live.keys import followed
+from reports.live.keys import Figure, followed
 from reports.live.text import patches
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
@@ -34,7 +34,7 @@ def live_model(design: Design) -> dict[str, Any]:
         row = exported(design).row
     except InputError as refused:
         return {"refused": f"{refused}."}
-    result = followed(design)
+    result = followed(design, _figures(design))
     text, places = patches(design, result.free)
     return {
         "name": design.name,
@@ -54,8 +54,8 @@ def live_model(design: Design) -> dict[str, Any]:
         "multiples": [list(pair) for pair in _multiples(design)],
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
-        "requirements": _requirements(design),
-        "others": _others(design),
+        "requirements": [*_on_loops(design), *_on_drive(design, result.figures)],
+        "apart": _apart(design, result.figures),
         "step": _step(design),
         "limits": _limits(design),
         "map": _map(design),
@@ -78,20 +78,26 @@ def _multiples(design: Design) -> list[tuple[str, str]]:
     return [("control.position.every", "control.velocity.every")]
 
 
-def _requirements(design: Design) -> list[dict[str, Any]]:
+def _limit(item: Requirement) -> dict[str, Any]:
+    """Give a requirement as the page judges it."""
+    quantity = QUANTITIES[item.quantity]
+    return {
+        "id": item.id,
+        "loop": None,
+        "quantity": item.quantity,
+        "words": quantity.words,
+        "absolute": quantity.absolute,
+        "unit": "" if item.unit == "1" else item.unit,
+        "minimum": item.minimum,
+        "maximum": item.maximum,
+    }
+
+
+def _on_loops(design: Design) -> list[dict[str, Any]]:
     """Give the requirements on loops, one for each loop that it holds for."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
     return [
-        {
-            "id": item.id,
-            "loop": loop,
-            "quantity": item.quantity,
-            "words": QUANTITIES[item.quantity].words,
-            "absolute": QUANTITIES[item.quantity].absolute,
-            "unit": "" if item.unit == "1" else item.unit,
-            "minimum": item.minimum,
-            "maximum": item.maximum,
-        }
+        {**_limit(item), "loop": loop}
         for item in design.requirements
         if item.quantity in LOOP_QUANTITIES
         for loop in judged_loops(item.loop, stages)
@@ -99,16 +105,31 @@ def _requirements(design: Design) -> list[dict[str, Any]]:
     ]
 
 
-def _others(design: Design) -> dict[str, int]:
-    """Count the requirements on the whole drive, which do not follow, and those not met as designed."""
-    others = [item for item in design.requirements if item.quantity not in LOOP_QUANTITIES]
-    failed = 0
-    for item in others:
-        if item.quantity in DRIVE_QUANTITIES:
-            value = float(drive_figure(design, item.quantity, item.load_Nm or 0.0))
-            low, high = item.minimum, item.maximum
-            failed += not ((low is None or value >= low) and (high is None or value <= high))
-    return {"count": len(others), "failed": failed}
+def _figures(design: Design) -> list[Figure]:
+    """Give the figures of the whole drive that requirements limit."""
+    return [
+        (item.quantity, item.load_Nm or 0.0)
+        for item in design.requirements
+        if item.quantity in DRIVE_QUANTITIES
+    ]
+
+
+def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[str, Any]]:
+    """Give the requirements on the whole drive whose figures follow, each with its statements."""
+    return [
+        {**_limit(item), "load": item.load_Nm or 0.0, "lines": figures[item.quantity, item.load_Nm or 0.0]}
+        for item in design.requirements
+        if (item.quantity, item.load_Nm or 0.0) in figures
+    ]
+
+
+def _apart(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[str, Any]]:
+    """Give the requirements that do not follow, with what they limit."""
+    return [
+        {"id": item.id, "words": QUANTITIES[item.quantity].words}
+        for item in design.requirements
+        if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
+    ]
 
 
 def _step(design: Design) -> dict[str, Any]:

@@ -18,11 +18,12 @@
   const FUNCTIONS = {
     pow: Math.pow, tan: Math.tan, sqrt: Math.sqrt, sin: Math.sin, cos: Math.cos, exp: Math.exp, log: Math.log,
     floor: Math.floor, ceil: Math.ceil, fabs: Math.abs, zero_below: (x, least) => (Math.abs(x) < least ? 0 : x),
+    where: (condition, yes, no) => (condition ? yes : no),
   };
   const SIGNS = {
     "+": (a, b) => a + b, "-": (a, b) => a - b, "*": (a, b) => a * b, "/": (a, b) => a / b,
-    "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b,
-    "==": (a, b) => a === b, "!=": (a, b) => a !== b,
+    "<": (a, b) => +(a < b), "<=": (a, b) => +(a <= b), ">": (a, b) => +(a > b), ">=": (a, b) => +(a >= b),
+    "==": (a, b) => +(a === b), "!=": (a, b) => +(a !== b), "&&": (a, b) => +(a && b), "||": (a, b) => +(a || b),
   };
   const expression = (text) => {
     let m = /^k\[(\d+)\]$/.exec(text);
@@ -32,6 +33,7 @@
     m = /^(\w+)\((.*)\)$/.exec(text);
     if (m && FUNCTIONS[m[1]]) {
       const run = FUNCTIONS[m[1]], parts = m[2].split(", ").map(expression);
+      if (parts.length > 2) return (k, v) => run(parts[0](k, v), parts[1](k, v), parts[2](k, v));
       return parts.length > 1 ? (k, v) => run(parts[0](k, v), parts[1](k, v)) : (k, v) => run(parts[0](k, v));
     }
     m = /^(\S+) (\S+) (\S+)$/.exec(text);
@@ -51,7 +53,7 @@
     m = /^p\[(\d+)\] = (.+);$/.exec(line);
     if (m) { const n = +m[1], of = expression(m[2]); return (k, v, p) => { p[n] = of(k, v); return true; }; }
     m = /^if \((!?)\((.+)\)\) \{ return 0; \}$/.exec(line);
-    if (m) { const refuses = m[1] === "", of = expression(m[2]); return (k, v) => of(k, v) !== refuses; }
+    if (m) { const refuses = m[1] === "", of = expression(m[2]); return (k, v) => Boolean(of(k, v)) !== refuses; }
     throw new Error("statement: " + line);
   };
   const statements = data.lines.map(statement);
@@ -60,6 +62,12 @@
     const p = base.slice(), v = [];
     return statements.every((run) => run(values, v, p)) ? p : null;
   };
+  // a figure of the whole drive: NaN where it has none, null where it needs another structure of the drive
+  const drive = data.requirements.map((item) => item.lines && item.lines.map(statement));
+  const driveOf = (values) => drive.map((lines) => {
+    const p = [], v = [];
+    return lines && lines.every((run) => run(values, v, p)) ? p[0] : null;
+  });
 
   // --- words ---------------------------------------------------------------------------------------------
   const minus = (text) => text.replace(/-/g, "−");
@@ -96,7 +104,7 @@
     const row = rowOf(values);
     if (!row) return null;
     view(x.p_at(), row.length).set(row);
-    const found = { row, loops: {}, points: {} };
+    const found = { row, drive: driveOf(values), loops: {}, points: {} };
     for (const name of data.loops) {
       const began = performance.now(), timed = whole || !slow.has(name);
       found.loops[name] = figures(stageOf(name), timed ? 1 : 0);
@@ -353,16 +361,19 @@
   // --- showing -------------------------------------------------------------------------------------------
   const chart = (name) => find(`[data-chart="${name}"] .chart`);
   const tell = (name, type, detail) => chart(name).dispatchEvent(new CustomEvent(type, { detail }));
-  const failing = (found) => data.requirements.filter((item) => {
+  // a requirement as found: its value (NaN: none), and whether it is met (null: not judged)
+  const judged = (found) => data.requirements.map((item, k) => {
     const loop = found.loops[item.loop];
-    if (!loop || !loop.figures) return false;
-    if (loop.figures[STABLE] !== 1) return true;
-    let value = loop.figures[PLACE[item.quantity]];
+    if (item.loop && (!loop || !loop.figures)) return { item, value: NaN, met: null };
+    if (item.loop && loop.figures[STABLE] !== 1) return { item, value: NaN, met: false, words: "unstable" };
+    if (item.loop && loop.waits && TIMED.includes(item.quantity)) return { item, value: NaN, met: null, words: "…" };
+    let value = item.loop ? loop.figures[PLACE[item.quantity]] : found.drive[k] ?? NaN;
     if (item.absolute) value = Math.abs(value);
-    return value < (item.minimum ?? -Infinity) || value > (item.maximum ?? Infinity);
+    return { item, value, met: Number.isNaN(value) ? null : value >= (item.minimum ?? -Infinity) && value <= (item.maximum ?? Infinity) };
   });
-  const cell = (now, was, factor, loop, name) => {
-    const made = html("td", "right"), value = now * factor, old = was * factor;
+  const calm = (value, unit) => (["dB", "deg", "%"].includes(unit) && Math.abs(value) < 1 ? Math.round(value * 1e4) / 1e4 : value); // no -3e-5 dB
+  const cell = (now, was, factor, loop, name, unit) => {
+    const made = html("td", "right"), value = calm(now * factor, unit), old = calm(was * factor, unit);
     made.dataset.loop = loop;
     made.dataset.figure = name;
     made.dataset.value = now;
@@ -384,7 +395,7 @@
       th.append(html("span", "unit", unit));
       head.append(th);
     }
-    const body = [], bad = new Set(failing(now).map((item) => item.loop + " " + item.quantity));
+    const body = [], bad = new Set(judged(now).filter(({ met }) => met === false).map(({ item }) => item.loop + " " + item.quantity));
     for (const name of [...data.loops, ...Object.keys(data.points)]) {
       const own = now.loops[name] || now.points[name], old = before.loops[name] || before.points[name];
       if (own.n === 0 && !(name in now.loops)) continue; // no such break point
@@ -399,7 +410,7 @@
         if (own.figures[STABLE] !== 1) th.append(" ", html("span", "mark fail", "unstable"));
         th.dataset.loop = name;
         th.dataset.stable = own.figures[STABLE];
-        for (const [quantity, , , factor] of FIGURES) {
+        for (const [quantity, , unit, factor] of FIGURES) {
           if (name in now.points && CLOSED.includes(quantity)) {
             row.append(html("td"));
             continue;
@@ -408,7 +419,7 @@
             row.append(html("td", "right", "…"));
             continue;
           }
-          const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity);
+          const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity, unit);
           if (bad.has(name + " " + quantity)) td.classList.add("bad");
           row.append(td);
         }
@@ -422,21 +433,51 @@
     box.replaceChildren(box.querySelector("caption"), top, rest);
   };
   const state = () => {
-    const line = find(".state"), fails = failing(now), old = failing(before), total = data.requirements.length;
+    const line = find(".state"), all = judged(now), was = judged(before), total = all.length;
+    const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met }) => met === null);
     const unstable = data.loops.filter((name) => now.loops[name].figures && now.loops[name].figures[STABLE] !== 1);
     const unknown = data.loops.filter((name) => now.loops[name].n === DOUBT), words = [];
     if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (total) words.push(fails.length ? `${fails.length} of ${total} requirements on the loops now ${fails.length === 1 ? "fails" : "fail"} (as designed: ${old.length}).` : unknown.length ? "" : total === 1 ? "The requirement on the loops is met." : `All ${total} requirements on the loops are met.`);
-    const { count, failed } = data.others;
-    if (count) words.push(`${count} on the whole drive ${count === 1 ? "does" : "do"} not follow${failed ? `; as designed ${failed} ${failed === 1 ? "is" : "are"} not met` : ""}: see the report.`);
+    if (fails.length && !changes().length) words.push(`${fails.length} of ${total} requirements ${fails.length === 1 ? "is" : "are"} not met as designed.`);
+    else if (fails.length) words.push(`${fails.length} of ${total} requirements now ${fails.length === 1 ? "fails" : "fail"} (as designed: ${old.length}).`);
+    else if (total > open.length) words.push(total === 1 ? "The requirement is met." : open.length ? `${total - open.length} of ${total} requirements are met.` : `All ${total} requirements are met.`);
+    if (open.length && !unknown.length) words.push(`${open.length} cannot be judged now.`);
+    if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
     if (refused) words.push(refused);
     line.className = `state ${unstable.length || fails.length || unknown.length ? "fail" : "pass"}`;
     line.textContent = words.filter(Boolean).join(" ");
     line.dataset.failing = fails.length;
-    const list = find(".moved-list");
-    const ids = new Set(old.map((item) => item.loop + item.id)), fresh = fails.filter((item) => !ids.has(item.loop + item.id));
-    list.replaceChildren(...fresh.slice(0, 6).map((item) => html("p", "fresh", `${LOOP_NAMES[item.loop]}: ${item.words} ${digits(now.loops[item.loop].figures[PLACE[item.quantity]], 4)} ${item.unit}, limit ${item.minimum !== null ? "≥ " + item.minimum : "≤ " + item.maximum} ${item.unit}`)));
+    demands(all, was);
+  };
+  const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${minus(String(item.load))} ${data.axis === "linear" ? "N" : "N m"}` : "");
+  const demands = (all, was) => {
+    const box = find("table.demands");
+    box.closest(".scroll").hidden = !all.length;
+    const top = html("tr"), limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
+    for (const [words, side] of [["Requirement", "left"], ["Where", "left"], ["Limit", "right"], ["As designed", "right"], ["As changed", "right"], ["Verdict", "left"]]) {
+      const th = html("th", side, words);
+      th.scope = "col";
+      top.append(th);
+    }
+    const rest = all.map(({ item, value, met, words }, k) => {
+      const row = html("tr"), th = html("th", "left", item.words[0].toUpperCase() + item.words.slice(1)), last = html("td", "left");
+      th.scope = "row";
+      th.title = item.id;
+      const found = (one) => one.words || `${digits(calm(one.value, one.item.unit), 4)} ${one.item.unit}`;
+      const cellNow = html("td", met === false ? "right bad" : "right", found({ item, value, words }));
+      row.dataset.id = item.id;
+      row.dataset.loop = item.loop || "";
+      row.dataset.value = value;
+      row.dataset.met = met;
+      last.append(html("span", `mark ${met === null ? "none" : met ? "pass" : "fail"}`, met === null ? "not judged" : met ? "met" : was[k].met === false ? "not met" : "now not met"));
+      row.append(th, html("td", "left", placed(item)), html("td", "right", `${limit(item)} ${item.unit}`), html("td", "right", found(was[k])), cellNow, last);
+      return row;
+    });
+    const head = html("thead"), body = html("tbody");
+    head.append(top);
+    body.append(...rest);
+    box.replaceChildren(box.querySelector("caption"), head, body);
   };
   const show = () => {
     rows.forEach((slider, k) => {

@@ -78,11 +78,30 @@ def read(page: Page) -> dict[str, dict[str, float]]:
     return result
 
 
-def command_line(path: Path) -> dict[str, Any]:
+def command_line(path: Path | str, part: str = "loops") -> Any:
     done = CliRunner().invoke(build(), ["margins", str(path), "--json"])
     assert done.exit_code in (0, 1), done.output
-    loops: dict[str, Any] = json.loads(done.stdout)["loops"]
-    return loops
+    return json.loads(done.stdout)[part]
+
+
+def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
+    """Compare value and verdict of every requirement that the page judges."""
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    rows = page.eval_on_selector_all(
+        "table.demands tbody tr",
+        "(all) => all.map((row) => [row.dataset.id, row.dataset.loop, row.dataset.value, row.dataset.met])",
+    )
+    apart = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).apart")
+    ours = {(id, loop or None): (value, met) for id, loop, value, met in rows}
+    assert len(ours) + len(apart) == len(verdicts)
+    for item in verdicts:
+        id = item["id"].removesuffix(f"/{item['loop']}")
+        if id in [each["id"] for each in apart]:
+            continue
+        value, met = ours[id, item["loop"]]
+        assert met == {True: "true", False: "false", None: "null"}[item["passed"]], item
+        if item["value"] is not None and math.isfinite(item["value"]):
+            assert float(value) == pytest.approx(item["value"], rel=1e-9, abs=1e-9), item
 
 
 def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:

@@ -11,18 +11,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from live_page import FIGURES, agree, command_line, opened, read, saved, settled, type_value, written
-from typer.testing import CliRunner
+from live_page import (
+    FIGURES,
+    agree,
+    command_line,
+    opened,
+    read,
+    saved,
+    settled,
+    type_value,
+    verdicts_agree,
+    written,
+)
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import with_values
 from actuator_lti.design.access import parameter_value
 from actuator_lti.design.loader import shipped_designs
-from actuator_lti.design.model import Friction, FrictionPoint
+from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
-from reports.cli.app import build
 from reports.live import live_model
 
 if TYPE_CHECKING:
@@ -58,6 +67,7 @@ def test_no_shipped_design_is_left_out() -> None:
 def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path: Path) -> None:
     name, page = shown
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
+    verdicts_agree(page, command_line(tmp_path / "same.toml", "verdicts"))
     before = read(page)
     for key, value in CHANGES[name].items():
         type_value(page, key, value)
@@ -67,6 +77,7 @@ def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page],
     after = read(page)
     assert after != before
     agree(after, command_line(changed))
+    verdicts_agree(page, command_line(changed, "verdicts"))
     for key in CHANGES[name]:
         assert parameter_value(load_design(changed), key) != parameter_value(load_design(name), key)
 
@@ -185,9 +196,45 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(
     assert len(set(wanted)) > 2
 
 
-@pytest.mark.parametrize("name", ["joint", "ilr33-amber"])
-def test_requirements_on_the_whole_drive_are_counted_as_the_command_line_judges_them(name: str) -> None:
-    done = CliRunner().invoke(build(), ["margins", name, "--json"])
-    whole = [item for item in json.loads(done.stdout)["verdicts"] if item["loop"] is None]
-    failed = sum(item["passed"] is False for item in whole)
-    assert live_model(load_design(name))["others"] == {"count": len(whole), "failed": failed}
+ASKED = (
+    ("output_rate", "deg/s", 60.0, 20.0),
+    ("motor_current", "A", None, None),
+    ("acceleration", "deg/s^2", 1e3, 20.0),
+    ("torque_margin", "1", 2.0, 20.0),
+    ("lost_motion", "deg", None, None),
+)
+
+
+def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path) -> None:
+    """Rate, current, acceleration, torque margin and lost motion of a loaded drive as `margins` has them."""
+    limits = [
+        Requirement(id=f"r{k}", quantity=name, unit=unit, minimum=low, maximum=9.0 if low is None else None,
+                    load_Nm=load)
+        for k, (name, unit, low, load) in enumerate(ASKED)
+    ]  # fmt: skip
+    design = replace(load_design("fin"), requirements=tuple(limits))
+    trouble: list[str] = []
+    page = opened(browser, written(design, tmp_path), trouble)
+    verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "verdicts"))
+    first = page.eval_on_selector_all(
+        "table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)"
+    )
+    changes = {"limits.peak_current": 0.6, "motor.resistance": 1.7, "load.inertia": 1.5, "coupling.play": 2.0,
+               "friction.load_coefficient": 3.0, "limits.voltage": 0.8}  # fmt: skip
+    for key, factor in changes.items():
+        field = f'.row[data-path="{key}"] .field'
+        if page.locator(field).count():
+            type_value(page, key, factor * float(page.input_value(field)))
+    verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "verdicts"))
+    then = page.eval_on_selector_all("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
+    assert all(a != b for a, b in zip(first, then, strict=True))
+    page.context.close()
+    assert trouble == []
+
+
+def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path: Path) -> None:
+    limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
+    design = replace(load_design("ilr33-amber"), requirements=limits)
+    model = live_model(design)
+    assert model["apart"] == [{"id": "swing", "words": "swing after a step"}]
+    assert model["requirements"] == []

@@ -1,0 +1,42 @@
+"""Choices between values that numbers, arrays of many designs and followed values make alike.
+
+A followed value is one that writes down what is done with it (`nonlinear.export.trace`); a comparison of it
+has a ``either`` of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+
+def where(condition: Any, yes: Any, no: Any) -> Any:
+    """``yes`` where the condition holds, else ``no``; both are worked out before.
+
+    Examples
+    --------
+    >>> where(2.0 > 1.0, 5.0, 7.0), where(np.array([True, False]), 5.0, 7.0).tolist()
+    (5.0, [5.0, 7.0])
+    """
+    if hasattr(condition, "either"):
+        return condition.either(yes, no)
+    if np.ndim(condition):
+        return np.where(condition, yes, no)
+    return yes if condition else no
+
+
+def smaller(a: Any, b: Any) -> Any:
+    """The smaller of two values."""
+    return where(b < a, b, a)
+
+
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two values."""
+    return where(b > a, b, a)
+
+
+def finite(value: Any) -> Any:
+    """Whether a value is neither infinite nor NaN."""
+    return abs(value) < math.inf

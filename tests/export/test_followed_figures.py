@@ -1,0 +1,112 @@
+"""Figures of the whole drive, followed from the keys into statements, against the same figures asked anew."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_drives import random_drive, random_elastic_drive
+
+from actuator_lti import load_design
+from actuator_lti.design.access import parameter_value, stacked
+from actuator_lti.design.model import Design, FrictionPoint, Supply
+from actuator_lti.drive_figure import drive_figure
+from nonlinear.export.page import changes_figure, changes_row, figure_statements
+
+NAMES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_motion")
+
+
+def run(lines: Sequence[str], keys: Sequence[float]) -> float | None:
+    """Run statements in C as Python; None where a condition ends them."""
+    known = {"INFINITY": math.inf, "NAN": math.nan, "fabs": abs, "pow": math.pow, "k": list(keys)}
+    known |= {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "exp", "log", "tan")}
+    known["where"] = lambda condition, yes, no: yes if condition else no
+    for line in lines:
+        text = line.replace("&&", "and").replace("||", "or")
+        if made := re.fullmatch(r"const double (v\d+) = (.*);", text):
+            known[made[1]] = float(eval(made[2], {}, known))
+        elif kept := re.fullmatch(r"p\[0\] = (.*);", text):
+            return float(eval(kept[1], {}, known))
+        else:
+            condition = re.fullmatch(r"if \((!?)\((.*)\)\) \{ return 0; \}", text)
+            assert condition is not None, line
+            if bool(eval(condition[2], {}, known)) is (condition[1] == ""):
+                return None
+    raise AssertionError("no statement gives the figure")
+
+
+def drives() -> list[Design]:
+    rng = np.random.default_rng(20261122)
+    made = [random_drive(rng) for _ in range(12)] + [random_elastic_drive(rng) for _ in range(8)]
+    amber, fin = load_design("ilr33-amber"), load_design("fin")
+    points = tuple(
+        FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 3e-3), (40.0, 2e-3), (900.0, 9e-3))
+    )
+    one_way = replace(amber.friction, dry_torque_reverse_Nm=2.0 * amber.friction.dry_torque_Nm)
+    return [
+        *made,
+        fin,
+        replace(amber, friction=replace(amber.friction, points=points)),
+        replace(amber, friction=one_way),
+        replace(amber, supply=Supply(resistance_ohm=0.02)),
+        replace(amber, load=replace(amber.load, path="self-locking")),
+        load_design("emps"),
+        load_design("joint"),
+    ]
+
+
+def followed_keys(design: Design) -> dict[str, float]:
+    from actuator_lti.design.access import paths_of
+
+    paths = [
+        path
+        for path in paths_of(design)
+        if changes_row(design, path) and parameter_value(design, path) != 0.0
+    ]
+    return {path: parameter_value(design, path) for path in paths}
+
+
+def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -> list[float]:
+    """Every value over decades; the speeds of a friction map together, as their order is its structure."""
+    together = 10.0 ** rng.uniform(-spread, spread)
+    own = [10.0 ** rng.uniform(-spread, spread) for _ in keys]
+    return [
+        value * (together if path.startswith("friction.point") and path.endswith("speed") else factor)
+        for (path, value), factor in zip(keys.items(), own, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("place", range(len(drives())))
+def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
+    """Over a decade of every key at once the statements give what the drive asked anew gives."""
+    design = drives()[place]
+    rng = np.random.default_rng(place)
+    keys = followed_keys(design)
+    compared = 0
+    for name in NAMES:
+        if name == "motor_current" and not design.motor.has_electrical_dynamics:
+            continue
+        for load in (0.0, 0.3 * (design.load.moment_max_Nm or 5.0)):
+            lines = figure_statements(design, keys, name, load)
+            assert lines is not None
+            for spread in (0.0, 0.1, 0.5, 1.0):
+                values = scattered(keys, spread, rng)
+                got = run(lines, values)
+                wanted = float(
+                    drive_figure(stacked(design, dict(zip(keys, values, strict=True))), name, load)
+                )
+                assert got is not None
+                assert got == pytest.approx(wanted, rel=1e-12, nan_ok=True), (design.name, name, load)
+                compared += math.isfinite(wanted)
+    assert compared > 10
+
+
+def test_what_sets_a_figure_changes_it_and_nothing_else() -> None:
+    design = load_design("ilr33-amber")
+    assert changes_figure(design, "limits.speed", "output_rate", 0.0)
+    assert not changes_figure(design, "control.position.gain", "output_rate", 0.0)
+    assert not changes_figure(design, "motor.resistance", "lost_motion", 0.0)
