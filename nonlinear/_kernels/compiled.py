@@ -15,11 +15,13 @@ from typing import Any
 
 import numba
 
+from actuator_lti.drive import signals
+
 
 @cache
 def source_stamp() -> str:
-    """Digest of every Python file of this folder."""
-    digest = hashlib.sha256(numba.__version__.encode())
+    """Digest of every Python file of this folder, and of the limiters that its layout reads."""
+    digest = hashlib.sha256(f"{numba.__version__} {signals.LIMITERS} {signals.REST_BIT}".encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
