@@ -291,6 +291,9 @@ class Limits:
         example="30000 rev/s^2")] = inf
     peak_current_A: Annotated[float, positive(
         "peak_current", "A", "i_peak", "clamp of the current command", example="12 A")] = inf
+    current_rate_A_s: Annotated[float, positive(
+        "current_rate", "A/s", "", "largest change of the current command (torque slope)",
+        example="2000 A/s")] = inf
     continuous_current_A: Annotated[float, positive(
         "continuous_current", "A", "i_cont", "current allowed for ever (no clamp)", example="4 A")] = inf
     peak_time_s: Annotated[float | None, positive(

@@ -106,6 +106,7 @@ _LIMITERS = (
     ),
     Limiter("overload", "overload protection", "i", "rms", "continuous_current_A", 6),
     Limiter("profile", "profile of the command", "w_ref", "command", "", 7),
+    Limiter("current-rate", "slope limit of the current", "i_ref", "rate", "current_rate_A_s", 8),
 )
 LIMITERS = {limiter.name: limiter for limiter in _LIMITERS}
 """Every limiter, in the order of its flag bit."""
