@@ -142,21 +142,25 @@ class Place:
 
 def limiter_places(wired: Drive) -> list[Place]:
     """Every limiter that the wiring has, in the order of the registry."""
-    limits, result = wired.design.limits, {}
-    target = wired.target or {"voltage": "u"}
-    for stage, signal in target.items():
-        name, every = CLAMP_OF[signal], wired.interval.get(stage, 1)
-        limiter, unit = LIMITERS[name], wired.unit(signal)
-        result[name] = Place(limiter, signal, every, limiter.limit_of(limits), unit)
-        if stage == "velocity" and wired.filters("torque"):
-            first = LIMITERS["torque-command"]
-            result[first.name] = Place(first, "torque_command", every, limiter.limit_of(limits), unit)
-        if name == "speed":
-            change = LIMITERS["acceleration"]
-            result["acceleration"] = Place(change, signal, every, change.limit_of(limits), f"{unit}^2")
-    if limits.peak_time_s is not None and "current" in wired.stages:
-        result["overload"] = Place(LIMITERS["overload"], "i", 1, limits.continuous_current_A, "A")
-    return [result[name] for name in LIMITERS if name in result]
+    found = (_place(wired, limiter) for limiter in LIMITERS.values())
+    return [place for place in found if place is not None]
+
+
+def _place(wired: Drive, limiter: Limiter) -> Place | None:
+    """Where a limiter acts; None in a drive that has no such signal or limit."""
+    limits, signal, acting = wired.design.limits, limiter.signal, limiter
+    stages = {target: stage for stage, target in (wired.target or {"voltage": "u"}).items()}
+    if signal == "torque_command" and wired.filters("torque"):
+        stages[signal], acting = "velocity", CLAMP_OF[wired.target["velocity"]]
+    elif limiter.kind == "rms" and limits.peak_time_s is not None and "current" in wired.stages:
+        stages[signal] = "current"
+    if signal not in stages or limiter.kind == "command":
+        return None
+    limit = acting.limit_of(limits)
+    if not (limiter.always or np.any(np.isfinite(limit))):
+        return None
+    every = 1 if limiter.kind == "rms" else wired.interval.get(stages[signal], 1)
+    return Place(limiter, signal, every, limit, acting.unit(wired.design.axis))
 
 
 def limiter_paths(

@@ -82,7 +82,7 @@ def numba_seconds(row: np.ndarray, repeats: int) -> float:
 def room(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Arrays for a history."""
     ticks = int(row[at.TICKS])
-    return np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
+    return np.zeros((8, ticks)), np.zeros(ticks, np.uint16)
 
 
 def best_of(work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.thread_time) -> float:
@@ -167,7 +167,7 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
     rows.sine("command", np.radians(5.0), 1.0)
     row = rows.values[0]
     history = np.zeros((8 + at.ELASTIC_COLUMNS, int(row[at.TICKS])))
-    flags, out, shared = np.zeros(history.shape[1], np.uint8), np.zeros(at.OUT_SIZE), np.zeros(2)
+    flags, out, shared = np.zeros(history.shape[1], np.uint16), np.zeros(at.OUT_SIZE), np.zeros(2)
     taken = best_of(lambda: call(row, np.zeros(1), history, flags, out, shared), 2 if quick else 8)
     return Row(
         group=GROUP,
@@ -226,7 +226,7 @@ def constant_cost(quick: bool) -> Iterator[Row]:
     costs = []
     for ticks in (10**4, 10**6, 10**7 if quick else 10**8):
         row[at.TICKS] = ticks
-        history, flags, out = np.empty((0, 0)), np.empty(0, np.uint8), np.zeros(at.OUT_SIZE)
+        history, flags, out = np.empty((0, 0)), np.empty(0, np.uint16), np.zeros(at.OUT_SIZE)
         work = partial(call, row, np.zeros(1), history, flags, out, np.zeros(2))
         costs.append(best_of(work, 50 if ticks <= 10**6 else 1) / ticks)
     yield Row(

@@ -201,7 +201,7 @@ def _run_span(
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
     from nonlinear.native import call
 
-    history, flags = np.empty((0, 0)), np.empty(0, np.uint8)
+    history, flags = np.empty((0, 0)), np.empty(0, np.uint16)
     for r in range(start, stop):
         statuses[r] = call(rows[r], tables, history, flags, outs[r], shared)
 

@@ -116,7 +116,7 @@ def kernel_name() -> str:
 
 
 def call(
-    row: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint8], out: Floats, shared: Floats
+    row: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats, shared: Floats
 ) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
     opened = _running()

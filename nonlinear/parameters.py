@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.elastic import put_drive_train
@@ -301,10 +302,9 @@ def _instruments(design: Design, row: Floats) -> None:
 
 def _limits(design: Design, row: Floats, limits_on: bool) -> None:
     limits = design.limits
-    values = (limits.speed_rad_s, limits.acceleration_rad_s2, limits.peak_current_A, limits.voltage_V)
-    places = (at.SPEED_LIMIT, at.ACCELERATION_LIMIT, at.CURRENT_LIMIT, at.VOLTAGE_LIMIT)
-    for place, value in zip(places, values, strict=True):
-        row[place] = value if limits_on else inf
+    for name, limiter in LIMITERS.items():
+        if limiter.limit and limiter.kind != "rms":
+            row[at.LIMIT[name]] = limiter.limit_of(limits) if limits_on else inf
     if not limits_on:
         row[at.SUPPLY] = 0.0
         return

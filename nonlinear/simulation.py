@@ -168,7 +168,7 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     if 8 * rows * columns > HISTORY_BYTES.most:
         message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
         raise InputError(f"{message}; use record_every, or simulate_many with reducers")
-    history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint8)
+    history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint16)
     out = np.zeros(at.OUT_SIZE)
     status = _call(row, tables, history, flags, out, progress)
     done = (int(out[at.OUT_TICKS]) + every - 1) // every

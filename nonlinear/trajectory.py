@@ -148,7 +148,7 @@ class Trajectory:
 
     Attributes
     ----------
-    limit_flags : ndarray of uint8
+    limit_flags : ndarray of uint16
         Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32
         limit in front of the torque filters, 64 overload protection, 128 profile of the command.
     limits : mapping
@@ -182,7 +182,7 @@ class Trajectory:
     voltage_V: Floats
     current_command_A: Floats
     speed_command_rad_s: Floats
-    limit_flags: npt.NDArray[np.uint8]
+    limit_flags: npt.NDArray[np.uint16]
     limits: Mapping[str, LimitUse]
     events: int
     events_per_tick: int
@@ -224,7 +224,7 @@ class Trajectory:
     @property
     def limited(self) -> npt.NDArray[np.bool_]:
         """Rows in which any limiter acts."""
-        return (self.limit_flags & ~np.uint8(at.FLAG_STICK)) != 0
+        return (self.limit_flags & ~np.uint16(at.FLAG_STICK)) != 0
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Axis, Design
+from actuator_lti.drive.signals import LIMITERS
 from nonlinear._kernels import layout as at
 from nonlinear.trajectory import Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
 Floats = npt.NDArray[np.float64]
-# in the order of ``layout.LIMITERS``: name, place of the limit, unit
-LIMITERS_OF_A_ROW = (
-    ("speed", at.SPEED_LIMIT, "rad/s"),
-    ("acceleration", at.ACCELERATION_LIMIT, "rad/s2"),
-    ("current", at.CURRENT_LIMIT, "A"),
-    ("voltage", at.VOLTAGE_LIMIT, "V"),
-    ("torque-command", at.CURRENT_LIMIT, "A"),
-    ("overload", at.CONTINUOUS_CURRENT, "A"),
-    ("profile", at.PROFILE_RATE, "rad/s"),
-)
-ALWAYS = 4  # named in every run, even where the drive has no such limit
-PRESENT = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
+SWITCHES = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
 
 
 def wrap(
-    design: Design, row: Floats, history: Floats, flags: npt.NDArray[np.uint8], out: Floats, status: Status,
+    design: Design, row: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats, status: Status,
     probing: list[str], digest: str,
 ) -> Trajectory:  # fmt: skip
     """Name the columns and the results of one run."""
@@ -63,16 +55,19 @@ def wrap(
     )
 
 
-def limit_uses(row: Floats, out: Floats, axis: str = "rotary") -> dict[str, LimitUse]:
+def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, LimitUse]:
     """How long each limiter of the drive acted."""
     uses = {}
-    for k, (name, place, unit) in enumerate(LIMITERS_OF_A_ROW):
-        if k >= ALWAYS and not row[PRESENT[name]]:
+    for k, (name, limiter) in enumerate(LIMITERS.items()):
+        limit, unit = float(row[at.LIMIT[name]]), limiter.unit(axis)
+        if limiter.signal == "torque_command" and not row[at.HAS_CURRENT]:
+            limit, unit = float(row[at.VOLTAGE_LIMIT]), "V"
+        if not (row[SWITCHES[name]] if name in SWITCHES else limiter.always or limit < inf):
             continue
         first = out[at.OUT_LIMIT_FIRST + k]
         uses[name] = LimitUse(
-            limit=float(row[place]),
-            unit=unit.replace("rad", "m") if axis == "linear" else unit,
+            limit=limit,
+            unit=unit,
             fraction=float(out[at.OUT_LIMIT_TICKS + k] / max(out[at.OUT_TICKS], 1.0)),
             first_time_s=None if first < 0 else float(first * row[at.PERIOD]),
         )

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from actuator_lti.design.model import Axis, Design
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
 
+Axis = Literal["rotary", "linear"]
 Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text"]
 
 BIG = 1e12
@@ -43,9 +45,9 @@ class Field:
     """
 
     path: str
-    attribute: str
     kind: Kind
     description: str
+    attribute: str = ""
     unit_template: str = "1"
     symbol: str = ""
     low: float = -inf
@@ -104,3 +106,50 @@ class Field:
     def accepts(self, value: float) -> bool:
         """Whether an SI value lies in the allowed range; NaN does not."""
         return (self.low < value if self.low_open else self.low <= value) and value <= self.high
+
+
+# --- a part of a design declares a key so: ``name: Annotated[type, positive(key, unit, symbol, words)]`` ---
+def quantity(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
+    """Any finite number; ``low``, ``high``, ``example`` besides."""
+    settings = {"low": -BIG, "high": BIG, **more}
+    return Field(path=key, kind="quantity", unit_template=unit, symbol=symbol, description=words, **settings)
+
+
+def positive(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
+    """A number above 0."""
+    return quantity(key, unit, symbol, words, **{"low": SMALL, **more})
+
+
+def not_negative(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
+    """A number of at least 0."""
+    return quantity(key, unit, symbol, words, **{"low": 0.0, **more})
+
+
+def degrees(key: str, words: str, example: str) -> Field:
+    """A temperature."""
+    return quantity(key, "degC", "", words, low=-273.15, high=1000.0, example=example)
+
+
+def quantities(key: str, unit: str, words: str, **more: Any) -> Field:
+    """A list of numbers."""
+    return Field(path=key, kind="quantities", unit_template=unit, description=words, **more)
+
+
+def integer(key: str, high: int, symbol: str, words: str, low: int = 1) -> Field:
+    """A whole number."""
+    return Field(path=key, kind="integer", symbol=symbol, description=words, low=low, high=high)
+
+
+def choice(key: str, words: str, choices: tuple[str, ...] = ()) -> Field:
+    """One of some words: those of the attribute's type, or fewer."""
+    return Field(path=key, kind="choice", choices=choices, description=words)
+
+
+def flag(key: str, words: str) -> Field:
+    """True or false."""
+    return Field(path=key, kind="flag", description=words)
+
+
+def text(words: str) -> Field:
+    """Any text; the key is the attribute's name."""
+    return Field(path="", kind="text", description=words)

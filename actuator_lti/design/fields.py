@@ -2,13 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import MISSING, fields, replace
 from functools import cache
+from typing import get_args
 
 from actuator_lti.design.field import Field, Structure
-from actuator_lti.design.field_table import ALL_FIELDS
-from actuator_lti.design.sections import template_of
+from actuator_lti.design.model import Design
+from actuator_lti.design.sections import SECTIONS, template_of
 
-__all__ = ["FIELDS", "Field", "Structure", "field_of", "fields_in"]
+__all__ = ["ALL_FIELDS", "FIELDS", "Field", "Structure", "field_of", "fields_in"]
+
+
+def _declared(kind: type, template: str) -> Iterator[Field]:
+    """The keys that a part of a design declares beside its attributes."""
+    for item in fields(kind):
+        annotated, *declared = get_args(item.type)[:2] if hasattr(item.type, "__metadata__") else (None,)
+        for field in declared:
+            yield replace(
+                field,
+                path=f"{template}.{field.path or item.name}",
+                attribute=item.name,
+                required=item.default is MISSING and item.default_factory is MISSING,
+                choices=field.choices or (get_args(annotated) if field.kind == "choice" else ()),
+            )
+
+
+ALL_FIELDS: tuple[Field, ...] = (
+    *_declared(Design, "design"),
+    *(field for section in SECTIONS for field in _declared(section.kind, section.template)),
+)
+"""Every key, in the order of a design file."""
 
 FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
 """Every key of a design file by its dotted path; repeated tables stand under ``*`` (``gear.*``)."""

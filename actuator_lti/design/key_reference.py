@@ -7,7 +7,7 @@ from math import inf
 from typing import Any
 
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.field_table import ALL_FIELDS
+from actuator_lti.design.fields import ALL_FIELDS
 from actuator_lti.design.model import Axis
 from actuator_lti.design.sections import SECTIONS
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from actuator_lti.design.model import Axis, Limits
 
-Kind = Literal["value", "rate", "rms"]
+Kind = Literal["value", "rate", "rms", "command"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ _SIGNALS = (
     Signal("output", "output angle", "rad", "m"),
     Signal("moment", "moment on the output shaft", "N m", "N"),
     Signal("w_cmd", "speed command before its limits", "rad/s", "m/s"),
+    Signal("torque_command", "velocity controller's output", "A"),
     Signal("w_meas", "measured speed", "rad/s", "m/s"),
     Signal("e_i", "current error", "A"),
     Signal("e_w", "speed error", "rad/s", "m/s"),
@@ -55,35 +56,60 @@ class Limiter:
     ----------
     name : str
     words : str
+    signal : str
+        What stands in front of it, of `SIGNALS`.
+    kind : {"value", "rate", "rms", "command"}
+        A clamp of the signal, of its change per update, or of its mean square in the long run; or no limit of
+        a loop but what the drive makes of its command.
     limit : str
         Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's
-        target.
-    kind : {"value", "rate", "rms"}
-        A clamp of the signal, of its change per update, or of its mean square in the long run.
+        target, and for the command.
     bit : int
-        Of the limit flags that a run writes (bit 4 says that the rotor is at rest).
+        Of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest).
+    always : bool
+        Whether every drive that has the signal is told of it, also where it has no such limit.
     """
 
     name: str
     words: str
-    limit: str
+    signal: str
     kind: Kind
+    limit: str
     bit: int
+    always: bool = False
 
     def limit_of(self, limits: Limits) -> Any:
         """Its value in a design; ``inf`` where there is none."""
         return getattr(limits, self.limit)
 
+    def unit(self, axis: Axis = "rotary") -> str:
+        """Unit of the limit on an axis."""
+        unit = SIGNALS[self.signal].unit_for(axis)
+        if self.kind != "rate":
+            return unit
+        return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
+
 
 _LIMITERS = (
-    Limiter("speed", "speed limit", "speed_rad_s", "value", 0),
-    Limiter("acceleration", "acceleration limit", "acceleration_rad_s2", "rate", 1),
-    Limiter("current", "current limit", "peak_current_A", "value", 2),
-    Limiter("voltage", "voltage limit", "voltage_V", "value", 3),
-    Limiter("torque-command", "limit in front of the torque filters", "", "value", 5),
-    Limiter("overload", "overload protection", "continuous_current_A", "rms", 6),
+    Limiter("speed", "speed limit", "w_ref", "value", "speed_rad_s", 0, always=True),
+    Limiter("acceleration", "acceleration limit", "w_ref", "rate", "acceleration_rad_s2", 1, always=True),
+    Limiter("current", "current limit", "i_ref", "value", "peak_current_A", 2, always=True),
+    Limiter("voltage", "voltage limit", "u", "value", "voltage_V", 3, always=True),
+    Limiter(
+        "torque-command",
+        "limit in front of the torque filters",
+        "torque_command",
+        "value",
+        "",
+        5,
+        always=True,
+    ),
+    Limiter("overload", "overload protection", "i", "rms", "continuous_current_A", 6),
+    Limiter("profile", "profile of the command", "w_ref", "command", "", 7),
+    Limiter("current-rate", "slope limit of the current", "i_ref", "rate", "current_rate_A_s", 8),
 )
 LIMITERS = {limiter.name: limiter for limiter in _LIMITERS}
 """Every limiter, in the order of its flag bit."""
-CLAMP_OF = {"w_ref": "speed", "i_ref": "current", "u": "voltage"}
+CLAMP_OF = {limiter.signal: limiter for limiter in _LIMITERS if limiter.kind == "value"}
 """The clamp of each signal that a stage drives."""
+REST_BIT = 4

@@ -37,15 +37,24 @@ def sampled_limiters(wired: Drive) -> dict[str, LimiterPath]:
             z = np.exp(1j * omega * period)
             x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, [0]], (len(z), n, 1)))
             values = table[:, :n] @ x[:, :, 0].T + table[:, [n]]
-            return values * (-np.expm1(-1j * omega * period) / period) if rate else values
+            return _changes(values, omega * period) / (every * wired.tick_s) if rate else values
 
         return response
 
     return limiter_paths(wired, evaluate, np.pi / period)
 
 
+def _changes(values: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Change of each update's value from that before it; the last one before the first is a turn older."""
+    if len(values) == 1:
+        return values * -np.expm1(-1j * turn)
+    before = np.roll(values, 1, axis=0)
+    before[0] *= np.exp(-1j * turn)
+    return values - before
+
+
 def continuous_limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:
-    """With exact delays, or ideal; the change of the speed command is taken as its derivative."""
+    """With exact delays, or ideal; the change of a command is taken as its derivative."""
     from actuator_lti.loops.continuous import systems  # with it python-control
 
     flow = FlowProgram(wired, wired.outermost, None, (), delays).flow()

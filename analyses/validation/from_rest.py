@@ -9,25 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.signals import LIMITERS
 from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.conditional import step_rows
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading, first_fall
-from nonlinear import LIMITERS
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 STEP_PERCENT = 5e-3  # of a step: its end may be so far from the target, as the run is as long as it settles
-LIMIT_NAMES = {
-    "speed": "speed limit",
-    "acceleration": "acceleration limit",
-    "current": "peak current",
-    "voltage": "voltage limit",
-    "torque-command": "limit in front of the torque filters",
-    "overload": "overload protection",
-    "profile": "profile of the command",
-}
 
 
 @dataclass(frozen=True)
@@ -61,7 +52,7 @@ def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
 def _reason(design: Design, result: BatchResult, k: int) -> str:
     """What took part in a run that the linear loop does not know of."""
     shares = {name: 100.0 * float(result.limit_fraction(name)[k]) for name in LIMITERS}
-    words = [f"{LIMIT_NAMES[name]} {share:.2g} %" for name, share in shares.items() if share > 0.0]
+    words = [f"{LIMITERS[name].words} {share:.2g} %" for name, share in shares.items() if share > 0.0]
     if result.events[k] == 0 and result.stick_fraction[k] > 0.99:
         return "no motion: dry friction holds the rotor"
     return ", ".join([*words, *nonlinear_parts(design)])
@@ -132,7 +123,7 @@ def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep) -> li
     if band is None:
         return []
     gain, phase = np.abs(sweep.measured), np.degrees(np.unwrap(np.angle(sweep.measured)))
-    acting = next((LIMIT_NAMES[name] for name in sweep.limiter if name), "")
+    acting = next((LIMITERS[name].words for name in sweep.limiter if name), "")
     parts = nonlinear_parts(design)
     if not np.isfinite(sweep.described).any() and bool((sweep.stick_fraction > 0.0).any()):
         parts = ["dry friction holds the rotor"]

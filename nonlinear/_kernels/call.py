@@ -45,7 +45,7 @@ def call(
     row: Floats,
     tables: Floats,
     history: Floats,
-    flags: npt.NDArray[np.uint8],
+    flags: npt.NDArray[np.uint16],
     out: Floats,
     shared: Floats,
 ) -> int:

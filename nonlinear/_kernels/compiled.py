@@ -14,14 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.compiled_late import CompiledLate
+from actuator_lti.drive import signals
 
 
 @cache
 def source_stamp() -> str:
-    """Digest of every Python file of this folder."""
+    """Digest of every Python file of this folder, and of the limiters that its layout reads."""
     import numba
 
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{numba.__version__} {signals.LIMITERS} {signals.REST_BIT}".encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()

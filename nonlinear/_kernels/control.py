@@ -16,6 +16,7 @@ from nonlinear._kernels.position import (
     put_current,
     put_outer,
     put_voltage,
+    sloped,
 )
 from nonlinear._kernels.probes import PROBE_Y
 from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
@@ -76,6 +77,9 @@ def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
     limit = s[layout.S_CURRENT_LIMIT] if cascaded else s[layout.S_VOLTAGE_LIMIT]
     if p[layout.RARE_VELOCITY] > 0.0:
         out = torque_path(p, s, e, limit)
+        if cascaded:
+            out, flag = sloped(p, s, out, p[layout.VELOCITY_PERIOD])
+            s[layout.S_FLAGS_VELOCITY] += flag
     else:
         step = p[layout.VELOCITY_INTEGRAL]
         out, integral, hit = pi(e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], step, limit)

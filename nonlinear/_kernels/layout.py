@@ -11,6 +11,8 @@ units are SI, motor side.
 
 from __future__ import annotations
 
+from actuator_lti.drive import signals
+
 # --- parameters of one run -------------------------------------------------------------------------
 (
     TICKS,  # number of ticks n; rows k = 0 .. n-1 are sampled at t_k = k Ts
@@ -173,7 +175,28 @@ TORQUE_CHAIN = SPEED_CHAIN + MAX_SECTIONS * SECTION
 MAX_POINTS = 16  # per side
 MAP = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # points (|w|, T) for w > 0, then for w < 0
 
-SIZE = MAP + 4 * MAX_POINTS  # what describes a run; what follows is derived from it
+# --- limiters: place of the limit, bit in the flags; those without a name above have their places here -----
+LIMITERS = tuple(signals.LIMITERS)
+LIMITS = MAP + 4 * MAX_POINTS
+LIMIT = {
+    "speed": SPEED_LIMIT,
+    "acceleration": ACCELERATION_LIMIT,
+    "current": CURRENT_LIMIT,
+    "voltage": VOLTAGE_LIMIT,
+    "torque-command": CURRENT_LIMIT,
+    "overload": CONTINUOUS_CURRENT,
+    "profile": PROFILE_RATE,
+}
+_NAMED = len(LIMIT)
+LIMIT |= {name: LIMITS + k for k, name in enumerate(name for name in LIMITERS if name not in LIMIT)}
+FLAG = {name: 1 << limiter.bit for name, limiter in signals.LIMITERS.items()}
+FLAG_SPEED, FLAG_ACCELERATION, FLAG_CURRENT = FLAG["speed"], FLAG["acceleration"], FLAG["current"]
+FLAG_VOLTAGE, FLAG_TORQUE_COMMAND = FLAG["voltage"], FLAG["torque-command"]
+FLAG_OVERLOAD, FLAG_PROFILE, FLAG_STICK = FLAG["overload"], FLAG["profile"], 1 << signals.REST_BIT
+LIMITER_BITS = tuple(FLAG.values())
+LIMITER_COUNT = len(LIMITERS)
+
+SIZE = LIMITS + LIMITER_COUNT - _NAMED  # what describes a run; what follows is derived from it
 
 # --- derived: one transition x+ = A x + b u + c T with x = (i, w, th), and one direction of slip ----------
 A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
@@ -382,14 +405,6 @@ ALL_SIGNALS = 15
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 ELASTIC_COLUMNS = 3
-
-# --- limiters: name, and its bit in the flags ---------------------------------------------------------
-LIMITERS = ("speed", "acceleration", "current", "voltage", "torque-command", "overload", "profile")
-FLAG_SPEED, FLAG_ACCELERATION, FLAG_CURRENT, FLAG_VOLTAGE = 1, 2, 4, 8
-FLAG_STICK = 16
-FLAG_TORQUE_COMMAND, FLAG_OVERLOAD, FLAG_PROFILE = 32, 64, 128
-LIMITER_BITS = (1, 2, 4, 8, 32, 64, 128)
-LIMITER_COUNT = 7
 
 # --- results of one run ----------------------------------------------------------------------------
 (

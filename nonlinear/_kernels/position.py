@@ -9,7 +9,18 @@ from nonlinear._kernels.estimate import counted
 from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y, probe
 from nonlinear._kernels.regulator import clamp
 
+CURRENT_RATE, FLAG_CURRENT_RATE = layout.LIMIT["current-rate"], float(layout.FLAG["current-rate"])
 STANDING = 1e-13  # change of the reference, relative, below which it stands still but for rounding
+
+
+@inlined
+def sloped(p, s, v, T):  # type: ignore[no-untyped-def]
+    """What the slope limit leaves of a current command that is updated every T, and its flag."""
+    change = v - s[layout.S_CURRENT_BEFORE]
+    allowed = clamp(change, p[CURRENT_RATE] * T)
+    if allowed == change:
+        return v, 0.0
+    return s[layout.S_CURRENT_BEFORE] + allowed, FLAG_CURRENT_RATE
 
 
 @inlined
@@ -24,8 +35,9 @@ def limited(p, s, v):  # type: ignore[no-untyped-def]
             return target, flags
         return s[layout.S_SPEED_COMMAND] + allowed, flags + float(layout.FLAG_ACCELERATION)
     if p[layout.HAS_CURRENT] > 0.0:
-        out = clamp(v, s[layout.S_CURRENT_LIMIT])
-        return out, 0.0 if out == v else float(layout.FLAG_CURRENT)
+        target = clamp(v, s[layout.S_CURRENT_LIMIT])
+        out, flags = sloped(p, s, target, p[layout.POSITION_PERIOD])
+        return out, flags if target == v else flags + float(layout.FLAG_CURRENT)
     out = clamp(v, s[layout.S_VOLTAGE_LIMIT])
     return out, 0.0 if out == v else float(layout.FLAG_VOLTAGE)
 

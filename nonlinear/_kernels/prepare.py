@@ -75,6 +75,9 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
     more = any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED)
     more = max(more, any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE))
     p[layout.RARE_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
+    for j in range(layout.LIMITS, layout.SIZE):
+        if p[j] < math.inf:
+            p[layout.RARE_VELOCITY] = 1.0
     more = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY), p[layout.OVERLOAD])
     p[layout.RARE_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))

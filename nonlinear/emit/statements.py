@@ -62,7 +62,7 @@ class Statements:
             if self._is_bytes(target):
                 if kind != "int":
                     raise self.function.error(target, f"a {kind} stored in a row of small whole numbers")
-                self._put(f"{self.expressions.element(target)} = (unsigned char){text};")
+                self._put(f"{self.expressions.element(target)} = (unsigned short){text};")
                 return
             text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
             self._put(f"{self.expressions.element(target)} = {text};")

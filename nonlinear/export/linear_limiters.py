@@ -31,6 +31,7 @@ from nonlinear.export.linear_row import at_rest, linear_row
 
 MOST_TICKS = 16  # between two commands
 SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
+SIGNALS = ("w_ref", "i_ref", "u")
 SEEN = 3
 
 
@@ -179,20 +180,60 @@ def states_at(n, a, b, x, work, state):
 
 
 @emitted
-def limiter_sizes(n, a, b, seen, every, count, xs, sizes, work, state):
+def signal_interval(q, signal, every):
+    """Ticks between two updates of a signal in front of a limiter."""
+    if signal == VOLTAGE:
+        return 1
+    if signal == CURRENT_COMMAND and q[layout.HAS_VELOCITY] > 0.0:
+        return int(q[layout.EVERY_VELOCITY])
+    return every
+
+
+@emitted
+def seen_at(n, seen, signal, k, state):
+    """A signal in front of a limiter at tick k, as a pair."""
+    at = (k * SEEN + signal) * (MOST + 1)
+    real, imaginary = seen[at + MOST], 0.0
+    for i in range(n):
+        real += seen[at + i] * state[2 * i]
+        imaginary += seen[at + i] * state[2 * i + 1]
+    return real, imaginary
+
+
+@emitted
+def largest_change(n, seen, signal, every, step, x, state):
+    """Largest change from one update to the next; the last one before the first is a turn older."""
+    largest = 0.0
+    real, imaginary = seen_at(n, seen, signal, every - step, state)
+    if step == every:
+        return 2.0 * abs(math.sin(0.5 * x)) * math.hypot(real, imaginary)
+    before_r = real * math.cos(x) + imaginary * math.sin(x)
+    before_i = imaginary * math.cos(x) - real * math.sin(x)
+    k = 0
+    while k < every:
+        real, imaginary = seen_at(n, seen, signal, k, state)
+        largest = max(largest, math.hypot(real - before_r, imaginary - before_i))
+        before_r, before_i = real, imaginary
+        k += step
+    return largest
+
+
+@emitted
+def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
     """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
 
-    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal.
+    At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal,
+    then one for the rate of each, its change from update to update per second.
     """
     for g in range(count):
         states_at(n, a, b, xs[g], work, state)
         for signal in range(SEEN):
-            largest = 0.0
-            for k in range(1 if signal == SPEED else every):
-                at = (k * SEEN + signal) * (MOST + 1)
-                real, imaginary = seen[at + MOST], 0.0
-                for i in range(n):
-                    real += seen[at + i] * state[2 * i]
-                    imaginary += seen[at + i] * state[2 * i + 1]
+            largest, step = 0.0, signal_interval(q, signal, every)
+            k = 0
+            while k < every:
+                real, imaginary = seen_at(n, seen, signal, k, state)
                 largest = max(largest, math.hypot(real, imaginary))
+                k += step
             sizes[signal * count + g] = largest
+            change = largest_change(n, seen, signal, every, step, xs[g], state)
+            sizes[(SEEN + signal) * count + g] = change / (step * q[layout.PERIOD])

@@ -26,9 +26,10 @@ CLEARED = np.array([
     layout.HALF_PLAY, layout.LOAD_DRY, layout.LOAD_OFFSET, layout.TWIST_START, layout.LOAD_SPEED_START,
     layout.MAP_COUNT, layout.MAP_COUNT_REVERSE,
 ])  # fmt: skip
-UNLIMITED = np.array(
-    [layout.SPEED_LIMIT, layout.ACCELERATION_LIMIT, layout.CURRENT_LIMIT, layout.VOLTAGE_LIMIT]
-)
+UNLIMITED = np.array([
+    place for name, place in layout.LIMIT.items()
+    if name not in ("overload", "profile")  # switched off above
+])  # fmt: skip
 
 
 @emitted

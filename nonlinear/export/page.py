@@ -7,9 +7,13 @@ from typing import Any
 
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design
+from actuator_lti.drive.signals import Limiter
+from actuator_lti.drive.wiring import wire
 from actuator_lti.drive_figure import drive_figure
+from actuator_lti.limiters import limiter_places
 from nonlinear._kernels import layout as at
 from nonlinear.emit.kinds import c_float
+from nonlinear.export.linear_limiters import SIGNALS as SEEN
 from nonlinear.export.trace import Tape, Traced, used_statements
 from nonlinear.parameters import design_row
 
@@ -19,9 +23,20 @@ PLACES = {
     "stick": at.FLAG_STICK,
 }  # fmt: skip
 EVERY_POSITION, EVERY_VELOCITY = at.EVERY_POSITION, at.EVERY_VELOCITY
-SPEED_LIMIT, ACCELERATION_LIMIT = at.SPEED_LIMIT, at.ACCELERATION_LIMIT
-CURRENT_LIMIT, VOLTAGE_LIMIT = at.CURRENT_LIMIT, at.VOLTAGE_LIMIT
 LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in the flags
+
+
+def line_of(limiter: Limiter) -> int | None:
+    """The line of `linear_limiters.limiter_sizes` in front of a limiter; None where there is none."""
+    if limiter.signal not in SEEN or limiter.kind not in ("value", "rate"):
+        return None
+    return SEEN.index(limiter.signal) + (len(SEEN) if limiter.kind == "rate" else 0)
+
+
+def limits_seen(design: Design) -> list[tuple[str, int, int]]:
+    """Words, place of the limit in the row and line of `limiter_sizes`, of each limiter of a drive."""
+    lines = [(place.limiter, line_of(place.limiter)) for place in limiter_places(wire(design))]
+    return [(item.words, at.LIMIT[item.name], line) for item, line in lines if line is not None]
 
 
 def changes_row(design: Design, path: str) -> bool | None:

@@ -9,6 +9,7 @@ import inspect
 import re
 from functools import cache
 
+from actuator_lti.drive.signals import LIMITERS
 from nonlinear._kernels import layout as at
 
 _LINE = re.compile(r"^\s*(?P<names>[A-Z][A-Z_0-9]*)(?P<end>,| =[^#]*)\s*(?:#\s*(?P<words>.*))?$")
@@ -79,10 +80,16 @@ def place_words() -> dict[int, str]:
     for k in range(4):
         begin = at.PROBES + k * at.PROBE_SIZE
         table |= {begin + j: f"probe at {at.POINTS[k]}, {j}" for j in range(at.PROBE_SIZE)}
-    ends = (at.SPEED_CHAIN, at.TORQUE_CHAIN, at.SIZE)
+    ends = (at.SPEED_CHAIN, at.TORQUE_CHAIN, at.MAP)
     chains = ((at.COMMAND_CHAIN, "command"), (at.SPEED_CHAIN, "speed"), (at.TORQUE_CHAIN, "torque"))
     for (begin, what), end in zip(chains, ends, strict=True):
         for place in range(begin, end):
             section, number = divmod(place - begin, at.SECTION)
             table[place] = f"{what} filter {section + 1}, {('b0', 'b1', 'b2', 'a1', 'a2')[number]}"
+    for place in range(at.MAP, at.LIMITS):
+        point, number = divmod(place - at.MAP, 2)
+        table[place] = f"friction map, {('speed', 'torque')[number]} {point + 1}"
+    for name, limiter in LIMITERS.items():
+        if at.LIMIT[name] >= at.LIMITS:
+            table[at.LIMIT[name]] = f"{limiter.words} [{limiter.unit()}]"
     return table

@@ -23,7 +23,7 @@ def run_sources() -> dict[str, str]:
     emitted = emit_c(kinds)
     parts = [
         "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n",
-        "typedef struct { unsigned char *at; int length; } drive_bytes;",
+        "typedef struct { unsigned short *at; int length; } drive_bytes;",
         emitted.constants_text(),
         *helpers_of(emitted.functions),
         emitted.types,

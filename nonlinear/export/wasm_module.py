@@ -43,7 +43,7 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear_figures.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
     linear_figures.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
     linear_limiters.limiters_assembled: (_ROW,) * 9,
-    linear_limiters.limiter_sizes: ("int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
+    linear_limiters.limiter_sizes: (_ROW, "int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
     linear_limiters.outer_interval: (_ROW,),
     linear_figures.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     linear_trust.rounding_decides: ("int", *(_ROW,) * 9),

@@ -8,33 +8,17 @@ from typing import Any, TypedDict
 
 import numpy as np
 
+from actuator_lti.drive.signals import LIMITERS
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
 
-COLOURS = {
-    "friction": style.BROWN,
-    "stiction": style.PURPLE,
-    "speed": style.BLUE,
-    "acceleration": style.ORANGE,
-    "current": style.GREEN,
-    "voltage": style.RED,
-    "torque-command": style.SKY,
-    "overload": style.INK,
-    "profile": style.MUTED,
-}
-LIMITERS = [name for name in COLOURS if name not in ("friction", "stiction")]
+PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
-WORDS = {
-    "friction": "dry friction",
-    "stiction": "stiction",
-    "speed": "speed limit",
-    "acceleration": "acceleration limit",
-    "current": "current limit",
-    "voltage": "voltage limit",
-    "torque-command": "limit in front of the torque filters",
-    "overload": "overload protection",
-    "profile": "profile of the command",
-    "none": "linear",
+COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE} | {
+    name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()
+}
+WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"} | {
+    name: limiter.words for name, limiter in LIMITERS.items()
 }
 GLYPHS: dict[str, dict[str, Any]] = {
     "triangle": {"marker": "^", "size": 5.0},

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.drive.signals import LIMITERS
+from nonlinear.export.page import line_of
 from reports.charts.svg import page_svg
 from reports.figures import style
 from reports.figures.style import Chart, Panel
@@ -11,7 +13,7 @@ from reports.figures.style import Chart, Panel
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 FRAME = 1.6
-BORDERS = ("speed limit", "acceleration limit", "peak current", "voltage")
+BORDERS = tuple(limiter.words for limiter in LIMITERS.values() if line_of(limiter) is not None)
 
 
 def live_charts(unit: str) -> dict[str, str]:

@@ -11,9 +11,10 @@ from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
-from nonlinear.export import linear, linear_limiters, page
+from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
 from reports.figures.map import WORDS
+from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
 
@@ -57,7 +58,8 @@ def live_model(design: Design) -> dict[str, Any]:
         "requirements": [*_on_loops(design), *_on_drive(design, result.figures)],
         "apart": _apart(design, result.figures),
         "step": _step(design),
-        "limits": _limits(design),
+        "limits": [list(limit) for limit in page.limits_seen(design)],
+        "borders": list(BORDERS),
         "map": _map(design),
         "text": text,
         "patches": places,
@@ -171,18 +173,5 @@ def _map(design: Design) -> dict[str, Any] | None:
         "decibel": FRICTION_DB,
         "degrees": FRICTION_DEG,
         "words": WORDS,
+        "colours": COLOURS,
     }
-
-
-def _limits(design: Design) -> list[list[Any]]:
-    """Give label, place in the row, signal in front of it and whether its rate counts, of each limiter."""
-    control = design.controller
-    rated = bool(control.position and control.velocity)
-    known: list[tuple[str, int, int, bool, bool]] = [
-        ("speed limit", page.SPEED_LIMIT, linear_limiters.SPEED, False, rated),
-        ("acceleration limit", page.ACCELERATION_LIMIT, linear_limiters.SPEED, True, rated),
-        ("peak current", page.CURRENT_LIMIT, linear_limiters.CURRENT_COMMAND, False,
-         control.current is not None and control.outermost != "current"),
-        ("voltage", page.VOLTAGE_LIMIT, linear_limiters.VOLTAGE, False, True),
-    ]  # fmt: skip
-    return [[label, place, signal, rate] for label, place, signal, rate, there in known if there]

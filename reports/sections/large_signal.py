@@ -11,7 +11,7 @@ from reports import document as doc
 from reports.document import abscissa, rounded
 from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.findings import Finding
-from reports.sections.limits import NAMES
+from reports.sections.limits import words_of
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -151,7 +151,7 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         if check is not None and np.isfinite(check.simulated_rad).any()
     ]
     onset: list[map_figure.Onset] = [
-        {"name": name, "label": NAMES[name], "amplitude": rounded(scale * np.asarray(values), 4)}
+        {"name": name, "label": words_of(name), "amplitude": rounded(scale * np.asarray(values), 4)}
         for name, values in shown.onset_rad.items()
         if np.isfinite(values).any()
     ]
@@ -208,8 +208,8 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
             "predicted": scale * border.predicted_rad[k],
             "simulated": scale * border.simulated_rad[k],
             "error": 100.0 * (border.ratio[k] - 1.0),
-            "limiter": NAMES.get(border.predicted_limiter[k], "none"),
-            "acts": NAMES.get(border.simulated_limiter[k], "none"),
+            "limiter": words_of(border.predicted_limiter[k]),
+            "acts": words_of(border.simulated_limiter[k]),
         }
         if shifted is not None:
             row["shift"] = 100.0 * (shifted.ratio[k] - 1.0)

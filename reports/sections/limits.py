@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.limiters import Onset
 from reports import document as doc
 from reports.document import abscissa, rounded
@@ -19,22 +20,12 @@ from reports.sections.names import hertz
 if TYPE_CHECKING:
     from reports.figures import onset as onset_figure
 
-NAMES = {
-    "speed": "speed limit",
-    "acceleration": "acceleration limit",
-    "current": "peak current",
-    "voltage": "voltage",
-    "torque-command": "limit in front of the torque filters",
-    "overload": "overload protection",
-    "profile": "profile of the command",
-}
-
 
 def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
     scale, unit = (1.0, "m") if design.axis == "linear" else (math.degrees(1.0), "deg")
     series: list[onset_figure.Series] = [
-        {"label": NAMES.get(name, name), "amplitude": rounded(scale * np.asarray(values), 4)}
+        {"label": LIMITERS[name].words, "amplitude": rounded(scale * np.asarray(values), 4)}
         for name, values in border.each_rad.items()
         if np.isfinite(values).any()
     ]
@@ -80,6 +71,11 @@ def _noun(limiter: str) -> str:
     return limiter if limiter.endswith("limit") else f"{limiter} limit"
 
 
+def words_of(limiter: str) -> str:
+    """Say which limiter acts, by its name; ``""`` is none."""
+    return LIMITERS[limiter].words if limiter else "none"
+
+
 class _Linear(TypedDict):
     """Up to which frequency one command amplitude passes unlimited."""
 
@@ -101,7 +97,7 @@ def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
                 "amplitude": amplitude * scale,
                 "fraction": 100.0 * fraction,
                 "hz": None if first is None else hertz(_crossing(border, first, amplitude)),
-                "limiter": "none in this range" if first is None else NAMES.get(border.active[first], ""),
+                "limiter": "none in this range" if first is None else words_of(border.active[first]),
             }
         )
     return rows

@@ -12,7 +12,7 @@ from reports.document import abscissa, rounded
 from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
-from reports.sections.limits import NAMES
+from reports.sections.limits import words_of
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -224,7 +224,7 @@ def _full(design: Design) -> str:
 
 
 def _limit_words(limits: dict[str, float]) -> str:
-    parts = [f"{NAMES.get(name, name)} {100.0 * share:.2g} %" for name, share in limits.items()]
+    parts = [f"{words_of(name)} {100.0 * share:.2g} %" for name, share in limits.items()]
     return ", ".join(parts) or "none"
 
 
@@ -250,7 +250,7 @@ def _step_table(result: Specification) -> Block:
             "overshoot": one.overshoot_percent,
             "settle": _finite(one.settling_time_s, 1e3),
             "rate": scale * one.peak_rate_rad_s,
-            "limits": ", ".join(NAMES.get(name, name) for name in one.limits) or "none",
+            "limits": ", ".join(words_of(name) for name in one.limits) or "none",
         }
         for one in result.steps
     ]

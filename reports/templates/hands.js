@@ -200,11 +200,8 @@
     view(x.p_at(), row.length).set(row);
     view(x.x_at(), count).set(hertz.map((f) => Math.min(2 * Math.PI * f * period, Math.PI)));
     if (x.limiters(count) <= 0) return null;
-    const sizes = view(x.y_at(), 3 * count), input = data.step.of === "speed" ? ratio : 1;
-    const each = data.limits.map(([name, place, signal, rate]) => [name, hertz.map((f, k) => {
-      const size = input * sizes[signal * count + k] * (rate ? 2 * Math.sin(Math.min(Math.PI * f * period, Math.PI / 2)) / period : 1);
-      return row[place] / size / data.step.factor;
-    })]);
+    const sizes = view(x.y_at(), 6 * count), input = data.step.of === "speed" ? ratio : 1;
+    const each = data.limits.map(([name, place, line]) => [name, hertz.map((f, k) => row[place] / (input * sizes[line * count + k]) / data.step.factor)]);
     return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
   };
   // the drive with all its limits and its friction, from rest; command and output as shares of the scale
@@ -619,7 +616,7 @@
   const drawBorder = (label, part) => {
     if (!part) return;
     tell("border", "chart:redraw", { panel: 0, curve: `lowest, ${label}`, x: borderGrid, y: part.lowest });
-    if (label === "as changed") for (const name of ["speed limit", "acceleration limit", "peak current", "voltage"]) {
+    if (label === "as changed") for (const name of data.borders) {
       const own = part.each.find(([known]) => known === name);
       tell("border", "chart:redraw", { panel: 0, curve: name, x: own ? borderGrid : [], y: own ? own[1] : [] });
     }

@@ -2,8 +2,7 @@
 // The map behind the sliders: sines from rest over frequency and amplitude, each run in the module with all limits and friction.
 // What a cell shows is named by the rule of analyses.large_signal.classify: the limit that acts most, stiction, friction, linear.
 const sineMap = ({ x, view, data }) => {
-  const { columns, levels, updates, lowest, stick, decibel, degrees, longest } = data.map, at = data.places;
-  const COLOURS = { friction: "c7", stiction: "c4", speed: "c1", acceleration: "c2", current: "c3", voltage: "c5", "torque-command": "c6", overload: "ink", profile: "muted" };
+  const { columns, levels, updates, lowest, stick, decibel, degrees, longest, colours: COLOURS } = data.map, at = data.places;
   const spread = (low, high, count) => Array.from({ length: count }, (_, k) => low * (high / low) ** (k / (count - 1)));
   // whole periods fill whole updates of the position loop
   const toneOf = (hertz, T) => {

@@ -62,6 +62,19 @@ def test_every_file_that_the_architecture_names_exists() -> None:
     assert result > 20
 
 
+@pytest.mark.parametrize(
+    ("change", "most"),
+    [("limiter", 4), ("controller block", 3), ("figure", 3), ("requirement quantity", 2)],
+)
+def test_each_change_touches_no_more_files_than_promised(change: str, most: int) -> None:
+    """Files of code that the page names for a change, and the number in its heading."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    title, table = re.split(rf"### A {change}", text)[1].split("\n", 1)
+    rows = [line for line in table.split("\n### ")[0].splitlines() if line.startswith("| `")]
+    assert len(rows) == int(title.rpartition(":")[2]) <= most
+    assert all(len(re.findall(r"`[\w/]+\.(?:py|md)`", row.split("|")[1])) <= 1 for row in rows)
+
+
 def test_the_list_of_keys_holds_every_key(made: ModuleType) -> None:
     page = made.keys_page()
     for field in FIELDS.values():

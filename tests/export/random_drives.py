@@ -209,7 +209,13 @@ def _supply(rng: Rng) -> Supply:
 
 
 def _limits(rng: Rng, design: Design) -> Any:
-    limits = replace(design.limits, voltage_V=scaled(rng, 12.0), speed_rad_s=maybe(rng, 600.0, inf))
+    own = rng.spawn(1)[0]
+    limits = replace(
+        design.limits,
+        voltage_V=scaled(rng, 12.0),
+        speed_rad_s=maybe(rng, 600.0, inf),
+        current_rate_A_s=maybe(own, scaled(own, 5e3), inf),
+    )
     if rng.random() < 0.5:
         return limits
     return replace(limits, continuous_current_A=4.0, peak_current_A=12.0, peak_time_s=1e-2)

@@ -175,7 +175,7 @@ def test_the_example_builds_without_a_warning_and_is_the_simulator(
     run = simulate(design, commands.step(0.01), 400 * design.controller.period_s, loads.constant(0.0))
     assert np.array_equal(table[:, 1], run.output_angle_rad)
     assert np.array_equal(table[:, 4], run.voltage_V)
-    assert np.array_equal(table[:, 5].astype(np.uint8), run.limit_flags)
+    assert np.array_equal(table[:, 5].astype(np.uint16), run.limit_flags)
 
 
 @needs_compiler

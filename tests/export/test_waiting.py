@@ -72,6 +72,6 @@ def test_compiling_by_numba_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setenv(native.SWITCH, "numba")
     monkeypatch.setattr(numba_call, "call", slow)
-    native.call(np.zeros(layout.SIZE), *[np.zeros(0)] * 2, np.zeros(0, np.uint8), *[np.zeros(0)] * 2)
+    native.call(np.zeros(layout.SIZE), *[np.zeros(0)] * 2, np.zeros(0, np.uint16), *[np.zeros(0)] * 2)
     assert "numba compiles the simulator" in terminal.getvalue()
     assert terminal.getvalue().count("\n") == 1

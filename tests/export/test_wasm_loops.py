@@ -21,6 +21,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, Instruments
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import point_blocks
@@ -29,6 +30,7 @@ from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 from nonlinear.export import linear, linear_limiters
 from nonlinear.export.c_files import exported
+from nonlinear.export.page import line_of
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
 STAGES = {
@@ -134,11 +136,11 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
     if ours["limiters"]["n"] <= 0:
         assert every > linear_limiters.MOST_TICKS
         return 0
-    sizes = numbers(ours["limiters"]["sizes"]).reshape(3, -1)
+    sizes = numbers(ours["limiters"]["sizes"]).reshape(6, -1)
     count = 0
-    for name, signal in (("speed", 0), ("current", 1), ("voltage", 2)):
-        path = loops.limiters.get(name)
-        if path is None:
+    for name, path in loops.limiters.items():
+        signal = line_of(LIMITERS[name])
+        if signal is None:
             continue
         wanted = np.abs(path.response(ANGLES / (every * control.period_s)))
         rounding = 1e-14 * wanted.max()  # far below its largest value a gain is a difference of large ones

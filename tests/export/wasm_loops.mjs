@@ -24,7 +24,7 @@ for (const row of given.rows) {
   const count = given.angles.length;
   floats(x.x_at(), count).set(given.angles);
   const n = x.limiters(count);
-  found.limiters = { n, sizes: n > 0 ? plain(floats(x.y_at(), 3 * count)) : [] };
+  found.limiters = { n, sizes: n > 0 ? plain(floats(x.y_at(), 6 * count)) : [] };
   all.push(found);
 }
 process.stdout.write(JSON.stringify({ imports: WebAssembly.Module.imports(module), all }));

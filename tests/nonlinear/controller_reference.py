@@ -181,7 +181,12 @@ class Controller:
         if c.velocity:
             target = clamp(v, limits.speed_rad_s)
             return self.w_ref + clamp(target - self.w_ref, limits.acceleration_rad_s2 * self.n_p * self.Ts)
-        return clamp(v, self.i_max if c.current else limits.voltage_V)
+        if c.current:
+            return self.slope(clamp(v, self.i_max), self.n_p)
+        return clamp(v, limits.voltage_V)
+
+    def slope(self, target: float, every: int) -> float:
+        return self.i_ref + clamp(target - self.i_ref, self.design.limits.current_rate_A_s * every * self.Ts)
 
     def position(self, r: float, th: float, y: float) -> float:
         loop, N, T = self.design.controller.position, self.design.total_ratio, self.n_p * self.Ts
@@ -252,7 +257,7 @@ class Controller:
                 out = item(out)
             out = clamp(out, limit)
             if c.current:
-                self.i_ref = out
+                self.i_ref = self.slope(out, self.n_v)
             else:
                 self.u = out
         if self.pi_c:

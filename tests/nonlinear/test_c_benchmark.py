@@ -20,7 +20,7 @@ def test_same_bits(name: str) -> None:
     rows = Rows.of(design)
     rows["ticks"], rows["load"] = ticks, 4.0
     rows.sine("command", 0.0873, 1.0)
-    history, flags = np.zeros((8, ticks)), np.zeros(ticks, np.uint8)
+    history, flags = np.zeros((8, ticks)), np.zeros(ticks, np.uint16)
     assert CSimulator().run(rows.values[0], history, flags) == 0
     run = simulate(design, command, ticks * design.controller.period_s, 4.0)
     assert run.events > 4

@@ -108,6 +108,7 @@ def some_drive(rng: np.random.Generator) -> Design:
         speed_rad_s=pick(inf, 300.0),
         acceleration_rad_s2=pick(inf, 20.0 / T_p),
         peak_current_A=pick(inf, 5.0),
+        current_rate_A_s=pick(inf, inf, 3.0 / T_o),
     )
     if has_current and np.isfinite(limits.peak_current_A):
         limits = replace(

@@ -223,17 +223,18 @@ static double whole_b[MOST];
 
 /*
  * Gains from the command to speed command, current command and voltage, in front of their limits, at count angles
- * per interval of the command in x: three rows of count numbers in y. Its states, or why there are none.
+ * per interval of the command in x: three rows of count numbers in y, then three of their changes per second.
+ * Its states, or why there are none.
  */
 EXPORT("limiters") int limiters(int count)
 {
-    if (SEEN * count > 2 * MOST_OUT) {
+    if (2 * SEEN * count > 2 * MOST_OUT) {
         return 0;
     }
     const int n = drive_limiters_assembled(p, q, other_s, other_io, whole_a, whole_b, places, column, seen);
     if (n <= 0) {
         return n;
     }
-    drive_limiter_sizes(n, whole_a, whole_b, seen, drive_outer_interval(q), count, x, y, work, state);
+    drive_limiter_sizes(q, n, whole_a, whole_b, seen, drive_outer_interval(q), count, x, y, work, state);
     return n;
 }

@@ -1,0 +1,172 @@
+"""What is asked and known of a drive as data: studies, requirements, tolerances, pedigree, objects."""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, Literal
+
+from actuator_lti.design.field import BIG, Axis, positive, quantities, quantity
+
+# fmt: off
+ObjectFamily = Literal["", "faulhaber-mc-v3"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """What is asked of the failure cases; ``None`` is what `analyses.failures.Asked` takes for it.
+
+    Deflections are those of the output from where it was; the load pushes forward from the start.
+    """
+
+    stop_rad: Annotated[float | None, positive(
+        "stop", "{angle}", "", "mechanical stop; default the full deflection", example="25 deg")] = None
+    deflection_rad: Annotated[float | None, positive(
+        "deflection", "{angle}", "", "deflection to which the time is taken; default a tenth of the stop",
+        example="2 deg")] = None
+    detection_s: Annotated[float | None, positive(
+        "detection_time", "s", "", "from a failure to its detection; default 0.1 s", high=1e4,
+        example="50 ms")] = None
+    load_Nm: Annotated[float | None, quantity(
+        "load", "{torque}", "", "moment that pushes the output forward; default none",
+        example="4 N*m")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DutyCycle:
+    """The duty that the drive has to do for ever; ``None`` is what `analyses.duty.Asked` takes for it."""
+
+    amplitude_rad: Annotated[float | None, positive(
+        "amplitude", "{angle}", "", "peak of the sine, output side; default half the full deflection",
+        example="5 deg")] = None
+    frequency_rad_s: Annotated[float | None, positive(
+        "frequency", "rad/s", "", "of the sine; default 1 Hz", example="0.5 Hz")] = None
+    load_Nm: Annotated[float | None, quantity(
+        "load", "{torque}", "", "moment at the output, all the time; default the largest of validation.loads",
+        example="4 N*m")] = None
+    share: Annotated[float | None, positive(
+        "share", "1", "", "share of the time in motion; default 1", high=1.0, example="0.4")] = None
+    cycle_s: Annotated[float | None, positive(
+        "cycle", "s", "", "one motion and one rest together; default 10 s", high=1e6, example="60 s")] = None
+
+
+def default_deflection(axis: Axis) -> float:
+    """Full deflection where a design states none: 10 deg, or 0.01 m on a linear axis."""
+    return 0.01 if axis == "linear" else 0.17453292519943295
+
+
+@dataclass(frozen=True, kw_only=True)
+class Validation:
+    """What the validator and the report are to look at: deflections (output side) and load torques."""
+
+    full_deflection_rad: Annotated[float, positive(
+        "full_deflection", "{angle}", "", "largest amplitude to look at, output side", example="10 deg")]
+    amplitude_fractions: Annotated[tuple[float, ...], quantities(
+        "amplitude_fractions", "1", "amplitudes as fractions of the full deflection", low=1e-09,
+        high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
+    loads_Nm: Annotated[tuple[float, ...], quantities(
+        "loads", "{torque}", "load moments to look at", low=-BIG, high=BIG)] = (0.0,)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirement:
+    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
+
+    id: str
+    quantity: str
+    unit: str
+    minimum: float | None = None
+    maximum: float | None = None
+    loop: str | None = None
+    load_Nm: float | None = None
+    source: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerance:
+    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution.
+
+    ``lower`` and ``upper`` are values of the parameter itself, not deviations.  ``text`` is the width as
+    written, kept so that a relative one ("50 %") follows a changed nominal.
+    """
+
+    kind: Literal["uniform", "normal", "truncated-normal"]
+    half_width: float | None = None
+    std: float | None = None
+    lower: float = -inf
+    upper: float = inf
+    text: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One value of the design file with its pedigree: dotted key, text as written, SI value."""
+
+    path: str
+    text: str
+    value: float
+    unit: str
+    symbol: str = ""
+    source: str = ""
+    grade: str = ""
+    tolerance: Tolerance | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Correlation coefficient between two toleranced parameters, named by their dotted keys."""
+
+    first: str
+    second: str
+    coefficient: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fact:
+    """Something known of the drive that no equation needs, as text with its pedigree."""
+
+    label: str
+    value: str
+    source: str = ""
+    grade: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerObject:
+    """One entry of the motion controller's object dictionary, as an integer in the object's own unit."""
+
+    index: int
+    subindex: int
+    value: int
+    name: str = ""
+    data_type: str = ""
+
+    @property
+    def label(self) -> str:
+        """The usual spelling, such as ``0x2344.01``."""
+        return f"0x{self.index:04X}.{self.subindex:02X}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerObjects:
+    """The controller's own settings that a design was imported from, also those that no key holds.
+
+    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges
+    and steps of its objects.
+    ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
+    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
+    index and subindex.
+    """
+
+    velocity_gain_factor: float = 1.0
+    values: tuple[ControllerObject, ...] = ()
+    family: ObjectFamily = ""
+
+    @property
+    def named(self) -> bool:
+        """Whether the drive is run by the motion controller whose objects these are."""
+        return bool(self.family or self.values)
+
+    def __post_init__(self) -> None:
+        """Put the values in order."""
+        ordered = tuple(sorted(self.values, key=lambda item: (item.index, item.subindex)))
+        object.__setattr__(self, "values", ordered)

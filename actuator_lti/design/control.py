@@ -1,0 +1,333 @@
+"""Measurement, control, limits and supply of a drive as data, and the keys that they are read from.
+
+A stage that the drive does not have is ``None``; a limit that it does not have is ``inf``.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, Any, Literal
+
+import numpy as np
+
+from actuator_lti.design.field import BIG, choice, flag, integer, not_negative, positive, quantities, quantity
+from actuator_lti.errors import InputError
+
+# fmt: off
+SpeedSource = Literal["ideal", "difference", "tracking"]
+Sensor = Literal["motor", "output"]
+AntiWindup = Literal["conditional", "clamped", "back-calculation"]
+FilterKind = Literal["lowpass", "notch", "skewed-notch", "leadlag", "biquad"]
+FILTER_KEYS: dict[FilterKind, tuple[set[str], set[str]]] = {
+    "lowpass": ({"frequency_rad_s"}, {"order", "damping"}),
+    "notch": ({"frequency_rad_s", "width_rad_s"}, {"depth"}),
+    "skewed-notch": ({"zero_rad_s", "pole_rad_s", "width_rad_s"}, {"depth"}),
+    "leadlag": ({"zero_rad_s", "pole_rad_s"}, set()),
+    "biquad": ({"b", "a"}, set()),
+}
+"""What each kind of filter needs, and what it may have besides."""
+FilterPlace = Literal["torque", "speed"]
+Overload = Literal["thermal", "excess"]
+Stage = Literal["position", "velocity", "current", "voltage"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoder:
+    """The speed measurement: w itself, a difference of angles, or a tracking loop; perhaps filtered.
+
+    The difference spans ``difference_samples`` m velocity periods.
+
+    ``counts_per_rev`` is per motor revolution after quadrature (linear axis: per metre); ``None`` is an
+    encoder without quantisation.  ``bandwidth_rad_s`` is w0 of the tracking loop (model.md section 7).
+    """
+
+    counts_per_rev: Annotated[int | None, integer(
+        "counts_per_rev", 2**32, "",
+        "counts per motor revolution after quadrature (linear axis without a screw: per metre)")] = None
+    speed: Annotated[SpeedSource, choice(
+        "speed", "the speed itself, a difference of angles, or a tracking loop (observer)")] = "ideal"
+    difference_samples: Annotated[int, integer(
+        "difference_samples", 64, "m", "velocity periods that the difference spans")] = 1
+    filter_time_s: Annotated[float, not_negative(
+        "filter_time", "s", "T_F", "first-order filter of the speed", example="0 us")] = 0.0
+    bandwidth_rad_s: Annotated[float | None, positive(
+        "bandwidth", "rad/s", "w0", "natural frequency of the tracking loop", example="300 Hz")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputEncoder:
+    """The angle sensor at the output shaft; counts per output revolution (linear axis: per metre)."""
+
+    counts_per_rev: Annotated[int | None, integer(
+        "counts_per_rev", 2**32, "",
+        "counts per output revolution after quadrature (linear axis: per metre)")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instruments:
+    """Errors of the drive's own measurements; 0 is an ideal one.
+
+    Noise is white, normal, of the stated rms value, new at every sample; jitter is the rms deviation of the
+    sampling instant.  ``seed`` makes a run repeatable.
+    """
+
+    current_resolution_A: Annotated[float, not_negative(
+        "current_resolution", "A", "", "step of the measured current", example="5 mA")] = 0.0
+    current_noise_A: Annotated[float, not_negative(
+        "current_noise", "A", "", "noise of the current, rms", example="2 mA")] = 0.0
+    angle_noise_rad: Annotated[float, not_negative(
+        "angle_noise", "{angle}", "", "noise of the motor's angle, rms", example="0.1 mrad")] = 0.0
+    output_angle_noise_rad: Annotated[float, not_negative(
+        "output_angle_noise", "{angle}", "", "noise of the output's angle, rms", example="0.01 mrad")] = 0.0
+    jitter_s: Annotated[float, not_negative(
+        "jitter", "s", "", "deviation of the sampling instant, rms", high=1.0, example="1 us")] = 0.0
+    seed: Annotated[int, integer(
+        "seed", 2**31, "", "seed of the noise, so that a run can be repeated", low=0)] = 0
+
+    @property
+    def ideal(self) -> bool:
+        """Whether nothing is to be simulated."""
+        return not any(
+            (
+                self.current_resolution_A,
+                self.current_noise_A,
+                self.angle_noise_rad,
+                self.output_angle_noise_rad,
+                self.jitter_s,
+            )
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Filter:
+    """One filter of the velocity loop, at its period, discretised by Tustin, prewarped (model.md section 7).
+
+    ``lowpass``: frequency, order 1 or 2, damping; ``notch``: frequency w0, width (rad/s), depth (gain at w0);
+    ``skewed-notch``: zeros at zero, depth width wide, poles at pole, width wide; gain 1 at DC;
+    ``leadlag``: zero and pole, (s/zero + 1)/(s/pole + 1); ``biquad``: sampled coefficients ``b``, ``a``.
+    """
+
+    kind: Annotated[FilterKind, choice("kind", "what the filter does")]
+    on: Annotated[FilterPlace, choice(
+        "on", "whether it filters the torque command or the measured speed")] = "torque"
+    frequency_rad_s: Annotated[float | None, positive(
+        "frequency", "rad/s", "w0", "corner of a low-pass, centre of a notch", example="100 Hz")] = None
+    order: Annotated[int, integer("order", 2, "", "order of a low-pass, 1 or 2")] = 1
+    damping: Annotated[float, positive(
+        "damping", "1", "", "damping of a low-pass of order 2", high=10.0,
+        example="0.7")] = 0.7071067811865476
+    width_rad_s: Annotated[float | None, positive(
+        "width", "rad/s", "", "width of a notch", example="50 Hz")] = None
+    depth: Annotated[float, quantity(
+        "depth", "1", "", "gain of a notch at its centre: width of its zeros over that of its poles", low=0.0,
+        high=1.0, example="0.1")] = 0.0
+    zero_rad_s: Annotated[float | None, positive(
+        "zero", "rad/s", "", "zero, or frequency of a pair", example="50 rad/s")] = None
+    pole_rad_s: Annotated[float | None, positive(
+        "pole", "rad/s", "", "pole, or frequency of a pair", example="500 rad/s")] = None
+    b: Annotated[tuple[float, ...], quantities(
+        "b", "1", "numerator of a biquad in z^-1, b0 b1 b2", low=-BIG, high=BIG)] = ()
+    a: Annotated[tuple[float, ...], quantities(
+        "a", "1", "denominator of a biquad in z^-1 after the leading 1, a1 a2", low=-BIG, high=BIG)] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurrentLoop:
+    """Current PI, every tick: V = gain (e + integral of e / integral_time) + feed-forward.
+
+    The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
+    """
+
+    gain_V_A: Annotated[float, positive("gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm")]
+    integral_time_s: Annotated[float | None, positive(
+        "integral_time", "s", "Tn_i", "integral time of the current PI; without it a P controller",
+        example="150 us")] = None
+    back_emf_feedforward: Annotated[float, quantity(
+        "back_emf_feedforward", "1", "", "share of the back-EMF kE w added to the voltage", low=0.0, high=2.0,
+        example="1")] = 0.0
+    resistance_feedforward: Annotated[float, quantity(
+        "resistance_feedforward", "1", "", "share of R i_ref added to the voltage", low=0.0, high=2.0,
+        example="1")] = 0.0
+    anti_windup: Annotated[AntiWindup, choice(
+        "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
+    tracking_time_s: Annotated[float | None, positive(
+        "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
+        example="10 ms")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class VelocityLoop:
+    """Velocity PI (P where integral_time_s is None), every ``every`` ticks.
+
+    The gain is in A s/rad where a current loop follows, in V s/rad where the voltage does.
+    """
+
+    gain: Annotated[float, positive(
+        "gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI", example="0.12 A*s/rad")]
+    integral_time_s: Annotated[float | None, positive(
+        "integral_time", "s", "Tn_w", "integral time of the velocity PI; without it a P controller",
+        example="15 ms")] = None
+    every: Annotated[int, integer("every", 1000, "n_v", "the velocity loop runs every so many ticks")] = 1
+    sensor: Annotated[Sensor, choice("sensor", "where the speed is measured", choices=("motor",))] = "motor"
+    anti_windup: Annotated[AntiWindup, choice(
+        "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
+    tracking_time_s: Annotated[float | None, positive(
+        "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
+        example="10 ms")] = None
+    filters: tuple[Filter, ...] = ()
+
+    def filters_on(self, place: FilterPlace) -> tuple[Filter, ...]:
+        """The filters of the measured speed or of the torque command, in order."""
+        return tuple(item for item in self.filters if item.on == place)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PositionLoop:
+    """Position P, PI or PID, every ``every`` ticks (model.md section 7).
+
+    The gain is in 1/s where a velocity loop follows, else in A/rad or V/rad (motor side).  The acceleration
+    feed-forward is a share of J/kM times the command's acceleration; the friction feed-forward is the current
+    (A; V without a current loop) whose sign follows the command's motion.
+    """
+
+    gain: Annotated[float, positive(
+        "gain", "{drive}/{angle}", "Kv", "gain of the position P controller", example="120 1/s")]
+    every: Annotated[int, integer(
+        "every", 10000, "n_p",
+        "the position loop runs every so many ticks, a multiple of control.velocity.every")] = 1
+    feedforward: Annotated[float, not_negative(
+        "feedforward", "1", "k_ff", "share of the reference's rate added to the speed command", high=10.0,
+        example="0")] = 0.0
+    sensor: Annotated[Sensor, choice("sensor", "whose angle is fed back")] = "motor"
+    integral_time_s: Annotated[float | None, positive(
+        "integral_time", "s", "Ti", "integral time of the position controller; without it no integral",
+        example="0.5 s")] = None
+    derivative_time_s: Annotated[float, not_negative(
+        "derivative_time", "s", "Td", "derivative time of the position controller", high=100.0,
+        example="1 ms")] = 0.0
+    derivative_filter_s: Annotated[float, not_negative(
+        "derivative_filter", "s", "TD", "filter time of the derivative", high=100.0, example="0.2 ms")] = 0.0
+    acceleration_feedforward: Annotated[float, not_negative(
+        "acceleration_feedforward", "1", "k_aff",
+        "share of J/kM times the command's acceleration added to the torque command", high=10.0,
+        example="1")] = 0.0
+    friction_feedforward: Annotated[float, not_negative(
+        "friction_feedforward", "{drive}", "i_fr",
+        "added to the torque command in the direction of the command's motion", example="0.4 A")] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What the drive makes of a command before its outermost loop: a profile, then a filter.
+
+    Rate, acceleration and jerk limits hold at the output shaft (``inf``: none).  The filter is a low-pass of
+    order 1 or 2 with the time constant ``filter_time_s`` (order 2: damping ``filter_damping``).
+    """
+
+    filter_time_s: Annotated[float, not_negative(
+        "filter_time", "s", "", "time constant of the command filter", high=1e4, example="5 ms")] = 0.0
+    filter_order: Annotated[int, integer("filter_order", 2, "", "order of the command filter, 1 or 2")] = 1
+    filter_damping: Annotated[float, positive(
+        "filter_damping", "1", "", "damping of a filter of order 2", high=10.0, example="1")] = 1.0
+    rate_rad_s: Annotated[float, positive(
+        "rate", "{angle}/s", "", "largest rate of the command, output side", example="20 deg/s")] = inf
+    acceleration_rad_s2: Annotated[float, positive(
+        "acceleration", "{angle}/s^2", "", "largest acceleration of the command, output side",
+        example="400 deg/s^2")] = inf
+    jerk_rad_s3: Annotated[float, positive(
+        "jerk", "{angle}/s^3", "", "largest jerk of the command, output side", example="8000 deg/s^3")] = inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """Sampling and the cascade; an absent loop is ``None``; any stage may be the outermost."""
+
+    period_s: Annotated[float, positive(
+        "period", "s", "Ts", "tick of the fastest loop", low=1e-07, high=10.0, example="100 us")]
+    computing_delay_s: Annotated[float, not_negative(
+        "computing_delay", "s", "d", "time from sampling to the voltage acting", high=10.0, example="100 us")]
+    position: PositionLoop | None = None
+    velocity: VelocityLoop | None = None
+    current: CurrentLoop | None = None
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The loops that there are, outermost first; empty for an open-loop voltage drive."""
+        names: tuple[Stage, ...] = ("position", "velocity", "current")
+        return tuple(name for name in names if getattr(self, name) is not None)
+
+    @property
+    def position_loop(self) -> PositionLoop:
+        """The position loop, for questions that need one.
+
+        Raises
+        ------
+        InputError
+            Where the drive has none.
+        """
+        if self.position is None:
+            raise InputError("control.position: missing; this needs a drive with a position loop")
+        return self.position
+
+    @property
+    def outermost(self) -> Stage:
+        """The stage that takes the command; ``"voltage"`` for a drive without a loop."""
+        return self.stages[0] if self.stages else "voltage"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits of the stages, motor side; ``inf`` where there is none.
+
+    The continuous current is no clamp unless ``peak_time_s`` is given: then the overload protection (I2t)
+    falls back to it after that time at the peak (model.md section 6), until its state is below ``release``.
+    """
+
+    voltage_V: Annotated[float, positive(
+        "voltage", "V", "U_bus", "supply, and so the largest motor voltage", example="12 V")]
+    speed_rad_s: Annotated[float, positive(
+        "speed", "{angle}/s", "w_max", "largest speed command at the motor", example="9000 rpm")] = inf
+    acceleration_rad_s2: Annotated[float, positive(
+        "acceleration", "{angle}/s^2", "a_max", "largest change of the speed command",
+        example="30000 rev/s^2")] = inf
+    peak_current_A: Annotated[float, positive(
+        "peak_current", "A", "i_peak", "clamp of the current command", example="12 A")] = inf
+    current_rate_A_s: Annotated[float, positive(
+        "current_rate", "A/s", "", "largest change of the current command (torque slope)",
+        example="2000 A/s")] = inf
+    continuous_current_A: Annotated[float, positive(
+        "continuous_current", "A", "i_cont", "current allowed for ever (no clamp)", example="4 A")] = inf
+    peak_time_s: Annotated[float | None, positive(
+        "peak_time", "s", "t_peak",
+        "time that the peak current is allowed for, from cold; then the overload protection (I2t) acts",
+        high=1e6, example="1 s")] = None
+    release: Annotated[float, positive(
+        "release", "1", "", "overload state below which the peak is allowed again", high=1.0,
+        example="0.9")] = 0.9
+    overload: Annotated[Overload, choice(
+        "overload", "what the peak time means: a thermal model, or (i_peak^2 - i_cont^2) t")] = "thermal"
+
+    @property
+    def overload_time_s(self) -> Any:
+        """tau of the overload state, of one design or stacked ones; None without overload protection."""
+        if self.peak_time_s is None:
+            return None
+        r2 = (self.peak_current_A / self.continuous_current_A) ** 2
+        return (
+            self.peak_time_s * (r2 - 1)
+            if self.overload == "excess"
+            else self.peak_time_s / np.log(r2 / (r2 - 1))
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supply:
+    """The supply behind ``limits.voltage``: resistance, and where braking energy goes (section 6)."""
+
+    resistance_ohm: Annotated[float, not_negative(
+        "resistance", "ohm", "R_s", "resistance of supply and leads", example="50 mohm")] = 0.0
+    regenerative: Annotated[bool, flag("regenerative", "whether the source takes braking energy back")] = True
+    capacitance_F: Annotated[float | None, positive(
+        "capacitance", "F", "C", "capacitance of the bus", example="2 mF")] = None
+    brake_voltage_V: Annotated[float | None, positive(
+        "brake_voltage", "V", "U_brake", "bus voltage at which the brake resistor holds it",
+        example="60 V")] = None

@@ -1,0 +1,257 @@
+"""The plant of a drive as data, and the keys of the file that it is read from.
+
+All values are in SI units on the motor side unless a name says otherwise.  For a linear axis
+(``axis = "linear"``) read N for N m, m for rad, kg for kg m2 in every name.
+"""
+
+from dataclasses import dataclass
+from math import inf, pi, sin
+from typing import Annotated, Literal
+
+from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
+
+# fmt: off
+FrictionLaw = Literal["coulomb", "tanh"]
+LoadPath = Literal["self-locking", "back-drivable"]
+Direction = Literal["both", "forward", "reverse"]
+MotorConstants = Literal["dc", "rms-line", "peak-phase"]
+STANDARD_GRAVITY_m_s2 = 9.80665
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """The motor: either R, L, kM, kE, or an ideal torque source with a gain.
+
+    ``L di/dt = u - R i - kE w`` and torque ``kM i`` (paper, equations 1 and 2); without electrical
+    dynamics the torque is ``source_gain_Nm_V * u``.
+    """
+
+    rotor_inertia_kgm2: Annotated[float, positive(
+        "rotor_inertia", "{inertia}", "J_motor", "inertia of the rotor (linear axis: moving mass)",
+        example="9.2 g*cm^2")]
+    resistance_ohm: Annotated[float | None, positive(
+        "resistance", "ohm", "R", "phase-phase resistance", example="55 mohm")] = None
+    inductance_H: Annotated[float | None, positive(
+        "inductance", "H", "L", "phase-phase inductance", example="6 uH")] = None
+    torque_constant_Nm_A: Annotated[float | None, positive(
+        "torque_constant", "{torque}/A", "kM", "torque per ampere", example="5.9 mN*m/A")] = None
+    back_emf_constant_Vs_rad: Annotated[float | None, positive(
+        "back_emf_constant", "V*s/{angle}", "kE",
+        "back-EMF per rad/s; a speed constant, 83.4 rpm/V, is turned over", example="5.9 mV*s/rad")] = None
+    source_gain_Nm_V: Annotated[float | None, positive(
+        "source_gain", "{torque}/V", "g", "gain of an ideal torque source, instead of R, L, kM, kE",
+        example="35.15 N/V")] = None
+    constants: Annotated[MotorConstants, choice(
+        "constants",
+        "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
+        "line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L per phase)")] = "dc"
+
+    @property
+    def has_electrical_dynamics(self) -> bool:
+        """Whether the current is a state."""
+        return self.source_gain_Nm_V is None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gear:
+    """One reduction stage; the inertias are those of its own input and output shafts."""
+
+    name: str
+    ratio: Annotated[float, positive("ratio", "1", "i", "input speed over output speed", example="66")]
+    input_inertia_kgm2: Annotated[float, not_negative(
+        "input_inertia", "{inertia}", "J_in", "inertia turning with the input shaft of the stage",
+        example="1 g*cm^2")] = 0.0
+    output_inertia_kgm2: Annotated[float, not_negative(
+        "output_inertia", "{inertia}", "J_out", "inertia turning with the output shaft of the stage",
+        example="5 g*cm^2")] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screw:
+    """A screw, rack or belt between a rotary motor and a linear axis: travel per revolution.
+
+    It lets the motor's data sheet stand in its own units: with p = lead/2 pi a torque T is the force T/p, an
+    angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
+    """
+
+    lead_m: Annotated[float, positive(
+        "lead", "m", "p",
+        "travel per revolution of the screw: with it the motor's values may stand in N m, rad and kg m2, "
+        "and encoder.counts_per_rev is per revolution", example="10 mm")]
+
+    @property
+    def travel_m_rad(self) -> float:
+        """p, travel per radian."""
+        return self.lead_m / (2.0 * pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling:
+    """The elastic coupling between the motor's side and the load's side (model.md section 6).
+
+    Stiffness k, damping c and play (total, 2 b) are those at its own shaft, which is the output shaft of the
+    gear ``after`` (``None``: of the last gear, or of the motor where there are no gears).
+    """
+
+    stiffness_Nm_rad: Annotated[float, positive(
+        "stiffness", "{torque}/{angle}", "k", "stiffness at the coupling's own shaft", example="400 N*m/rad")]
+    damping_Nms_rad: Annotated[float, not_negative(
+        "damping", "{torque}*s/{angle}", "c", "damping at the coupling's own shaft",
+        example="0.02 N*m*s/rad")] = 0.0
+    play_rad: Annotated[float, not_negative(
+        "play", "{angle}", "2b", "total play (backlash) at its own shaft", example="2 mrad")] = 0.0
+    after: Annotated[str | None, text(
+        "name of the gear whose output shaft it is on; default the last gear")] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadFriction:
+    """Friction behind the coupling, at its shaft: C0_l, Cv_l, breakaway ratio and constant offset."""
+
+    dry_torque_Nm: Annotated[float, not_negative(
+        "dry_torque", "{torque}", "C0_l", "dry friction behind the coupling, at its shaft",
+        example="0.1 N*m")] = 0.0
+    viscous_Nms_rad: Annotated[float, not_negative(
+        "viscous", "{torque}*s/{angle}", "Cv_l", "viscous friction behind the coupling, at its shaft",
+        example="0.01 N*m*s/rad")] = 0.0
+    breakaway_ratio: Annotated[float, quantity(
+        "breakaway_ratio", "1", "", "breakaway torque over dry friction of the load side", low=1.0,
+        high=100.0, example="1")] = 1.0
+    offset_torque_Nm: Annotated[float, quantity(
+        "offset_torque", "{torque}", "", "constant torque that opposes positive motion of the load",
+        example="0 N*m")] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity:
+    """A pendulum at the output shaft: M_ext = m g l sin(angle + offset); angle + offset = 0 is upright."""
+
+    mass_kg: Annotated[float, positive("mass", "kg", "m", "mass of the pendulum", example="2 kg")]
+    arm_m: Annotated[float, positive(
+        "arm", "m", "l", "distance of its centre of mass from the axis", example="0.3 m")]
+    offset_rad: Annotated[float, quantity(
+        "offset", "rad", "", "angle from upright at output angle zero", low=-7.0, high=7.0,
+        example="180 deg")] = 0.0
+
+    def moment_Nm(self, angle_rad: float) -> float:
+        """Moment on the output shaft at an output angle, in N m; positive pushes forward."""
+        return self.peak_Nm * sin(angle_rad + self.offset_rad)
+
+    @property
+    def peak_Nm(self) -> float:
+        """m g l."""
+        return self.mass_kg * STANDARD_GRAVITY_m_s2 * self.arm_m
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """What hangs on the output shaft, and how its moment reaches the motor.
+
+    M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle + gravity.
+    """
+
+    inertia_kgm2: Annotated[float, not_negative(
+        "inertia", "{inertia}", "J_load", "inertia at the output shaft", example="2e-4 kg*m^2")] = 0.0
+    path: Annotated[LoadPath, choice(
+        "path", "whether the load moment only adds friction, or also drives the motor")] = "self-locking"
+    moment_max_Nm: Annotated[float, not_negative(
+        "moment_max", "{torque}", "M_ext", "largest load moment at the output", example="8 N*m")] = 0.0
+    moment_slope_Nm_rad: Annotated[float, quantity(
+        "moment_slope", "{torque}/{angle}", "", "load moment per output deflection",
+        example="0 N*m/rad")] = 0.0
+    friction: LoadFriction | None = None
+    gravity: Gravity | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionPoint:
+    """One point (|w|, T) of a friction map, motor side; for both directions of motion or one."""
+
+    speed_rad_s: Annotated[float, not_negative(
+        "speed", "{angle}/s", "|w|", "speed at the motor", example="10 rad/s")]
+    torque_Nm: Annotated[float, not_negative(
+        "torque", "{torque}", "T", "friction at that speed", example="2 mN*m")]
+    direction: Annotated[Direction, choice(
+        "direction", "direction of motion for which the point holds")] = "both"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """Friction at the motor shaft: dry ``Tc = C0 + CM |M_ext|`` plus viscous ``Cv w`` (paper, equation 9).
+
+    ``dry_torque_reverse_Nm`` and ``viscous_reverse_Nms_rad`` hold for w < 0 where they differ; ``None``
+    means symmetric.  ``offset_torque_Nm`` is a constant torque that opposes positive motion.  ``points`` is a
+    friction map that takes the place of C0 and Cv (model.md section 6); CM and the offset add.
+    """
+
+    law: Annotated[FrictionLaw, choice("law", "dry friction with stick, or smoothed by tanh")] = "coulomb"
+    dry_torque_Nm: Annotated[float, not_negative(
+        "dry_torque", "{torque}", "C0", "dry friction at the motor", example="2.25e-3 N*m")] = 0.0
+    viscous_Nms_rad: Annotated[float, not_negative(
+        "viscous", "{torque}*s/{angle}", "Cv", "viscous friction", example="5.25e-6 N*m*s/rad")] = 0.0
+    load_coefficient: Annotated[float, not_negative(
+        "load_coefficient", "{torque}/({torque})", "CM",
+        "dry friction at the motor per load moment at the output", example="1.34 mN*m/(N*m)")] = 0.0
+    breakaway_ratio: Annotated[float, quantity(
+        "breakaway_ratio", "1", "", "breakaway torque over dry friction", low=1.0, high=100.0,
+        example="1")] = 1.0
+    smoothing_speed_rad_s: Annotated[float, positive(
+        "smoothing_speed", "{angle}/s", "w_s", "speed scale of the tanh law", example="1 rad/s")] = 1.0
+    dry_torque_reverse_Nm: Annotated[float | None, not_negative(
+        "dry_torque_reverse", "{torque}", "C0-", "dry friction backward, where it differs",
+        example="2.3e-3 N*m")] = None
+    viscous_reverse_Nms_rad: Annotated[float | None, not_negative(
+        "viscous_reverse", "{torque}*s/{angle}", "Cv-", "viscous friction backward, where it differs",
+        example="5.3e-6 N*m*s/rad")] = None
+    offset_torque_Nm: Annotated[float, quantity(
+        "offset_torque", "{torque}", "", "constant torque that opposes positive motion",
+        example="0 N*m")] = 0.0
+    points: tuple[FrictionPoint, ...] = ()
+
+    def map(self, direction: int = 1) -> tuple[FrictionPoint, ...]:
+        """Points of the friction map for motion forward (1) or backward (-1), by rising speed."""
+        other = "reverse" if direction > 0 else "forward"
+        chosen = (point for point in self.points if point.direction != other)
+        return tuple(sorted(chosen, key=lambda point: point.speed_rad_s))
+
+    def dry_Nm(self, load_Nm: float, direction: int = 1) -> float:
+        """Dry friction torque Tc at a load torque (either sign), for motion forward (1) or backward (-1)."""
+        base = self.dry_torque_Nm
+        if direction < 0 and self.dry_torque_reverse_Nm is not None:
+            base = self.dry_torque_reverse_Nm
+        return base + self.load_coefficient * abs(load_Nm)
+
+    def viscous(self, direction: int = 1) -> float:
+        """Viscous slope Cv in N m s/rad, for motion forward (1) or backward (-1)."""
+        if direction < 0 and self.viscous_reverse_Nms_rad is not None:
+            return self.viscous_reverse_Nms_rad
+        return self.viscous_Nms_rad
+
+
+@dataclass(frozen=True, kw_only=True)
+class Temperature:
+    """Winding and magnet temperature, in degrees Celsius, and how R, kM and kE follow them.
+
+    ``R (1 + resistance_per_K (winding - reference))``, ``kM, kE (1 + magnet_per_K (magnet - reference))``.
+    The thermal resistance and time constant of the winding serve the duty cycle.
+    """
+
+    winding_degC: Annotated[float, degrees(
+        "winding", "temperature of the winding in this design", "80 degC")] = 25.0
+    magnet_degC: Annotated[float, degrees(
+        "magnet", "temperature of the magnets in this design", "60 degC")] = 25.0
+    reference_degC: Annotated[float, degrees(
+        "reference", "temperature that the sheet holds for", "25 degC")] = 25.0
+    resistance_per_K: Annotated[float, quantity(
+        "resistance_coefficient", "1/K", "", "change of R per kelvin (copper 0.393 %/K)", low=0.0, high=0.02,
+        example="0.393 %/K")] = 0.00393
+    magnet_per_K: Annotated[float, quantity(
+        "magnet_coefficient", "1/K", "", "change of kM and kE per kelvin (NdFeB -0.11 %/K)", low=-0.05,
+        high=0.05, example="-0.11 %/K")] = -0.0011
+    ambient_degC: Annotated[float, degrees("ambient", "temperature around the motor", "25 degC")] = 25.0
+    winding_limit_degC: Annotated[float, degrees(
+        "winding_limit", "largest temperature of the winding", "125 degC")] = inf
+    thermal_resistance_K_W: Annotated[float | None, positive(
+        "thermal_resistance", "K/W", "R_th", "winding to ambient", example="5 K/W")] = None
+    thermal_time_s: Annotated[float | None, positive(
+        "thermal_time", "s", "", "thermal time constant of the winding", example="20 s")] = None
