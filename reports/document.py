@@ -36,6 +36,7 @@ from reports.document_schema import (
 from reports.findings import Finding
 from reports.findings import plain as plain_findings
 from reports.verdict_summary import summary
+from reports.visible import visible
 
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
@@ -247,21 +248,33 @@ def document(
 ) -> Document:
     """Put a document together; its verdict counts every verdict in its sections.
 
-    Numbers are rounded to the digits that are the same on every machine (`reports.certain`).
+    Numbers are rounded to the digits that are the same on every machine (`reports.certain`). Names of files
+    and columns may hold anything: what cannot be seen in them is made visible.
     """
     made: Document = {
         "schema": SCHEMA,
         "version": VERSION,
         "kind": kind,
-        "title": title,
-        "subtitle": subtitle,
-        "design": plain(design),
-        "provenance": plain(provenance),
+        "title": visible(title),
+        "subtitle": visible(subtitle),
+        "design": _seen(plain(design)),
+        "provenance": _seen(plain(provenance)),
         "verdict": summary(block for part in sections for block in walk(part)),
-        "sections": [certain(part) for part in sections],
+        "sections": [_seen(certain(part)) for part in sections],
     }
     check(made)
     return made
+
+
+def _seen(value: Any) -> Any:
+    """Make every text of plain data visible, keys included."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, Mapping):
+        return {visible(key): _seen(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_seen(item) if isinstance(item, str | Mapping | list | tuple) else item for item in value]
+    return value
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:

@@ -21,6 +21,7 @@ from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
 from reports.verdict_summary import verdict_lines
+from reports.visible import visible
 
 LONG_TABLE = 13  # rows; longer tables fold
 KICKERS = {"report": "Loop analysis report"}
@@ -99,6 +100,7 @@ def environment() -> Environment:
     made = Environment(
         loader=PackageLoader("reports"),
         autoescape=select_autoescape(default=True, default_for_string=True),
+        finalize=_seen,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -106,6 +108,11 @@ def environment() -> Environment:
     made.filters["show"] = show
     made.filters["show_signed"] = show_signed
     return made
+
+
+def _seen(value: Any) -> Any:
+    """What a template puts in: texts of files so that they are seen, not obeyed; markup of ours as it is."""
+    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
 @cache

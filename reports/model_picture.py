@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from html import escape
 from importlib.util import find_spec
 
 from actuator_lti.design.model import Design
 from reports.charts.paint import COLOURS
+from reports.visible import escape
 
 WIDTH, HEIGHT = 640, 300
 LEFT, TOP, GAP = 16.0, 62.0, 14.0

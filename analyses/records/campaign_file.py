@@ -44,6 +44,7 @@ from typing import Any
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.records.toml_tables import Table, read_toml
@@ -110,7 +111,7 @@ def load_campaign(path: str | Path) -> Campaign:
     runs = tuple(_run(table, path.parent) for table in root.tables("run"))
     join = root.table("join")
     campaign = Campaign(
-        name=head.text("name", path.stem),
+        name=head.text("name", shown_path(path.stem)),
         design=head.text("design", "ilr33-amber"),
         outliers=head.text("outliers", "keep", ("keep", "set-aside")),
         drive=_spec(root.table("drive")),

@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
-from actuator_lti.reading import open_regular
+from actuator_lti.reading import open_regular, shown_path
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
@@ -75,7 +75,7 @@ def read_csv_record(
     signals = {signal.name: np.ascontiguousarray(table[:, k]) for k, signal in enumerate(spec.signals, 1)}
     signals, made = filled(table[:, 0], signals, spec.resample_tolerance, str(path))
     return Record(
-        name=name or path.name,
+        name=name or shown_path(path.name),
         time_s=np.ascontiguousarray(table[:, 0]),
         signals=MappingProxyType(signals),
         units=MappingProxyType({s.name: converter(s).si_unit for s in spec.signals}),

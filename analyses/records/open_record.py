@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import open_regular
+from actuator_lti.reading import open_regular, shown_path
 from analyses.records.campaign_file import record_spec
 from analyses.records.campaign_import import read_record
 from analyses.records.csv_stream import MAX_ROWS
@@ -64,7 +64,7 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
     inputs = tuple(
         one if one.signal else replace(one, note=why.get(one.column, one.note)) for one in record.inputs
     )
-    return replace(_with_gain(record), name=path.name, inputs=inputs)
+    return replace(_with_gain(record), name=shown_path(path.name), inputs=inputs)
 
 
 def _described(path: Path, max_rows: int) -> Record:
@@ -79,7 +79,7 @@ def _described(path: Path, max_rows: int) -> Record:
         )
     file = path.parent / table.text("file")
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
-    return replace(read_record(file, spec, max_rows), name=file.name)
+    return replace(read_record(file, spec, max_rows), name=shown_path(file.name))
 
 
 def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:

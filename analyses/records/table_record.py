@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown_path
 from analyses.records.csv_rows import Account, Block
 from analyses.records.gaps import filled, several_rates
 from analyses.records.inputs import inputs_of
@@ -51,7 +52,7 @@ def record_of_columns(
     }
     signals, notes = filled(time, signals, spec.resample_tolerance, str(path))
     return Record(
-        name=name or path.name,
+        name=name or shown_path(path.name),
         time_s=time,
         signals=MappingProxyType(signals),
         units=MappingProxyType({s.name: c.si_unit for s, c in zip(spec.signals, converters, strict=True)}),

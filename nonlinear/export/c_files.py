@@ -161,7 +161,13 @@ void drive_load_design(double *p)
 
 
 def _plain(text: str) -> str:
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("\\", "/").replace("\n", " ")
+    """A text as it may stand in a comment: it neither ends it nor begins one, nor turns the code round."""
+    return _seen(text).replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
+
+
+def _seen(text: str) -> str:
+    """One line without control characters and marks of direction."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
@@ -170,8 +176,8 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
     what, unit = stage_words(design)
     number = 4 if single_precision else 8
     values = {
-        "NAME": design.name,
-        "TITLE": design.title,
+        "NAME": _seen(design.name),
+        "TITLE": _seen(design.title),
         "PRECISION": "single (float)" if single_precision else "double",
         "COMMAND": f"{what}, {unit}",
         "PERIOD": f"{row[at.PERIOD]:g}",

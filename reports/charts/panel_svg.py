@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
 from reports.charts.axis import minor_ticks
@@ -12,6 +10,7 @@ from reports.charts.labels import Room
 from reports.charts.notes_svg import by_need, note_svg
 from reports.charts.paint import MARKER_PATHS
 from reports.charts.pen import FAR, Frame, Pen
+from reports.visible import escape
 
 TICK, LABEL, TITLE = 10.5, 11.5, 12.0
 RULE_LENGTH = 3000  # of rules; longer ones cost a browser dear where they are dashed

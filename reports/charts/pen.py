@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from reports.charts.axis import Axis
 from reports.charts.chart import Look
 from reports.charts.labels import LINE_EM
 from reports.charts.paint import COLOURS, DASHES, HATCH_PATHS, MARKER_PATHS, paint
+from reports.visible import escape
 
 FAR = 1e5
 

@@ -7,13 +7,13 @@ its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from html import escape
 from itertools import accumulate
 
 from reports.charts.chart import Chart, Column, Curve, Item, Look, Note, Panel
 from reports.charts.labels import LINE_EM, text_width
 from reports.charts.panel_svg import LABEL, TICK, TITLE, panel_svg, room_y
 from reports.charts.pen import Frame, Pen
+from reports.visible import escape
 
 FONT = "DejaVu Sans"
 GAP = 10.0

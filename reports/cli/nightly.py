@@ -133,18 +133,20 @@ def _split(words: list[str]) -> tuple[bool, str]:
 
 
 def _warn(line: str) -> None:
-    typer.echo(f"actuator-lti: {line}", err=True)
+    from reports.cli.output import print_note
+
+    print_note(f"actuator-lti: {line}")
 
 
 def _show(night: Overview, site: Path, as_json: bool) -> None:
     """Print the night: JSON, or the counts and every design that needs a look."""
-    from reports.cli.output import print_line
+    from reports.cli.output import print_json_text, print_line
     from reports.nightly.machines import STATE_WORDS, summary_text
     from reports.nightly.text import one_line
     from reports.terminal import print_verdict
 
     if as_json:
-        print_line(summary_text(night).rstrip("\n"))
+        print_json_text(summary_text(night).rstrip("\n"))
         return
     counts = ", ".join(f"{night.count(s)} {words}" for s, words in STATE_WORDS.items() if night.count(s))
     cached = sum(d.result.cached for d in night.designs)

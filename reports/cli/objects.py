@@ -59,7 +59,7 @@ def export(
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import write_settings_toml
     from actuator_lti.design.settings_xml import settings_xml
-    from reports.cli.output import print_json, print_line
+    from reports.cli.output import print_json, print_line, print_note
 
     drive = load_drive(design, changes)
     if per is not None:
@@ -84,7 +84,7 @@ def export(
     if out is None:
         print_line(text.rstrip())
     for note in notes:
-        typer.echo(note, err=True)
+        print_note(note)
 
 
 @app.command("import")
@@ -101,10 +101,11 @@ def import_settings(
     from actuator_lti.design import load_design, write_design
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
-    from reports.cli.output import print_json, print_line
+    from actuator_lti.reading import shown_path
+    from reports.cli.output import print_json, print_line, print_note
 
     factor = None if per is None else calibration(per)
-    result = import_objects(read_settings(settings, factor), load_design(base), str(settings))
+    result = import_objects(read_settings(settings, factor), load_design(base), shown_path(settings))
     text = write_design(result.design)
     if out is not None:
         refuse_existing(out, force)
@@ -119,7 +120,7 @@ def import_settings(
     changed_lines = [f"{path} = {result.design.parameters[path].text}" for path in result.changed]
     kept_lines = [f"kept: {item.label} = {item.value}" for item in result.kept]
     for line in [*changed_lines, *kept_lines, *result.notes]:
-        typer.echo(line, err=True)
+        print_note(line)
 
 
 def _plain(item: ControllerObject) -> dict[str, object]:

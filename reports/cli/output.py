@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
-import unicodedata
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+from reports.visible import DIRECTION
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-_OBEYED = ("Cc", "Cs")
+_TURNED = re.compile(f"[{DIRECTION}]")
+_OBEYED = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff{DIRECTION}]")
 
 
 def print_json(data: Any) -> None:
@@ -19,9 +22,12 @@ def print_json(data: Any) -> None:
 
     from reports.document import plain
 
-    text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2)
-    # what is no Unicode (a path of other bytes) stays an escape of JSON
-    sys.stdout.write(text.encode("utf-8", "backslashreplace").decode() + "\n")
+    print_json_text(json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2))
+
+
+def print_json_text(text: str) -> None:
+    """Print JSON; what a terminal would obey, or is no Unicode (a path of other bytes), stays escaped."""
+    sys.stdout.write(_OBEYED.sub(lambda found: f"\\u{ord(found[0]):04x}", text) + "\n")
 
 
 def console() -> Console:
@@ -29,12 +35,28 @@ def console() -> Console:
     from rich.console import Console
 
     width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120
-    return Console(highlight=False, width=width)
+    return Console(highlight=False, width=width, file=cast("TextIO", _Straight()))
+
+
+class _Straight:
+    """Standard output without marks of direction; the other control characters rich takes out itself."""
+
+    def write(self, text: str) -> int:
+        sys.stdout.write(_TURNED.sub("?", text))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(sys.stdout, name)
 
 
 def print_warning(text: str) -> None:
     """Print one line about something suspicious on standard error."""
     sys.stderr.write(f"warning: {printable(' '.join(text.split()))}\n")
+
+
+def print_note(text: str) -> None:
+    """Print one line beside the answer on standard error."""
+    sys.stderr.write(f"{printable(' '.join(text.split()))}\n")
 
 
 def print_line(text: str) -> None:
@@ -43,13 +65,11 @@ def print_line(text: str) -> None:
 
 
 def printable(text: str) -> str:
-    """The text without control characters but line breaks and tabs.
+    """The text without control characters but line breaks and tabs, and without marks of direction.
 
     Examples
     --------
-    >>> printable("a\\x1b[31mb")
-    'a?[31mb'
+    >>> printable("a\\x1b[31mb\\u202e")
+    'a?[31mb?'
     """
-    if text.isprintable():
-        return text
-    return "".join("?" if unicodedata.category(c) in _OBEYED and c not in "\n\t" else c for c in text)
+    return text if text.isprintable() else _OBEYED.sub("?", text)

@@ -405,7 +405,7 @@ def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
             damage = "an entry refers to one that is missing"
         if damage == "ok":
             damage = sums.damage(connection) or "ok"
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         if isinstance(error, sqlite3.OperationalError):
             raise
         raise InputError(f"is no history of a nightly build ({error})", where=str(path)) from error

@@ -8,9 +8,10 @@ from xml.sax.saxutils import escape, quoteattr
 
 from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.figures import Verdict
-from reports.nightly.text import markdown_cell, one_line, visible
+from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import DesignView, Overview
 from reports.numbers import significant
+from reports.visible import visible
 
 SCHEMA = "actuator-lti/nightly"
 VERSION = 1

@@ -15,9 +15,10 @@ from reports.nightly.headline import cause_words, change_words, headlines, main_
 from reports.nightly.history import History
 from reports.nightly.machines import STATE_WORDS, cause_lines
 from reports.nightly.records import Result, Run
-from reports.nightly.text import csv_text, one_line, visible
+from reports.nightly.text import csv_text, one_line
 from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
 from reports.numbers import MISSING, significant
+from reports.visible import visible
 
 MAX_NIGHTS = 400
 MAX_HEADLINES = 12

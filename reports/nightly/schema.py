@@ -107,7 +107,7 @@ def checked_version(connection: sqlite3.Connection, path: Path) -> int:
         tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
     except sqlite3.OperationalError:  # the disk, not the file
         raise
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of names that are quoted
         raise InputError(f"is no history of a nightly build ({error})", where=str(path)) from error
     if tables and application != APPLICATION_ID:
         raise InputError("is a database, but no history of a nightly build", where=str(path))

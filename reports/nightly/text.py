@@ -8,10 +8,8 @@ import io
 import re
 from collections.abc import Iterable, Sequence
 
-_ILLEGAL_XML = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]"
-)
-_BIDI = re.compile("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+from reports.visible import visible
+
 _NOT_SLUG = re.compile(r"[^A-Za-z0-9]+")
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "|")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
@@ -37,20 +35,6 @@ def slug(name: str) -> str:
     """
     readable = _NOT_SLUG.sub("-", name).strip("-")[:40].strip("-").lower() or "design"
     return f"{readable}-{sha256(name)[:10]}"
-
-
-def visible(text: str) -> str:
-    """Replace what XML and HTML cannot hold, and direction marks, by signs that are seen.
-
-    Examples
-    --------
-    >>> visible("a\\x00b\\u202ec")
-    'a\\ufffdb\\u27e8U+202E\\u27e9c'
-    """
-    if text.isascii() and text.isprintable():
-        return text
-    clean = _ILLEGAL_XML.sub("\N{REPLACEMENT CHARACTER}", text)
-    return _BIDI.sub(lambda m: f"⟨U+{ord(m.group()):04X}⟩", clean)
 
 
 def one_line(text: str, limit: int = 300) -> str:

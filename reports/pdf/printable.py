@@ -9,9 +9,9 @@ from typing import Any
 from reports.document import figures, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
-from reports.nightly.text import visible
 from reports.numbers import show
 from reports.verdict_summary import verdict_lines
+from reports.visible import visible
 
 MAX_CELL = 600
 MAX_TEXT = 20_000

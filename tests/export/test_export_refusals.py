@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import nonlinear.export.build as build
+from actuator_lti import load_design
 from nonlinear import native
+from nonlinear.export import c_export
 from nonlinear.export.build import system_compiler
 from reports.cli.main import main
 
@@ -118,3 +122,15 @@ def test_the_library_without_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_pat
     with pytest.raises(Exception, match="no C compiler; allowed: gcc or clang, or leave it to numba"):
         native.build()
     assert not list(tmp_path.iterdir())
+
+
+def test_no_name_ends_a_comment_or_turns_the_code_round() -> None:
+    hostile = "*/ int evil; /* \\ \u202e\u2066 \x85 two\nlines"
+    texts = c_export(replace(load_design("ctms-motor-position"), name=hostile, title=hostile))
+    for name in ("drive_design.h", "drive_design.c", "README.md"):
+        assert all(c.isprintable() or c == "\n" for c in texts[name]), name
+    for name in ("drive_design.h", "drive_design.c"):
+        code = re.sub(r"/\*.*?\*/", "", texts[name], flags=re.DOTALL)
+        assert "evil" in texts[name]
+        assert "evil" not in code
+        assert "*/" not in code

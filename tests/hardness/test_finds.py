@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from fuzz import attack, written
 from mutate import damaged
-from targets import Target, small_report, targets
+from targets import Target, history_file, small_report, targets
 
+from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
 
 BY_NAME = {target.name: target for target in targets()}
@@ -30,6 +32,18 @@ def table_of(made: dict) -> dict:
 
 def glance_of(made: dict) -> dict:
     return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "glance")
+
+
+@pytest.mark.parametrize(
+    ("design", "known"), [("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")]
+)
+def test_a_coupling_after_a_gear_that_is_none(design: str, known: str) -> None:
+    text = design_text(design)
+    changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
+    assert changed != text
+    line = refused("design", changed.encode())
+    assert 'coupling.after = "wor[["' in line
+    assert known in line
 
 
 def test_numbers_of_samples_beyond_floats() -> None:
@@ -62,6 +76,13 @@ def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     made = json.loads(small_report())
     change(made)
     assert words in refused("report", json.dumps(made).encode())
+
+
+def test_a_history_whose_broken_schema_is_quoted_in_the_error() -> None:
+    entry, broken = b"tablesnapshotssnapshots\x0eCREATE", b"table\x81napshotssnapshots\x0eDREATE"
+    assert entry in history_file()
+    line = refused("history", history_file().replace(entry, broken))
+    assert "is no history" in line
 
 
 def test_files_of_the_attack_lie_alone_in_their_folder() -> None:

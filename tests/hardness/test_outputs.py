@@ -27,7 +27,10 @@ def simulate(*options: str, **named: object) -> subprocess.CompletedProcess[str]
     return subprocess.run(command, text=True, timeout=120, check=False, **{"capture_output": True, **named})
 
 
-@pytest.mark.parametrize("name", ["a\x1b[31mb.toml", "a\x9bb.toml", "a\udc80b.toml"])
+DIRECTIONS = "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31mb.toml", "a\x9bb.toml", "a\udc80b.toml", "a\u202eb.toml"])
 def test_a_terminal_is_told_of_no_file_in_its_own_commands(name, tmp_path, monkeypatch, capsys) -> None:
     from reports.cli.main import main
 
@@ -37,7 +40,44 @@ def test_a_terminal_is_told_of_no_file_in_its_own_commands(name, tmp_path, monke
     assert said.startswith("wrote a?")
     assert said.rstrip("\n").isprintable()
     assert main(["init", name, "--force", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["file"] == name
+    said = capsys.readouterr().out
+    assert said.replace("\n", "").isprintable()
+    assert json.loads(said)["file"] == name
+
+
+@pytest.mark.parametrize("mark", DIRECTIONS)
+def test_a_mark_of_direction_is_shown_not_obeyed(mark, capsys) -> None:
+    from reports.cli.output import console, print_json, print_line, print_note, print_warning
+    from reports.html import environment
+    from reports.visible import escape
+
+    words = f"a{mark}b"
+    for say in (print_line, print_note, print_warning, console().print, print_json):
+        say(words)
+    said = capsys.readouterr()
+    assert mark not in said.out + said.err
+    assert json.loads(said.out.splitlines()[-1]) == words
+    template = environment().from_string('<a title="{{ x }}">{{ x }}{{ x | upper }}{{ y }}</a>')
+    assert template.render(x=words, y=7).count(f"U+{ord(mark):04X}") == 3
+    assert mark not in escape(words)
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31mb", "a\u202eb", "a\x85b"])
+def test_names_of_records_may_hold_anything(name, tmp_path, monkeypatch) -> None:
+    from reports.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    record, design = f"{name}.csv", ("--design", "ilr33-amber")
+    assert main(["simulate", "ilr33-amber", "--csv", record, "--duration", "0.5", "--quiet"]) == 0
+    assert main(["correlate", "ilr33-amber", record, "--out", "c", "--quiet"]) in (0, 1)
+    assert main(["pdf", "c/correlation.json"]) == 0
+    assert main(["identify", record, *design, "--accept", "--out", "i", "--quiet"]) in (0, 1)
+    assert main(["margins", "i/ilr33-amber-identified.toml"]) in (0, 1)
+    assert main(["objects", "export", "ilr33-amber", "--out", f"{name}.toml"]) == 0
+    assert main(["objects", "import", f"{name}.toml", "--out", "o.toml"]) == 0
+    assert main(["margins", "o.toml"]) in (0, 1)
+    for page in (*Path().glob("?/*.html"), *Path().glob("?/*.json"), *Path().glob("?/*.toml")):
+        assert set("\x1b\u202e\x85").isdisjoint(page.read_text(encoding="utf-8")), page
 
 
 def test_a_line_on_standard_error_is_one_that_can_be_read(capsys) -> None:

@@ -19,7 +19,8 @@ from actuator_lti.errors import InputError
 from reports.nightly.charts import Chart, line_chart
 from reports.nightly.night import approve, run_night
 from reports.nightly.source import read_study
-from reports.nightly.text import one_line, visible
+from reports.nightly.text import one_line
+from reports.visible import visible
 
 HOSTILE = (
     "<script>window.hacked=1</script>",
