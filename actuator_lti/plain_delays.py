@@ -1,7 +1,7 @@
 """A continuous linear system with exact internal delays as matrices and names only.
 
-The equations are those of `actuator_lti.delay_system`, whose python-control systems are made of these; how two
-systems are joined and how one is evaluated stands here alone.
+The equations are those of `actuator_lti.delay_system`, whose python-control systems are made of these; how
+two systems are joined and how one is evaluated stands here alone.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _ALGEBRAIC = 1e12  # condition of an algebraic loop beyond which it has no solut
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlainDelaySystem:
-    """``dx/dt = A x + B1 u + B2 z, y = C1 x + D11 u + D12 z, v = C2 x + D21 u + D22 z, z_k = v_k(t - delays_k)``.
+    """``dx/dt = A x + B1 u + B2 z``, ``y = C1 x + D11 u + D12 z``, ``v = C2 x + D21 u + D22 z``.
 
-    Margins, bandwidths and step figures take it as they take a `actuator_lti.delay_system.DelaySystem`.
+    The delays: ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take a `actuator_lti.delay_system.DelaySystem`.
 
     Attributes
     ----------

@@ -47,7 +47,7 @@ class PlainSystem:
     states: tuple[str, ...] = ()
 
     def __call__(self, points: npt.ArrayLike) -> Any:
-        """The response at complex points (z, or s where ``dt`` is 0), of their shape; inf + nan j at a pole."""
+        """The response at complex points (z; s where ``dt`` is 0), of their shape; inf + nan j at a pole."""
         asked = np.asarray(points, dtype=complex)
         flat = asked.reshape(-1)
         matrix = flat[:, None, None] * np.eye(len(self.A)) - self.A

@@ -13,7 +13,7 @@ from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRAC
 from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
-from reports.figures.map import WORDS
+from reports.figures.map import COLOURS, WORDS
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
