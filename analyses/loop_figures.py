@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from actuator_lti.as_control import as_control
 from actuator_lti.drive.profile import profile_note
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.plain_system import as_control
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from actuator_lti.plain_system import as_control
+from actuator_lti.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]

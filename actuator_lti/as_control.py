@@ -1,0 +1,35 @@
+"""The python-control system of a plain one: made where somebody asks for it.
+
+Importing python-control takes a second, and margins, bandwidths and steps do not need it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from actuator_lti.plain_delays import PlainDelaySystem
+from actuator_lti.plain_system import PlainSystem
+
+
+def as_control(system: Any) -> Any:
+    """The named python-control system of a plain one; anything else as it is.
+
+    With exact delays it is an `actuator_lti.delay_system.DelaySystem`, without a `control.StateSpace`.
+    """
+    if isinstance(system, PlainDelaySystem):
+        from actuator_lti.delay_system import DelaySystem
+
+        return DelaySystem.of(system, **_names(system))
+    if isinstance(system, PlainSystem):
+        import control
+
+        names: dict[str, Any] = _names(system)
+        if system.states:
+            names["states"] = [state.replace(".", "_") for state in system.states]
+        parts = (system.A, system.B, system.C, system.D, system.dt)
+        return control.ss(*parts, remove_useless_states=False, **names)
+    return system
+
+
+def _names(system: PlainSystem | PlainDelaySystem) -> dict[str, Any]:
+    return {"inputs": [system.source], "outputs": [system.signal], "name": system.name}
