@@ -101,34 +101,34 @@ class _Axis:
         """The only root between two points, by Newton's method held by bisection; proved by a change of sign."""
         wanted = ctx.prec
         bits = max(2 * wanted, _FIRST_BITS)
-        with ctx.workprec(bits):
-            a, b = arb(low), arb(high)
-            rising = self._sign(b) > 0
-            x = (a * b).sqrt().mid()
-            for _ in range(_ROUNDS):
+        a, b = arb(low), arb(high)
+        rising = self._sign(b) > 0
+        x = arb(math.sqrt(low) * math.sqrt(high))
+        for _ in range(_ROUNDS):
+            with ctx.workprec(bits):
                 p, slope = self._at(bits)
                 value = p(x)
                 if not (value > 0 or value < 0):
-                    value = value.mid()
+                    bits *= 2  # lost in rounding
+                    if bits > _MOST_BITS:
+                        break
+                    continue
                 if (value > 0) == rising:
                     b = x
                 else:
                     a = x
-                step = (value / slope(x)).mid()
-                ahead = (x - step).mid()
-                if not (step.is_finite() and ahead > a and ahead < b):
+                ahead = (x - value / slope(x)).mid()
+                if not (ahead.is_finite() and ahead > a and ahead < b):
                     ahead = ((a + b) / 2).mid()
-                near = arb(2) ** (-wanted - _SPARE_BITS) * abs(ahead)
-                if bool(abs(ahead - x) < near):
-                    below, above = self._sign(ahead - near), self._sign(ahead + near)
-                    if below * above < 0:
-                        return ahead + arb(0, 1) * near.abs_upper()
+                near = (arb(2) ** (-wanted - _SPARE_BITS) * abs(ahead)).mid()
+                if bool(abs(ahead - x) < near) and self._sign(ahead - near) * self._sign(ahead + near) < 0:
+                    return ahead + arb(0, 1) * near
                 x = ahead
         raise NotIsolated("a root did not settle")
 
     def _sign(self, x: arb) -> int:
         """The sign of p at an exact point; 0 where it could not be told."""
-        place, bits = x.mid(), _FIRST_BITS
+        place, bits = x.mid(), max(ctx.prec, _FIRST_BITS)
         while bits <= _MOST_BITS:
             with ctx.workprec(bits):
                 value = self._at(bits)[0](place)
