@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from flint import fmpz, fmpz_mat, fmpz_poly
+from flint import fmpz, fmpz_poly
 
 from actuator_lti.margins.certified_roots import Polynomial
+from actuator_lti.margins.exact_charpoly import characteristic, numerator
 from actuator_lti.margins.given import Given
 
 _S = fmpz_poly([0, 1])
@@ -90,19 +91,20 @@ def _by_coefficients(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
 
 
 def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
-    """D = det(sI - A), N = det(sI - A + b c) - D + d D: the matrix determinant lemma."""
+    """D = det(sI - A), N = c adj(sI - A) b + d D."""
     n = given.b.size
     (A, d), shift = _integers(given.A, given.d)
     (b,), shift_b = _integers(given.b)
     (c,), shift_c = _integers(given.c)
     if not n:
         return fmpz_poly(d), fmpz_poly([1 << shift])
-    scale = max(shift, shift_b + shift_c)
-    whole = fmpz_mat(n, n, A) * (1 << (scale - shift))
-    product = fmpz_mat(n, 1, b) * fmpz_mat(1, n, c) * (1 << (scale - shift_b - shift_c))
-    D = _unscaled(whole.charpoly(), scale)
-    N = _unscaled((whole - product).charpoly(), scale) - D
-    return N * (1 << shift) + D * d[0], D * (1 << shift)
+    whole = [A[k * n : k * n + n] for k in range(n)]
+    below = characteristic(whole)
+    above = numerator(whole, b, c, below)
+    # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
+    D, N = _unscaled(below, shift), _unscaled(above, shift)
+    power = shift_b + shift_c
+    return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
 
 
 def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:

@@ -9,37 +9,49 @@ a disc of radius n |p/p'| about a point holds a root, so n discs without common 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from flint import acb, acb_poly, arb, ctx, fmpz, fmpz_poly
+from flint import acb, acb_poly, arb, ctx, fmpz, fmpz_poly, nmod_poly
 from numpy.typing import NDArray
 
 from actuator_lti.margins.loop import Complex, Mask
 
 _FIRST_BITS, _MOST_BITS = 64, 1 << 13
 _ROUNDS = 120
+_MOST_MISSING = 0.5  # of the roots known: beyond, those of a neighbour are no start
+_SPLIT = 0.05  # about how far the roots of a multiple one are from each other in a neighbour
+_REAL = 1e-9  # imaginary over modulus below which a place may be that of a real root
+_PRIME = (1 << 61) - 1
+_UNIT = fmpz_poly([1, 1])
 _FEW = 1e-14  # relative step at which a position in double precision stands
 _TOLD_BITS = 10  # of p at a point: enough for a step
 _CLOSE_BITS = 512  # positions of roots closer than double precision parts
 
 Indices = NDArray[np.intp]
+Near = tuple[complex, ...] | None
 
 
 class NotIsolated(ArithmeticError):
     """The iteration did not end, or the discs have points in common."""
 
 
-def isolated_roots(p: fmpz_poly) -> list[acb]:
+def isolated_roots(p: fmpz_poly, near: Near = None) -> list[acb]:
     """All roots of a square-free polynomial with p(0) != 0, at the working precision; real ones marked so.
+
+    Parameters
+    ----------
+    near : tuple of complex, optional
+        About where they are, such as the roots of a neighbour: they only save time.
 
     Raises
     ------
     NotIsolated
         They could not be parted in this way.
     """
-    return _Polished(p).discs(list(_positions(tuple(p.coeffs()))))
+    return _Polished(p).discs(list(_positions(tuple(p.coeffs()), near)))
 
 
 def square_free(p: fmpz_poly) -> list[tuple[fmpz_poly, int]]:
@@ -49,18 +61,52 @@ def square_free(p: fmpz_poly) -> list[tuple[fmpz_poly, int]]:
 
 @lru_cache(maxsize=8)  # asked again at a higher precision
 def _factors(coefficients: tuple[fmpz, ...]) -> tuple[tuple[tuple[fmpz, ...], int], ...]:
-    _, result = fmpz_poly(list(coefficients)).factor_squarefree()
+    p = fmpz_poly(list(coefficients))
+    p, late = _without_unit_root(p)
+    result = [] if not late else [(fmpz_poly([1, 1]), late)]
+    if p.degree() > 0:
+        result += [(p, 1)] if _told_square_free(p) else p.factor_squarefree()[1]
     return tuple((tuple(factor.coeffs()), int(times)) for factor, times in result)
 
 
+def _without_unit_root(p: fmpz_poly) -> tuple[fmpz_poly, int]:
+    """Take out the root -1, as often as it occurs: poles at z = 0, whole samples of delay, lie there."""
+    times = 0
+    while p.degree() > 0 and p(-1) == 0:
+        p, times = p // _UNIT, times + 1
+    return p, times
+
+
+def _told_square_free(p: fmpz_poly) -> bool:
+    """Whether p is without a common factor with its derivative modulo a prime that keeps its degree.
+
+    Then it has none over the integers either; the other way round nothing is told.
+    """
+    small = nmod_poly([int(c % _PRIME) for c in p.coeffs()], _PRIME)
+    return small.degree() == p.degree() and small.gcd(small.derivative()).degree() == 0
+
+
 @lru_cache(maxsize=8)
-def _positions(coefficients: tuple[fmpz, ...]) -> tuple[acb, ...]:
+def _positions(coefficients: tuple[fmpz, ...], near: Near) -> tuple[acb, ...]:
     """Approximate roots, each nearer to its own than to any other."""
     steps = _NewtonSteps(fmpz_poly(list(coefficients)))
-    z = _starts(coefficients)
+    missing = len(coefficients) - 1 - len(near or ())
+    if near and 0 <= missing <= _MOST_MISSING * len(near):
+        with suppress(NotIsolated):
+            return _settled_positions(steps, np.concatenate([near, _about_unit(missing)]), _ROUNDS)
+    return _settled_positions(steps, _starts(coefficients), _ROUNDS)
+
+
+def _about_unit(count: int) -> Complex:
+    """Starts of roots that a neighbour has not: mostly of a multiple one at -1 that came apart."""
+    return np.asarray(_SPLIT * np.exp(2j * math.pi * (np.arange(count) + 0.3) / max(count, 1)) - 1.0)
+
+
+def _settled_positions(steps: _NewtonSteps, z: Complex, rounds: int) -> tuple[acb, ...]:
+    """Iterate from starting points."""
     active = np.ones(z.size, dtype=bool)
     with np.errstate(all="ignore"):
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             k = np.flatnonzero(active)
             move = _aberth(steps.at(z[k], k), _repulsion(z, k))
             if not np.isfinite(move).all():
@@ -112,7 +158,7 @@ def _parted(steps: _NewtonSteps, z: Complex, close: Mask) -> list[acb]:
 
 def _starts(coefficients: tuple[fmpz, ...]) -> Complex:
     """Points on the circles of the Newton polygon: as many as roots are of about that size."""
-    points = [(k, _log2(c)) for k, c in enumerate(coefficients) if c != 0]
+    points = [(k, log2_of(c)) for k, c in enumerate(coefficients) if c != 0]
     hull: list[tuple[int, float]] = []
     for k, size in points:
         while len(hull) > 1 and _above(hull[-2], (k, size), hull[-1]):
@@ -134,7 +180,8 @@ def _above(left: tuple[int, float], right: tuple[int, float], middle: tuple[int,
     return rise <= (right[1] - left[1]) * (middle[0] - left[0])
 
 
-def _log2(c: fmpz) -> float:
+def log2_of(c: fmpz) -> float:
+    """Base-2 logarithm of the size of an integer that is not 0."""
     size = abs(int(c))
     shift = max(size.bit_length() - 60, 0)
     return math.log2(size >> shift) + shift
@@ -161,7 +208,7 @@ class _NewtonSteps:
         bits = int(self._bits[k]) if k is not None else max(ctx.prec, _FIRST_BITS)
         while True:
             with ctx.workprec(bits):
-                p, slope = self._at_precision(bits)
+                p, slope = self.at_precision(bits)
                 value = p(x)
                 if value.rel_accuracy_bits() >= _TOLD_BITS or bits >= _MOST_BITS:
                     break
@@ -171,7 +218,8 @@ class _NewtonSteps:
         with ctx.workprec(bits):
             return value / slope(x)
 
-    def _at_precision(self, bits: int) -> tuple[acb_poly, acb_poly]:
+    def at_precision(self, bits: int) -> tuple[acb_poly, acb_poly]:
+        """p and p' with coefficients of so many bits."""
         if bits not in self._rounded:
             self._rounded[bits] = acb_poly(self._p), acb_poly(self._slope)
         return self._rounded[bits]
@@ -187,37 +235,58 @@ class _Polished:
     def discs(self, places: list[acb]) -> list[acb]:
         """One disc around each place, no two with a common point."""
         wanted = ctx.prec
-        with ctx.workprec(2 * wanted + _CLOSE_BITS):
+        polished = self._mirrored(places, wanted)
+        if len(polished) != len(places):
             polished = [self._polish(place, wanted) for place in places]
+        with ctx.workprec(2 * wanted + _CLOSE_BITS):
             _refuse_common_points(polished)
             return [_disc(x, radius) for x, radius in polished]
 
+    def _mirrored(self, places: list[acb], wanted: int) -> list[tuple[acb, arb]]:
+        """Discs about the places that are not below the real axis, and about their mirror images."""
+        result = []
+        for place in places:
+            z = complex(place)
+            if z.imag < -_REAL * abs(z):
+                continue
+            x, radius = self._polish(place, wanted)
+            result.append((x, radius))
+            if z.imag > _REAL * abs(z) and x.imag != 0:
+                result.append((x.conjugate(), radius))
+        return result
+
     def _polish(self, x: acb, wanted: int) -> tuple[acb, arb]:
+        bits = 2 * wanted + _FIRST_BITS
         small = arb(2) ** (-wanted - 10)
         for _ in range(_ROUNDS):
-            step = self._steps.exactly(x)
-            if not step.is_finite():
-                raise NotIsolated("a step without bound")
-            radius = self._radius(x)
-            if bool(radius <= small * abs(x)):
-                break
-            x = (x - step).mid()
+            with ctx.workprec(bits):
+                value, slope, radius = self._bounded(x)
+                if bool(radius <= small * abs(x)):
+                    break
+                if value.rel_accuracy_bits() >= _TOLD_BITS:
+                    x = (x - value / slope).mid()
+                    continue
+            bits *= 2  # what p is there is lost in rounding, and the disc too wide
+            if bits > 4 * _MOST_BITS:
+                raise NotIsolated("Newton's method did not converge")
         else:
             raise NotIsolated("Newton's method did not converge")
         if not bool(abs(x.imag) > radius):
             x = acb(x.real)
-            radius = self._radius(x)
+            with ctx.workprec(bits):
+                radius = self._bounded(x)[2]
         return x, radius
 
-    def _radius(self, x: acb) -> arb:
-        """n |p/p'|, rounded up; a root is no farther away than this."""
+    def _bounded(self, x: acb) -> tuple[acb, acb, arb]:
+        """p and p' at a point, and n |p/p'|, rounded up: a root is no farther away than this."""
         bits = ctx.prec
         while bits <= 4 * _MOST_BITS:
             with ctx.workprec(bits):
-                p, slope = self._steps._at_precision(bits)
+                p, slope = self._steps.at_precision(bits)
                 below = slope(x)
                 if below.rel_accuracy_bits() >= _TOLD_BITS:
-                    return arb((self._degree * abs(p(x)) / abs(below)).abs_upper())
+                    value = p(x)
+                    return value, below, arb((self._degree * abs(value) / abs(below)).abs_upper())
             bits *= 2
         raise NotIsolated("the slope at a root could not be told from zero")
 
