@@ -31,7 +31,7 @@ TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated 
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
 POINTS = 600  # angles to start from
 SMOOTH = 0.05
-NO_GAIN = 1e-9  # of the peak of |T|: less at DC is rounding of a response that is zero there
+NO_GAIN = 1e-6  # of the peak of |T|: less at DC (120 dB) is the rounding of a response that is zero there
 LOG_10 = 2.302585092994046
 
 

@@ -24,7 +24,14 @@ from typing import Any
 from actuator_lti.batch import _figures, _quoted, _response, _run
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import Kind
-from nonlinear.export import linear, linear_figures, linear_limiters, linear_periodic, linear_trust
+from nonlinear.export import (
+    linear,
+    linear_figures,
+    linear_limiters,
+    linear_periodic,
+    linear_rest,
+    linear_trust,
+)
 from nonlinear.export.build import compile_files
 from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
 
@@ -47,6 +54,8 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear_limiters.outer_interval: (_ROW,),
     linear_figures.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     linear_trust.rounding_decides: ("int", *(_ROW,) * 9),
+    linear_rest.corrected_at_rest: ("int", *(_ROW,) * 11),
+    linear_rest.crossover_missed: ("int", *(_ROW,) * 6),
     _quoted.quoted: (_ROW, "float", _ROW),
 }
 _SIZES = {

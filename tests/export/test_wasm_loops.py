@@ -245,6 +245,43 @@ def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path: Path) -> 
         assert got["modulus_margin"] == pytest.approx(wanted.modulus_margin, rel=1e-9)
 
 
+@pytest.mark.parametrize("base", ["ilr33-amber", "ilr33-amber-multirate", "ilr33-amber-compliant", "joint"])
+def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path: Path) -> None:
+    """A load with a spring: the velocity loop's gain margin lies at rest, behind a mode speed does not show.
+
+    Certified margins of the same loop say what it is; half of its digits were lost in the page.
+    """
+    plain = load_design(base)
+    designs = [
+        replace(plain, load=replace(plain.load, path="back-drivable", moment_slope_Nm_rad=slope))
+        for slope in (1.0, 1e3, 1e5)
+    ]
+    at_rest = 0
+    for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
+        for name, loop in assemble_loops(design).present.items():
+            got = dict(zip(LOOP_QUANTITIES, numbers(ours[name]["figures"]), strict=False))
+            truth = stability_margins(loop.open_loop, certify=True)
+            assert got["modulus_margin"] == pytest.approx(truth.modulus_margin, rel=1e-9)
+            if truth.gain_margin_db is None or math.isinf(truth.gain_margin_db):
+                continue
+            if abs(truth.gain_margin_db) < FURTHEST_DB:
+                assert got["gain_margin"] == pytest.approx(truth.gain_margin_db, rel=1e-9), name
+            at_rest += any(each.frequency_rad_s == 0.0 for each in truth.gain_margins)
+    assert at_rest > 0 or base != "ilr33-amber"
+
+
+def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path: Path) -> None:
+    """A current loop of almost no integral part: where no figure is certain, the page gives none either."""
+    whole = load_design("ilr33-amber")
+    control = whole.controller
+    assert control.current is not None
+    slow = replace(control.current, integral_time_s=100.0)
+    design = replace(whole, controller=replace(control, position=None, velocity=None, current=slow))
+    (ours,) = in_node([design], tmp_path)
+    assert linear_figures(Population(design, {}, 1)).withheld("current")[0]
+    assert bool(ours["current"]["doubtful"])
+
+
 def unstable_inside(seed: int) -> Design:
     """A current loop far beyond its border that runs 8 to 24 times between two position updates."""
     rng = np.random.default_rng([seed, 16])

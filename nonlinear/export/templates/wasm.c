@@ -161,8 +161,14 @@ static int one(int stage, double lead, int timed)
             it->a[k * n + k] -= 1.0;
         }
     }
-    it->doubtful = !isnan(lead)
-        && drive_rounding_decides(n, given_a, given_b, given_c, poles, it->row, work, state, lent, column);
+    it->doubtful = 0;
+    if (!isnan(lead)) {
+        drive_corrected_at_rest(
+            n, given_a, given_b, given_c, it->row, work, state, column, exchanged, lent, real, imaginary);
+        it->doubtful =
+            drive_rounding_decides(n, given_a, given_b, given_c, poles, it->row, work, state, lent, column)
+            || drive_crossover_missed(n, given_a, given_b, given_c, it->row, work, state);
+    }
     drive_quoted(it->row, it->period, it->quoted);
     it->n = n;
     return n;
