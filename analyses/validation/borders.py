@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import exp, inf, isfinite, log
+from math import ceil, exp, inf, isfinite, log
 from typing import Literal
 
 import numpy as np
@@ -53,6 +53,10 @@ SLOW = "a slow motion that dies out hides the border: not told apart within the 
 SUDDEN = "no steady growth: a limit, a reversal or the play is met before"
 DECEIVED = 3.0  # widths of the bracket that a border may move when it is measured again
 GAIN_RANGE = 1e3
+NEXT_TO = (0.97, 0.9986, 1.0014, 1.03)  # of an expected border: those inside lie `CLOSE` apart
+PART_WAY = np.array([0.02, 0.2, 0.4, 0.6, 0.8])  # of an expected delay
+FURTHER = (1.2, 2.0, 6.0)  # times the expected border
+APART, FEWEST = 1.5, 3  # ratio of two gains on the way to it, and how many at least
 LONGEST_DELAY_SAMPLES = 2000.0
 SHORTEST_DELAY_SAMPLES = 0.02
 
@@ -87,6 +91,9 @@ class Search:
         Where a real pole leaves the unit circle: 0 (at 1: the drive drifts away) or half a sampling
         frequency (at -1: it alternates); ``None`` for an oscillation.  The span of such a motion changes from
         window to window by its growth, exactly; then ``frequency_hz`` is one over the length of a window.
+    foreseen : float or None
+        Where the border is foreseen: values next to it are tried in the first round, beside those from the
+        nominal drive on that find any other border.
     """
 
     setup: Rig
@@ -98,6 +105,7 @@ class Search:
     close: float = CLOSE
     smooth: bool = True
     alternating_hz: float | None = None
+    foreseen: float | None = None
 
     @property
     def real_pole(self) -> bool:
@@ -136,7 +144,8 @@ class Search:
     def _burst(self) -> Floats:
         """Some periods of the expected oscillation, swelling and dying away: other modes are hardly moved."""
         turn = 2.0 * np.pi * self.frequency_hz * self.setup.design.controller.period_s
-        t = np.arange(int(np.ceil(2.0 * np.pi * BURST / turn)) + 1)
+        periods = max(BURST * self.cycles, LEAST_BURST)
+        t = np.arange(int(np.ceil(2.0 * np.pi * periods / turn)) + 1)
         shape = np.sin(np.pi * t / max(t.size - 1, 1)) ** 2
         return np.append(shape * np.sin(turn * t + AHEAD), 0.0)
 
@@ -178,10 +187,27 @@ class Search:
 
     def grid(self) -> Floats:
         """First values to try, outwards from the nominal drive."""
+        if self.foreseen is not None:
+            return self._about(self.foreseen)
         if self.kind == "delay":
             return np.geomspace(SHORTEST_DELAY_SAMPLES, LONGEST_DELAY_SAMPLES, 2 * VALUES)
         steps = np.geomspace(1.0 + 1e-3, self.search_range, 2 * VALUES if self.smooth else VALUES)
         return steps if self.kind == "gain up" else 1.0 / steps
+
+    def _about(self, expected: float) -> Floats:
+        """Values up to an expected border, next to it on both sides, and beyond."""
+        if self.kind == "delay":
+            before, last = expected * PART_WAY, LONGEST_DELAY_SAMPLES
+            beyond = expected * np.array(FURTHER)
+        else:
+            way = abs(log(expected))
+            count = max(ceil(way / log(APART)), FEWEST)
+            before = np.exp(np.sign(log(expected)) * way * (np.arange(count) + 0.5) / count)
+            last = self.search_range if self.kind == "gain up" else 1.0 / self.search_range
+            beyond = expected ** np.sign(log(expected)) * np.array(FURTHER)
+            beyond = beyond if self.kind == "gain up" else 1.0 / beyond
+        near = expected * (np.array(NEXT_TO) if self.kind != "gain down" else np.array(NEXT_TO)[::-1])
+        return np.concatenate([before, near, beyond[np.abs(np.log(beyond)) < abs(log(last))], [last]])
 
     def frequency(self, result: BatchResult) -> Floats:
         """Frequency of the oscillation, Hz, from the turn of the fundamental between the windows."""
@@ -193,7 +219,7 @@ class Search:
         return (result.column("cycles") + turn / (2.0 * np.pi)) / seconds
 
 
-BURST = 8  # periods of the kick
+BURST, LEAST_BURST = 0.4, 3.0  # length of the kick over that of a window, and periods at least
 AHEAD = 0.7  # rad, its phase: at half the sampling frequency a sine itself is nothing
 IMPULSE = np.array([1.0, 0.0])
 
@@ -396,24 +422,22 @@ def find_borders(
 
 
 def _hunt(hunts: list[_Hunt], threads: int | None, progress: Progress | None) -> bool:
-    """Take some hunts to their ends; whether there was time enough."""
-    try:
-        _control(hunts, threads)
-    except OutOfTime:
-        return False
-    for k in range(ROUNDS):
-        waiting = [hunt for hunt in hunts if not hunt.done and not hunt.spoiled]
-        if not waiting:
-            break
+    """Take some hunts to their ends, the short ones first; whether there was time enough for all."""
+    groups = _groups(hunts)
+    for k, group in enumerate(groups):
         try:
-            for group in _groups(waiting):
-                _advance(group, threads)
+            _control(group, threads)
+            for _ in range(ROUNDS):
+                waiting = [hunt for hunt in group if not hunt.done and not hunt.spoiled]
+                if not waiting:
+                    break
+                _advance(waiting, threads)
         except OutOfTime:
             return False
+        with suppress(OutOfTime):
+            _measure_again([hunt for hunt in group if hunt.smooth], threads)
         if progress is not None:
-            progress(k + 1, ROUNDS)
-    with suppress(OutOfTime):
-        _measure_again([hunt for hunt in hunts if hunt.smooth], threads)
+            progress(k + 1, len(groups))
     return True
 
 
@@ -452,7 +476,7 @@ def _control(hunts: list[_Hunt], threads: int | None) -> None:
 
 
 def _groups(hunts: list[_Hunt]) -> list[list[_Hunt]]:
-    """Searches that run together, the short ones first: what has no time left is then the longest."""
+    """Searches that run together to their ends, the short ones first: what is cut is then the longest."""
     ordered = sorted(hunts, key=lambda hunt: hunt.search.ticks)
     groups: list[list[_Hunt]] = [[]]
     ticks = 0

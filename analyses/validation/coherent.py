@@ -28,9 +28,17 @@ class Coherent:
     ticks: npt.NDArray[np.int64]
     cycles: npt.NDArray[np.int64]
 
+    def part(self, which: npt.NDArray[np.int64]) -> Coherent:
+        """Some of them."""
+        return Coherent(self.frequency_hz[which], self.ticks[which], self.cycles[which])
+
 
 def coherent(
-    frequency_hz: npt.ArrayLike, tick_s: float, base_ticks: int = 1, least_cycles: int = 1
+    frequency_hz: npt.ArrayLike,
+    tick_s: float,
+    base_ticks: int = 1,
+    least_cycles: int = 1,
+    least_samples: npt.ArrayLike = LEAST_SAMPLES,
 ) -> Coherent:
     """Move frequencies to the nearest ones that can be measured without leakage.
 
@@ -41,6 +49,8 @@ def coherent(
     tick_s : float
     base_ticks : int
         Ticks after which everything in the drive repeats.
+    least_samples : int or array_like of int
+        Of the slowest loop in a window: frequencies that can be measured lie one over it apart.
 
     Examples
     --------
@@ -50,7 +60,7 @@ def coherent(
     """
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     period = base_ticks * tick_s
-    cycles = np.maximum(least_cycles, np.ceil(LEAST_SAMPLES * asked * period)).astype(np.int64)
+    cycles = np.maximum(least_cycles, np.ceil(np.asarray(least_samples) * asked * period)).astype(np.int64)
     samples = np.rint(cycles / (asked * period)).astype(np.int64)
     return Coherent(cycles / (samples * period), samples * base_ticks, cycles)
 

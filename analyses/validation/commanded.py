@@ -18,6 +18,7 @@ from analyses.validation.bias_motion import BiasMotion, bias_motion, may_stand, 
 from analyses.validation.coherent import coherent
 from analyses.validation.response import Sweep
 from analyses.validation.rig import every, stages_of
+from analyses.validation.transient import fourier_sum, long_enough
 from nonlinear import Rows, Trajectory
 
 Floats = npt.NDArray[np.float64]
@@ -75,6 +76,55 @@ def command_sweep(design: Design, frequency_hz: Floats, settle_ticks: int) -> Sw
     )
 
 
+def command_step(design: Design, frequency_hz: Floats, slowest_ticks: float) -> Sweep | None:
+    """The same from one long step of the command, for a drive that is slow against its tick.
+
+    ``None`` where the step would take too long, or something not linear takes part in it.  See
+    `analyses.validation.transient`; ``slowest_ticks`` is the slowest time constant.
+    """
+    base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
+    ticks = long_enough(slowest_ticks, base)
+    if ticks is None:
+        return None
+    motion = standing(design) if may_stand(design) else bias_motion(design)
+    size = FAINT * _full(design)
+    values = []
+    for part in (0.0, 0.5, 1.0):
+        run = _run(design, motion, part * size, 0.0, ticks, base)
+        if _why_not(design, motion, run, 0):
+            return None
+        values.append(np.asarray(getattr(run, _signal(design)), dtype=float))
+    rest, half, whole = values
+    commanded = size * (design.total_ratio if design.controller.outermost == "velocity" else 1.0)
+    period_s = base * design.controller.period_s
+    answers = [(y - rest) / (part * commanded) for y, part in ((whole, 1.0), (half, 0.5))]
+    G, again = (fourier_sum(y, frequency_hz, period_s) for y in answers)
+    left = float(np.ptp(answers[0][-max(rest.size // 10, 2) :]))
+    nothing = np.full(G.size, np.nan, complex)
+    return Sweep(
+        design_name=design.name,
+        loop="command",
+        point="command",
+        period_s=period_s,
+        frequency_hz=frequency_hz,
+        open_loop=nothing,
+        closed_loop=G,
+        sensitivity=nothing,
+        plant=nothing,
+        amplitude=np.full(G.size, size),
+        distortion=np.zeros(G.size),
+        unsteadiness=np.abs(G - again) / np.abs(G),
+        ticks=np.full(G.size, float(ticks)),
+        reason=("",) * G.size,
+        speed_rad_s=motion.speed_rad_s,
+        error=(np.abs(G - again).max() + left) / np.abs(G),
+    )
+
+
+def _signal(design: Design) -> str:
+    return SIGNAL.get(design.controller.outermost, "motor_speed_rad_s")
+
+
 @dataclass(frozen=True)
 class _Point:
     """One frequency as measured."""
@@ -117,7 +167,7 @@ def _full(design: Design) -> float:
 def _run(
     design: Design, motion: BiasMotion, amplitude: float, hertz: float, ticks: int, base: int
 ) -> Trajectory:
-    """The run, recorded at the instants of the outermost stage."""
+    """The run, recorded at the instants of the outermost stage; a step instead of a sine of 0 Hz."""
     row = Rows.of(design, friction_on=motion.friction_on, limits_on=False)
     motion.load(row)
     row["twist_start"] = motion.twist_rad
@@ -128,7 +178,10 @@ def _run(
             row.step("bias", angle / design.total_ratio, -1.0)
     row["friction_feedforward"] = 0.0  # the sign of the command's motion: no part of a linear response
     row["ticks"], row["record_every"] = ticks, base
-    row.sine("command", amplitude, hertz)
+    if hertz > 0.0:
+        row.sine("command", amplitude, hertz)
+    else:
+        row.step("command", amplitude)
     if motion.speed_rad_s:
         row["speed_start"], row["current_start"] = motion.speed_rad_s, motion.current_A
         row["load_speed_start"] = motion.speed_rad_s / design.ratio_to_coupling
@@ -145,7 +198,7 @@ def _read(
     design: Design, motion: BiasMotion, run: Trajectory, amplitude: float, hertz: float, samples: int
 ) -> _Point:
     """Response over the last window of whole periods, and its change from the one before."""
-    values = getattr(run, SIGNAL.get(design.controller.outermost, "motor_speed_rad_s"))
+    values = getattr(run, _signal(design))
     if design.controller.outermost == "position":
         values = values - motion.speed_rad_s / design.total_ratio * run.time_s
     turned = np.exp(-2j * np.pi * hertz * run.time_s)
@@ -155,22 +208,26 @@ def _read(
         for part in (slice(n - samples, n), slice(n - 2 * samples, n - samples))
     )
     change = abs(last - before) / max(abs(last), 1e-300)
-    speed = run.motor_speed_rad_s[n - samples :]
-    acting = [name for name in run.limits if run.limit_active(name)[n - samples :].any()]
-    reason = "not steady" if not change <= STEADY else ""
-    if run.status != "ok":
-        reason = run.status
-    elif acting:
-        reason = f"{acting[0]} limit"
-    elif motion.friction_on and speed.min() <= 0.0:
-        reason = "speed reversal"
-    elif design.load.gravity is not None and np.ptp(run.output_angle_rad) > SMALL_ANGLE_RAD:
-        reason = "gravity is not proportional to the angle"
-    elif motion.coupling_Nm and _parted(run, n - samples):
-        reason = "the coupling comes free"
+    reason = _why_not(design, motion, run, n - samples) or ("" if change <= STEADY else "not steady")
     # a speed is commanded at the output, and predicted at the motor
     commanded = amplitude * (design.total_ratio if design.controller.outermost == "velocity" else 1.0)
     return _Point(amplitude, last / commanded, change, reason)
+
+
+def _why_not(design: Design, motion: BiasMotion, run: Trajectory, since: int) -> str:
+    """What is not linear in a run from a record on; empty where nothing is."""
+    acting = [name for name in run.limits if run.limit_active(name)[since:].any()]
+    if run.status != "ok":
+        return run.status
+    if acting:
+        return f"{acting[0]} limit"
+    if motion.friction_on and run.motor_speed_rad_s[since:].min() <= 0.0:
+        return "speed reversal"
+    if design.load.gravity is not None and np.ptp(run.output_angle_rad) > SMALL_ANGLE_RAD:
+        return "gravity is not proportional to the angle"
+    if motion.coupling_Nm and _parted(run, since):
+        return "the coupling comes free"
+    return ""
 
 
 def _parted(run: Trajectory, since: int) -> bool:

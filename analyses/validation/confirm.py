@@ -14,7 +14,7 @@ from analyses.responses import response_at
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.coherent import LEAST_SAMPLES
 from analyses.validation.rig import Rig
-from analyses.validation.sweep import SETTLE_TIME_CONSTANTS
+from analyses.validation.sweep import EVER_TICKS, SETTLE_TIME_CONSTANTS, settling_ticks_of
 from analyses.validation.tolerance import allowed
 from nonlinear import Rows
 from nonlinear.probe import fractional_delay
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 SETTLE_CYCLES = 20
+LONG_TICKS, FEWEST = 10_000, 0.3  # a window longer than this holds fewer periods, down to this share
+LEAST_DELAY = 1e-3  # samples
 LONGEST_SETTLE_TICKS = 5_000  # at first; what then contradicts is looked at again
 AGAIN = 16  # times the wait
 LONGEST_AGAIN_TICKS = 100_000
@@ -180,13 +182,19 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     ups = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio > 1.0]
     downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
     up, down = min(ups, default=None), max(downs, default=None)
-    result = [_gain(setup, "gain up", up, settle_ticks, loop)]
-    result.append(_gain(setup, "gain down", down, settle_ticks, loop))
+    ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, setup.design.name, EVER_TICKS)
+    result = [
+        replace(asked, settles_ticks=max(ever, asked.settles_ticks))
+        for asked in (
+            _gain(setup, "gain up", up, settle_ticks, loop),
+            _gain(setup, "gain down", down, settle_ticks, loop),
+        )
+    ]
     delay = margins.delay_margin
     if delay is not None and delay.samples is not None and isfinite(delay.samples):
         hertz = delay.frequency_rad_s / (2.0 * pi)
         best = instrument_delay(loop.plain_open, delay.samples, delay.frequency_rad_s * loop.period_s)
-        search = Search(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
+        search = _expecting(setup, "delay", hertz, settle_ticks, delay.samples)
         result.append(Question(search, "delay", delay.samples, hertz, best))
     return result
 
@@ -219,7 +227,7 @@ def point_questions(
         if exact.delay_s is not None and isfinite(exact.delay_s):
             ticks = exact.delay_s / setup.design.controller.period_s
             hertz = oscillation_hz(loop, delay_s=exact.delay_s)
-            search = ComputingDelay(setup, "delay", hertz, _settle(setup, hertz, settle_ticks))
+            search = _expecting(setup, "delay", hertz, settle_ticks, ticks, ComputingDelay)
             result.append(Question(search, "computing delay", ticks, hertz))
     return result
 
@@ -267,7 +275,7 @@ def _gain(
     if alternating:
         return Question(_real_pole(setup, kind, settle_ticks, alternating[0]), kind, ratio, alternating[0])
     hertz = min(hertz, 0.97 * 0.5 / setup.period_s)
-    return Question(Search(setup, kind, hertz, _settle(setup, hertz, settle_ticks)), kind, ratio, hertz)
+    return Question(_expecting(setup, kind, hertz, settle_ticks, ratio), kind, ratio, hertz)
 
 
 def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
@@ -303,10 +311,19 @@ def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Searc
     return Search(setup, kind, hertz, wait, cycles=1, alternating_hz=at_hz)
 
 
-def _settle(setup: Rig, hertz: float, settle_ticks: int) -> int:
-    """Wait for whatever is not the oscillation: some of its periods, and the nominal loop's slowest mode."""
-    tick_s = setup.design.controller.period_s
-    return max(ceil(SETTLE_CYCLES / (hertz * tick_s)), min(settle_ticks, LONGEST_SETTLE_TICKS))
+def _expecting(
+    setup: Rig, kind: Kind, hertz: float, settle_ticks: int, expected: float, how: type[Search] = Search
+) -> Search:
+    """Look for an oscillation, about where it is expected first.
+
+    Before the windows it waits for whatever is not the oscillation: for some of its periods, and for the
+    nominal loop's slowest mode. Of an oscillation that is slow against the tick fewer periods are looked at.
+    """
+    period = 1.0 / (hertz * setup.design.controller.period_s)
+    fewer = min(max(LONG_TICKS / (CYCLES * period), FEWEST), 1.0)
+    wait = max(ceil(fewer * SETTLE_CYCLES * period), min(settle_ticks, LONGEST_SETTLE_TICKS))
+    cycles = ceil(fewer * CYCLES)
+    return how(setup, kind, hertz, wait, cycles=cycles, foreseen=max(expected, LEAST_DELAY))
 
 
 def instrument_delay(open_loop: Any, samples: float, turn: float) -> float | None:

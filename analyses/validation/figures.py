@@ -6,17 +6,20 @@ bracket, then interpolated by a polynomial through the nearest points; no linear
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import nan, pi, sqrt
 
 import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.budget import OutOfTime
-from analyses.validation.coherent import coherent
+from analyses.validation.coherent import LEAST_SAMPLES, coherent
 from analyses.validation.reading import (
+    NEAREST,
     NOTHING,
+    SAME,
     Reading,
     crossing,
     distinct,
@@ -25,42 +28,22 @@ from analyses.validation.reading import (
     value_at,
 )
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig, producer, small_rig
+from analyses.validation.rig import Rig, producer
+from analyses.validation.step import ROUNDING, StepMeasured, step_response
 from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
+from analyses.validation.transient import Transient
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
 PEAK_DB = 1e-3  # a maximum is measured again until it no longer changes by so much
 PEAK_ROUNDS = 5
+TOP_DB = 0.02  # so much lower, the points beside a maximum lie close enough; closer, its place is all noise
+MOST_SAMPLES = 20_000  # in the window of a point that is measured again
 DIP = 1.0  # of the value at zero frequency: lower minima are looked at closely
 WIDE = 1.15  # ratio of two frequencies: a crossing between them is measured again
-SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
-SETTLED = 0.02  # band of the settling time
-UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
-ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
 HIGHEST_OF_NYQUIST = 0.4995
+RESPONSES = ("open_loop", "closed_loop", "sensitivity")
 NO_TIME = "no time left for it"
-STEP_PART = 0.02  # of the room of the signal
-
-
-@dataclass(frozen=True)
-class StepMeasured:
-    """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
-
-    ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
-    the final value (what its last tenth still moves), the other two what it does to the times.
-    """
-
-    rise_time_s: float
-    overshoot_percent: float
-    settling_time_s: float
-    final_value: float
-    time_s: Floats
-    response: Floats
-    reason: str
-    error: float = 0.0
-    rise_error_s: float = 0.0
-    settling_error_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,9 +63,9 @@ class Measured:
     step : StepMeasured
     sweep : Sweep
         With the points measured again.
-    point_error : ndarray, shape (K,)
-        Relative error of each point of the sweep: what two windows differ by, carried on to the end of the
-        transient.
+    point_error : mapping of str to ndarray, shape (K,)
+        Relative error of each point of ``open_loop``, ``closed_loop`` and ``sensitivity``: what two windows
+        differ by, carried on to the end of the transient.
     no_dc : str
         Why the value at zero frequency is not known; then what is related to it is nothing.
     cut : str
@@ -99,13 +82,18 @@ class Measured:
     crossover: Reading
     step: StepMeasured
     sweep: Sweep
-    point_error: Floats
+    point_error: Mapping[str, Floats]
     no_dc: str = ""
     cut: str = ""
 
 
 def measure_figures(
-    setup: Rig, sweep: Sweep, settle_ticks: int, step_ticks: int, slowest_ticks: float | None = None
+    setup: Rig,
+    sweep: Sweep,
+    settle_ticks: int,
+    step_ticks: int,
+    slowest_ticks: float | None = None,
+    transient: Transient | None = None,
 ) -> Measured:
     """Measure what a sweep brackets, and the step.
 
@@ -118,10 +106,12 @@ def measure_figures(
         Waited for before a point of the sweep; length of the step response.
     slowest_ticks : float, optional
         Slowest time constant of the loop; by default that which the step response is made for.
+    transient : Transient, optional
+        Where the sweep comes from it: its step, and its points in between.
     """
     cut = ""
     try:
-        step = step_response(setup, step_ticks)
+        step = step_response(setup, step_ticks) if transient is None else transient.step
     except OutOfTime:
         step, cut = StepMeasured(nan, nan, nan, nan, np.empty(0), np.empty(0), NO_TIME), "step response"
     lost = step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0
@@ -130,26 +120,38 @@ def measure_figures(
     dc = 1.0 if lost else step.final_value
     fine, changed = sweep, 0.0
     try:
-        fine = refined(setup, fine, [*_brackets(fine, dc), *_dips(fine, dc)], settle_ticks)
+        more = partial(refined, setup, settle_ticks=settle_ticks, transient=transient)
+        fine = more(fine, [*_brackets(fine, dc), *_dips(fine, dc)])
         wide = [pair for pair in _falls(fine, dc) if pair[1] > WIDE * pair[0]]
-        fine = refined(setup, fine, wide, settle_ticks)
-        fine, changed = _peaks_refined(setup, fine, settle_ticks)
+        fine = more(fine, wide)
+        fine, changed = _peaks_refined(more, fine)
     except OutOfTime:  # the sweep stands as it is
         cut = ", ".join([*([cut] if cut else []), "points about each figure"])
     f = fine.frequency_hz
-    own = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
-    error = float(own[fine.valid].max())
+    if transient is None:
+        each = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
+        own = dict.fromkeys(RESPONSES, each)
+    else:
+        own = transient.errors(fine)
+    error = partial(_error_at, fine, own, everywhere=transient is None)
     closed = np.abs(fine.closed_loop) / abs(dc)
     phase = np.degrees(_phase(fine.closed_loop * np.sign(dc)))
     crossover, margin = _phase_margin(fine, error)
-    peak, at = maximum(f, closed, error + step.error + changed / 8.7)
-    top, _ = maximum(f, np.abs(fine.closed_loop), error)
-    peak_s, _ = maximum(f, np.abs(fine.sensitivity), error)
+    at_top = error("closed_loop", _highest(f, closed))
+    peak, at = maximum(f, closed, at_top + step.error + changed / 8.7)
+    top, _ = maximum(f, np.abs(fine.closed_loop), at_top)
+    peak_s, _ = maximum(
+        f, np.abs(fine.sensitivity), error("sensitivity", _highest(f, np.abs(fine.sensitivity)))
+    )
     low = Reading(abs(dc), abs(dc) * step.error)
     over = (peak.value or 0.0) > 1.0
     return Measured(
-        bandwidth=first_fall(f, closed, sqrt(0.5), sqrt(0.5) * (error + step.error)),
-        minus90deg=first_fall(f, phase, -90.0, float(np.degrees(error))),
+        bandwidth=first_fall(
+            f, closed, sqrt(0.5), sqrt(0.5) * (error("closed_loop", _fall(f, closed, sqrt(0.5))) + step.error)
+        ),
+        minus90deg=first_fall(
+            f, phase, -90.0, float(np.degrees(error("closed_loop", _fall(f, phase, -90.0))))
+        ),
         resonance_peak=_decibel(peak) if over else Reading(0.0, 8.7 * peak.error),
         resonance=at if over else Reading(0.0),
         sensitivity_peak=_decibel(peak_s, changed),
@@ -164,6 +166,26 @@ def measure_figures(
         else "",
         cut=cut,
     )
+
+
+def _error_at(sweep: Sweep, own: Mapping[str, Floats], name: str, hertz: float, *, everywhere: bool) -> float:
+    """Relative error of the points about a frequency; of all, where a transient may hide from some."""
+    errors, valid = own[name], sweep.valid
+    if everywhere or not np.isfinite(hertz):
+        return float(errors[valid].max())
+    k = int(np.searchsorted(sweep.frequency_hz, hertz))
+    near = slice(max(k - NEAREST, 0), k + NEAREST)
+    return float(errors[near][valid[near]].max(initial=0.0))
+
+
+def _highest(f: Floats, values: Floats) -> float:
+    return float(f[int(np.argmax(np.where(np.isfinite(values), values, -np.inf)))])
+
+
+def _fall(f: Floats, values: Floats, level: float) -> float:
+    """Where values first fall below a level; NaN if nowhere."""
+    below = values < level
+    return float(f[int(np.argmax(below))]) if below.any() else nan
 
 
 BESIDE = 2  # points on either side
@@ -243,21 +265,32 @@ def most_frequent(reasons: Sequence[str]) -> str:
     return f"{word} at {given.count(word)} of {len(reasons)} frequencies"
 
 
-def _peaks_refined(setup: Rig, sweep: Sweep, settle_ticks: int) -> tuple[Sweep, float]:
+def _peaks_refined(
+    more: Callable[[Sweep, list[tuple[float, float]]], Sweep], sweep: Sweep
+) -> tuple[Sweep, float]:
     """Measure around the maxima of T and S until they no longer change; with the last change in dB."""
     before, change = _peaks_db(sweep), 0.0
     for _ in range(PEAK_ROUNDS):
         pairs = []
         for values in (np.abs(sweep.closed_loop), np.abs(sweep.sensitivity)):
-            f, v = distinct(sweep.frequency_hz, values)
-            k = int(np.argmax(np.where(np.isfinite(v), v, -np.inf)))
-            pairs += [(float(f[j]), float(f[j + 1])) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
-        sweep = refined(setup, sweep, list(dict.fromkeys(pairs)), settle_ticks)
+            pairs += _beside_top(sweep.frequency_hz, values)
+        if not pairs:
+            break
+        sweep = more(sweep, list(dict.fromkeys(pairs)))
         after = _peaks_db(sweep)
         change, before = float(np.abs(after - before).max()), after
         if change < PEAK_DB:
             break
     return sweep, change
+
+
+def _beside_top(frequency_hz: Floats, values: Floats) -> list[tuple[float, float]]:
+    """The intervals beside the largest value; none where the points beside it are nearly as high."""
+    f, v = distinct(frequency_hz, values)
+    k = int(np.argmax(np.where(np.isfinite(v), v, -np.inf)))
+    if 0 < k < v.size - 1 and bool((20.0 * np.log10(v[k] / v[[k - 1, k + 1]]) < TOP_DB).all()):
+        return []
+    return [(float(f[j]), float(f[j + 1])) for j in (k - 1, k) if j >= 0 and j + 1 < f.size]
 
 
 def _peaks_db(sweep: Sweep) -> Floats:
@@ -266,17 +299,54 @@ def _peaks_db(sweep: Sweep) -> Floats:
     return 20.0 * np.log10(np.array(list(both), dtype=float))
 
 
-def refined(setup: Rig, sweep: Sweep, brackets: list[tuple[float, float]], settle_ticks: int) -> Sweep:
-    """The sweep with more points inside each bracket, at the amplitudes found before."""
-    if not brackets:
+def refined(
+    setup: Rig,
+    sweep: Sweep,
+    brackets: list[tuple[float, float]],
+    settle_ticks: int,
+    transient: Transient | None = None,
+) -> Sweep:
+    """The sweep with more points inside each bracket, at the amplitudes found before.
+
+    Inside a narrow bracket windows are longer: the frequencies that fill one lie closer together.
+    """
+    asked = [np.geomspace(a, b, INSIDE + 2)[1:-1] for a, b in brackets if b > a]
+    if not asked:
         return sweep
-    inside = [np.geomspace(a, b, INSIDE + 2)[1:-1] for a, b in brackets]
-    asked = np.unique(np.concatenate(inside))
-    asked = asked[asked < HIGHEST_OF_NYQUIST / setup.period_s]
-    if not asked.size:
+    samples = [np.full(INSIDE, _samples(a, b)) for a, b in brackets if b > a]
+    hertz, order = np.unique(np.concatenate(asked), return_index=True)
+    tick_s, highest = setup.design.controller.period_s, HIGHEST_OF_NYQUIST / setup.period_s
+    if transient is not None:
+        hertz = hertz[_new(hertz, sweep.frequency_hz, highest)]
+        return sweep.joined(transient.sweep(hertz)) if hertz.size else sweep
+    window = coherent(
+        hertz,
+        tick_s,
+        setup.base_ticks,
+        least_samples=np.maximum(np.concatenate(samples)[order], LEAST_SAMPLES),
+    )
+    window = window.part(_new(window.frequency_hz, sweep.frequency_hz, highest))
+    if not window.ticks.size:
         return sweep
-    amplitude = np.interp(np.log(asked), np.log(sweep.frequency_hz), sweep.amplitude)
-    return sweep.joined(stepped_sine(setup, asked, settle_ticks, amplitude=amplitude))
+    amplitude = np.interp(np.log(window.frequency_hz), np.log(sweep.frequency_hz), sweep.amplitude)
+    found = stepped_sine(setup, window.frequency_hz, settle_ticks, amplitude=amplitude, window=window)
+    return sweep.joined(found)
+
+
+def _samples(low: float, high: float) -> int:
+    """Samples of a window of which the frequencies lie closer together than the points inside a bracket."""
+    apart = float(np.log(high / low)) / (INSIDE + 1)
+    return int(min(max(2.0 / apart, LEAST_SAMPLES), MOST_SAMPLES))
+
+
+def _new(hertz: Floats, known: Floats, highest: float) -> npt.NDArray[np.int64]:
+    """Numbers of the frequencies that have not been measured yet, each once."""
+    result, seen = [], np.log(known)
+    for k, x in enumerate(np.log(hertz)):
+        if hertz[k] < highest and np.abs(seen - x).min(initial=np.inf) > SAME:
+            result.append(k)
+            seen = np.append(seen, x)
+    return np.array(result, dtype=np.int64)
 
 
 def _brackets(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
@@ -314,8 +384,8 @@ def _dips(sweep: Sweep, dc: float) -> list[tuple[float, float]]:
     return [(float(f[k + j]), float(f[k + j + 1])) for k in np.flatnonzero(low) for j in (0, 1)]
 
 
-def _phase_margin(sweep: Sweep, error: float) -> tuple[Reading, Reading]:
-    """Crossover (Hz) and phase margin (deg) nearest to zero; ``error`` is the relative one of the points."""
+def _phase_margin(sweep: Sweep, error: Callable[[str, float], float]) -> tuple[Reading, Reading]:
+    """Crossover (Hz) and phase margin (deg) nearest to zero; ``error`` gives that of the points."""
     with np.errstate(divide="ignore"):
         f, gain = distinct(sweep.frequency_hz, np.log(np.abs(sweep.open_loop)))
     _, phase = distinct(sweep.frequency_hz, np.degrees(_phase(sweep.open_loop)))
@@ -323,8 +393,9 @@ def _phase_margin(sweep: Sweep, error: float) -> tuple[Reading, Reading]:
     for k in np.flatnonzero((gain[1:] > 0.0) != (gain[:-1] > 0.0)):
         if not np.isfinite(gain[k : k + 2]).all():
             continue  # a point that could not be measured hides what lies between
-        hertz = crossing(f, gain, int(k), 0.0, error)
-        angle = value_at(f, phase, int(k), hertz, float(np.degrees(error)))
+        own = error("open_loop", float(f[k]))
+        hertz = crossing(f, gain, int(k), 0.0, own)
+        angle = value_at(f, phase, int(k), hertz, float(np.degrees(own)))
         assert angle.value is not None
         result.append((hertz, Reading((angle.value + 360.0) % 360.0 - 180.0, angle.error)))
     return min(result, key=lambda item: abs(item[1].value or 0.0), default=(NOTHING, NOTHING))
@@ -335,84 +406,6 @@ def _phase(response: npt.NDArray[np.complex128]) -> Floats:
     out, measured = np.full(response.size, np.nan), np.isfinite(response)
     out[measured] = np.unwrap(np.angle(response[measured]))
     return out
-
-
-def step_response(setup: Rig, settle_ticks: int) -> StepMeasured:
-    """Step added at the rig's point: what comes back is the step response of T."""
-    signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
-    room = setup.room[signal]
-    size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
-    for _ in range(3):
-        time_s, response, reason, turned = _step(setup, size, settle_ticks)
-        bent = setup.design.load.gravity is not None and turned > SMALL_ANGLE_RAD
-        if not reason and not bent:
-            break
-        size *= SMALL_ANGLE_RAD / turned if bent else 0.2
-    figures = step_figures_of(time_s, response, reason)
-    if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
-        small = small_rig(setup.design, setup.loop, held=setup.held)
-        time_s, response, reason, _ = _step(small, size, settle_ticks)
-        figures = step_figures_of(time_s, response, reason)
-    return figures
-
-
-def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
-    """Run the drive with a step and without; times and difference at the updates of the point.
-
-    What the start leaves to settle is in both.  Then what limited it, and the largest difference of the
-    output angle.
-    """
-    n, runs = setup.hold_ticks, []
-    for height in (0.0, size):
-        row = setup.row()
-        row["ticks"] = settle_ticks + 4 * n
-        row.step(setup.point, height)
-        runs.append(row.trajectory())
-    steady, run = runs
-    reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
-    if run.status != "ok":
-        reason = run.status
-    elif not reason and run.events and setup.bias.delicate:
-        reason = "speed reversal"
-    before, without = (one.probes[setup.point].before[::n] for one in (run, steady))
-    turned = float(np.abs(run.output_angle_rad - steady.output_angle_rad).max())
-    return run.time_s[::n], (without - before) / size, reason, turned
-
-
-def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
-    """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response."""
-    final = float(response[-1])
-    nothing = float("nan")
-    if not np.isfinite(response).all() or final == 0.0:
-        return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
-    y = response / final
-    moved = float(np.ptp(y[-max(y.size // 10, 2) :]))
-    if not reason and moved > UNSETTLED:
-        reason = (
-            f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
-        )
-    error = moved + ROUNDING
-    settled = [_settled(time_s, y, SETTLED + part * error) for part in (0.0, 1.0, -1.0)]
-    rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
-    over = max(100.0 * (float(y.max()) - 1.0), 0.0)
-    return StepMeasured(
-        rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
-    )
-
-
-def _rise(time_s: Floats, y: Floats) -> float:
-    """10 to 90 %."""
-    return float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
-
-
-def _settled(time_s: Floats, y: Floats, band: float) -> float:
-    """From when on a response stays within a band about 1."""
-    outside = np.flatnonzero(np.abs(y - 1.0) > band)
-    return float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0
-
-
-def _spread(values: list[float]) -> float:
-    return max(values) - min(values)
 
 
 def hertz(omega_rad_s: float | None) -> float | None:

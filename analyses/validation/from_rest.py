@@ -19,16 +19,22 @@ from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 STEP_PERCENT = 5e-3  # of a step: its end may be so far from the target, as the run is as long as it settles
+AT_TARGET = 1e-6  # of a step: so near its end is the target
 
 
 @dataclass(frozen=True)
 class RestSteps:
-    """Steps of the command from rest, one entry an amplitude; NaN where a level is not reached."""
+    """Steps of the command from rest, one entry an amplitude; NaN where a level is not reached.
+
+    ``final_ratio`` is where each ends, over its command: a P controller against a load that changes with the
+    angle does not end at 1.
+    """
 
     amplitude_rad: Floats
     rise_time_s: Floats
     overshoot_percent: Floats
     settling_time_s: Floats
+    final_ratio: Floats
     reasons: tuple[str, ...]
 
 
@@ -39,12 +45,17 @@ def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
     rows = step_rows(design, amplitude, settle_ticks)
     rows.step_figures(amplitude)
     result = rows.run()
+    final = result.step.final_ratio
+    if (np.isfinite(final) & (np.abs(final - 1.0) > AT_TARGET)).any():  # figures are those of the final value
+        rows.step_figures(amplitude * np.where(np.isfinite(final) & (final > 0.0), final, 1.0))
+        result = rows.run()
     step = result.step
     return RestSteps(
         amplitude,
         step.rise_time_s,
         step.overshoot_percent,
         step.settling_time_s,
+        final,
         tuple(_reason(design, result, k) for k in range(amplitude.size)),
     )
 
@@ -85,7 +96,9 @@ def rest_entries(
     design: Design, figures: LoopFigures, steps: RestSteps, sweep: RestSweep | None
 ) -> list[Entry]:
     """Ledger entries from rest: judged only where neither a limit nor friction takes part."""
-    rows = [] if sweep is None else _sweep_entries(design, figures, sweep)
+    dc = float(steps.final_ratio[0])
+    dc = dc if not steps.reasons[0] and np.isfinite(dc) and dc > 0.0 else 1.0
+    rows = [] if sweep is None else _sweep_entries(design, figures, sweep, dc)
     if figures.step is None:
         return rows
     sample = figures.step.period_s or 0.0  # both are read at samples
@@ -117,12 +130,12 @@ def _judge(
     return entry("position", quantity, unit, predicted, reading, condition, least)
 
 
-def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep) -> list[Entry]:
-    """Bandwidths without bias motion."""
+def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep, dc: float) -> list[Entry]:
+    """Bandwidths without bias motion, of the response over its value at zero frequency."""
     band = figures.bandwidth
     if band is None:
         return []
-    gain, phase = np.abs(sweep.measured), np.degrees(np.unwrap(np.angle(sweep.measured)))
+    gain, phase = np.abs(sweep.measured) / dc, np.degrees(np.unwrap(np.angle(sweep.measured)))
     acting = next((LIMITERS[name].words for name in sweep.limiter if name), "")
     parts = nonlinear_parts(design)
     if not np.isfinite(sweep.described).any() and bool((sweep.stick_fraction > 0.0).any()):

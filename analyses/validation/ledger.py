@@ -127,7 +127,7 @@ def loop_entries(
     return [replace(row, condition=words) if row.condition == SMALL else row for row in rows]
 
 
-RESPONSES = ("response_open", "response_closed")
+RESPONSES = {"response_open": "open_loop", "response_closed": "closed_loop"}
 
 
 def response_entries(
@@ -136,9 +136,9 @@ def response_entries(
     """The worst point of each response: its distance from the linear one, over what that point may be off."""
     rows = []
     valid = measured.sweep.valid
-    for quantity, error in zip(RESPONSES, errors, strict=False):
+    for (quantity, response), error in zip(RESPONSES.items(), errors, strict=False):
         off = np.hypot(error.gain_db / DECIBEL, np.radians(error.phase_deg))[valid]
-        may = allowed(measured.point_error[valid], 1.0)
+        may = allowed(measured.point_error[response][valid], 1.0)
         if not off.size:
             continue
         k = int(np.argmax(off / may))
@@ -260,9 +260,13 @@ def command_entry(design: Design, sweep: Sweep, system: Any, slowest_ticks: floa
         why = f"no frequency could be measured: {most_frequent(sweep.reason)}"
         return not_judged(loop, "response_command", "%", 0.0, None, why, words)
     off = np.abs(sweep.closed_loop[valid] / linear_response(system, sweep.frequency_hz[valid]) - 1.0)
-    tick_s = design.controller.period_s
-    window = coherent(sweep.frequency_hz[valid], tick_s, round(sweep.period_s / tick_s)).ticks
-    may = allowed(carried_on(sweep.unsteadiness[valid], window, max(slowest_ticks, 1.0)) + ROUNDING, 1.0)
+    if sweep.error is not None:
+        own = sweep.error[valid]
+    else:
+        tick_s = design.controller.period_s
+        window = coherent(sweep.frequency_hz[valid], tick_s, round(sweep.period_s / tick_s)).ticks
+        own = carried_on(sweep.unsteadiness[valid], window, max(slowest_ticks, 1.0))
+    may = allowed(own + ROUNDING, 1.0)
     k = int(np.argmax(off / may))
     hertz = sweep.frequency_hz[valid][k]
     where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"

@@ -43,6 +43,8 @@ class Sweep:
         reversal"``.
     speed_rad_s : float
         Of the bias motion, motor side.
+    error : ndarray, shape (K,), optional
+        Relative error of the closed loop where the measurement knows it without windows.
     """
 
     design_name: str
@@ -60,6 +62,7 @@ class Sweep:
     ticks: Floats
     reason: tuple[str, ...]
     speed_rad_s: float
+    error: Floats | None = None
 
     @property
     def valid(self) -> Flags:

@@ -34,6 +34,7 @@ USED_ROOM = 0.3  # of the way to the nearest limit, or to standstill, that the a
 SETTLE_TIME_CONSTANTS = 14.0
 LONGEST_SETTLE_TICKS = 100_000  # at first; a point that is not steady then is given more
 LONGEST_EXTENDED_TICKS = 1_600_000
+EVER_TICKS = 10**9  # no run is so long: this tells how slow a loop is
 SMALL_ANGLE_RAD = 1e-3  # sin x is x to 2e-7 in the fundamental
 FAINT_SETTLE_TICKS = 2_000
 EXTENSIONS, LONGER = 3, 4
@@ -89,12 +90,15 @@ def stepped_sine(
     settle_ticks: int,
     threads: int | None = None,
     amplitude: Floats | None = None,
+    window: Coherent | None = None,
 ) -> Sweep:
     """Measure at a rig that has been set up; see `frequency_response`.
 
-    ``amplitude`` (injected, peak) is what to begin with; by default a faint run says what fits.
+    ``amplitude`` (injected, peak) is what to begin with; by default a faint run says what fits.  ``window``
+    takes the place of the shortest windows that fit.
     """
-    window = coherent(frequency_hz, setup.design.controller.period_s, setup.base_ticks)
+    if window is None:
+        window = coherent(frequency_hz, setup.design.controller.period_s, setup.base_ticks)
     if amplitude is None:
         amplitude = fitting_amplitude(setup, window, settle_ticks, threads)
     result = _run(setup, window, amplitude, settle_ticks, threads)
@@ -109,7 +113,7 @@ def stepped_sine(
         if longer <= settle_ticks and not limited.any():
             break  # the same run again would show the same
         settle_ticks = max(longer, settle_ticks)
-        part = Coherent(window.frequency_hz[poor], window.ticks[poor], window.cycles[poor])
+        part = window.part(poor)
         try:
             again = _run(setup, part, amplitude[poor], settle_ticks, threads)
         except OutOfTime:

@@ -23,7 +23,7 @@ from analyses.validation.bench import on_the_bench
 from analyses.validation.bias_motion import bias_motion, has_to_stand, may_stand, on_its_stand
 from analyses.validation.breakaway import breakaway_entry
 from analyses.validation.budget import Budget, OutOfTime
-from analyses.validation.commanded import command_sweep
+from analyses.validation.commanded import command_step, command_sweep
 from analyses.validation.conditional import Conditional, conditional_stability
 from analyses.validation.confirm import (
     Confirmation,
@@ -48,8 +48,14 @@ from analyses.validation.result import LoopValidation, PointValidation, Validati
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.steady import steady_entry
-from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, settling_ticks_of, stepped_sine
+from analyses.validation.sweep import (
+    EVER_TICKS,
+    SETTLE_TIME_CONSTANTS,
+    settling_ticks_of,
+    stepped_sine,
+)
 from analyses.validation.tones import tone_sweep
+from analyses.validation.transient import is_slow, transient_of
 from nonlinear import Rows
 
 if TYPE_CHECKING:
@@ -63,11 +69,11 @@ HIGHEST = 0.49  # of the sampling frequency
 LOADED = ("actuator_lti.loops.limiter_responses", "scipy.interpolate", "scipy.ndimage", "scipy.optimize")
 THIRD_OF_NYQUIST = 0.5 / 3.0
 LONGEST_STEP_TICKS = 400_000
-EVER_TICKS = 10**9  # no run is so long: this tells how slow a loop is
 NEAR = (0.9, 0.95, 1.0, 1.05)
 NO_POSITION = "a drive without a position loop: its loops are judged, motion from rest to an angle is not"
 ABOUT = (0.98, 1.0, 1.02)  # frequencies about each figure, beside the grid
 LOWEST = 1e-5  # of the highest frequency: what lies lower takes too long to measure
+LOWEST_OF_A_STEP = 1e-9  # its length does not depend on the frequency
 PER_DECADE = 6  # frequencies of a sweep, at least
 ANSWERS = 12  # frequencies of the response to the command
 BELOW = 20.0  # the sweep begins so far below the lowest figure
@@ -293,17 +299,25 @@ class _Work:
         """Sweep one stable loop and read its figures."""
         figures = self.figures[name]
         setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
-        sweep = stepped_sine(setup, self._frequencies(name, loop), settle)
         whole = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
         ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, EVER_TICKS)
-        measured = measure_figures(setup, sweep, settle, whole, ever / SETTLE_TIME_CONSTANTS)
+        slowest, asked = ever / SETTLE_TIME_CONSTANTS, self._frequencies(name, loop)
+        slow = is_slow(asked, self.design.controller.period_s, setup.base_ticks, ever)
+        transient = transient_of(setup, slowest) if slow else None
+        if transient is not None and transient.settled:
+            sweep = transient.sweep(self._frequencies(name, loop, LOWEST_OF_A_STEP))
+        else:
+            transient, sweep = None, stepped_sine(setup, asked, settle)
+        measured = measure_figures(setup, sweep, settle, whole, slowest, transient)
         fine = measured.sweep
         if measured.cut:
             self.budget.cut.append(
                 f"{name} loop: {measured.cut}: its share of {self.budget.seconds:g} s is used up"
             )
         tones = errors = None
-        if self.settings.multisine and not measured.cut:
+        if transient is not None:
+            self.notes.append(f"{name} loop: slow against its tick, measured by one long step, not by sines")
+        elif self.settings.multisine and not measured.cut:
             with suppress(OutOfTime):  # it only confirms the sweep
                 tones = tone_sweep(setup, sweep.frequency_hz, sweep.amplitude, settle)
                 errors = sweep_errors(tones, loop)
@@ -320,11 +334,11 @@ class _Work:
             confirmed=(),
         )
 
-    def _frequencies(self, name: str, loop: Loop) -> Floats:
+    def _frequencies(self, name: str, loop: Loop, lowest: float = LOWEST) -> Floats:
         """From well below the lowest figure of the loop to near Nyquist, evenly on a logarithmic scale."""
         assert loop.period_s is not None
         top = HIGHEST / loop.period_s
-        low = max(self._lowest(name), LOWEST * top)
+        low = max(self._lowest(name), lowest * top)
         count = max(self.settings.frequencies, int(PER_DECADE * np.log10(top / low)))
         marks = np.outer(self._marks(name), ABOUT).ravel()
         return np.unique(
@@ -434,7 +448,21 @@ class _Work:
         middle = [x for x in marks if x < 0.5 * top] or [0.05 * top]
         low = max(min(middle) / 3.0, LOWEST * top)
         asked = np.geomspace(low, min(3.0 * max(middle), top), ANSWERS)
+        ever = self._answer_settles(system, base)
+        if is_slow(asked, design.controller.period_s, base, ever):
+            sweep = command_step(design, asked, ever / SETTLE_TIME_CONSTANTS)
+            if sweep is not None:
+                return sweep
         return command_sweep(design, asked, settle)
+
+    def _answer_settles(self, system: Any, base: int) -> int:
+        """Ticks in which the response to the command settles, however many."""
+        loops = self._stage_loops()
+        own = [settling_ticks_of(system, base, self.design.name, EVER_TICKS)]
+        for name in self.settle:
+            held = rig(self.linear, name).hold_ticks
+            own.append(settling_ticks_of(loops[name].closed_loop, held, self.design.name, EVER_TICKS))
+        return max(own)
 
     def _steady(self) -> Entry:
         return steady_entry(self.linear, on_the_bench(self.model), max(self.settle.values()))
@@ -455,7 +483,7 @@ class _Work:
             return []
         system, design = self.answer_loops.plain_response, self.design
         base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
-        settle = max([settling_ticks_of(system, base, design.name, EVER_TICKS), *self.settle.values()])
+        settle = self._answer_settles(system, base)
         return [command_entry(design, sweep, system, settle / SETTLE_TIME_CONSTANTS)]
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:

@@ -44,7 +44,7 @@ def worst_below_third(loop: LoopValidation) -> tuple[float, float]:
 def allowed_below_third(loop: LoopValidation) -> tuple[float, float]:
     """What the measurement itself may be off by there, in dB and deg (`analyses.validation.tolerance`)."""
     assert loop.measured is not None
-    may = float(allowed(loop.measured.point_error[_low(loop)].max(initial=0.0), 1.0))
+    may = float(allowed(loop.measured.point_error["open_loop"][_low(loop)].max(initial=0.0), 1.0))
     return 20.0 * may / np.log(10.0), float(np.degrees(may))
 
 

@@ -1,0 +1,121 @@
+"""The step response of a loop in the simulator, and its figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from analyses.validation.rig import Rig, small_rig
+
+Floats = npt.NDArray[np.float64]
+SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
+SETTLED = 0.02  # band of the settling time
+UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
+ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
+STEP_PART = 0.02  # of the room of the signal
+
+
+@dataclass(frozen=True)
+class StepMeasured:
+    """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
+
+    ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
+    the final value (what its last tenth still moves), the other two what it does to the times.  ``size`` is
+    that of the step, in the unit of the point; the response is per unit.
+    """
+
+    rise_time_s: float
+    overshoot_percent: float
+    settling_time_s: float
+    final_value: float
+    time_s: Floats
+    response: Floats
+    reason: str
+    error: float = 0.0
+    rise_error_s: float = 0.0
+    settling_error_s: float = 0.0
+    size: float = 0.0
+
+
+def step_response(setup: Rig, settle_ticks: int, size: float | None = None) -> StepMeasured:
+    """Step added at the rig's point: what comes back is the step response of T.
+
+    ``size`` is what to begin with, by default a small part of the way to the nearest limit.
+    """
+    signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
+    room = setup.room[signal]
+    if size is None:
+        size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
+    for _ in range(3):
+        time_s, response, reason, turned = _step(setup, size, settle_ticks)
+        bent = setup.design.load.gravity is not None and turned > SMALL_ANGLE_RAD
+        if not reason and not bent:
+            break
+        size *= SMALL_ANGLE_RAD / turned if bent else 0.2
+    figures = step_figures_of(time_s, response, reason)
+    if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
+        small = small_rig(setup.design, setup.loop, held=setup.held)
+        time_s, response, reason, _ = _step(small, size, settle_ticks)
+        figures = step_figures_of(time_s, response, reason)
+    return replace(figures, size=size)
+
+
+def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
+    """Run the drive with a step and without; times and difference at the updates of the point.
+
+    What the start leaves to settle is in both.  Then what limited it, and the largest difference of the
+    output angle.
+    """
+    n, runs = setup.hold_ticks, []
+    for height in (0.0, size):
+        row = setup.row()
+        row["ticks"], row["record_every"] = settle_ticks + 4 * n, n
+        row.step(setup.point, height)
+        runs.append(row.trajectory())
+    steady, run = runs
+    reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
+    if run.status != "ok":
+        reason = run.status
+    elif not reason and run.events and setup.bias.delicate:
+        reason = "speed reversal"
+    before, without = (one.probes[setup.point].before for one in (run, steady))
+    turned = float(np.abs(run.output_angle_rad - steady.output_angle_rad).max())
+    return run.time_s, (without - before) / size, reason, turned
+
+
+def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
+    """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response."""
+    final = float(response[-1])
+    nothing = float("nan")
+    if not np.isfinite(response).all() or final == 0.0:
+        return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
+    y = response / final
+    moved = float(np.ptp(y[-max(y.size // 10, 2) :]))
+    if not reason and moved > UNSETTLED:
+        reason = (
+            f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
+        )
+    error = moved + ROUNDING
+    settled = [_settled(time_s, y, SETTLED + part * error) for part in (0.0, 1.0, -1.0)]
+    rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
+    over = max(100.0 * (float(y.max()) - 1.0), 0.0)
+    return StepMeasured(
+        rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
+    )
+
+
+def _rise(time_s: Floats, y: Floats) -> float:
+    """10 to 90 %."""
+    return float(time_s[int(np.argmax(y >= 0.9))] - time_s[int(np.argmax(y >= 0.1))])
+
+
+def _settled(time_s: Floats, y: Floats, band: float) -> float:
+    """From when on a response stays within a band about 1."""
+    outside = np.flatnonzero(np.abs(y - 1.0) > band)
+    return float(time_s[min(int(outside[-1]) + 1, y.size - 1)]) if outside.size else 0.0
+
+
+def _spread(values: list[float]) -> float:
+    return max(values) - min(values)
