@@ -90,7 +90,7 @@ def _torque_drive(design: Design, seed: int) -> Design:
         raise InputError("this bench needs a rotary drive with a current loop and a coupling", design.name)
     controller = replace(design.controller, position=None, velocity=None)
     instruments = replace(design.instruments, seed=seed)
-    load = replace(design.load, gravity=None, moment_slope_Nm_rad=0.0)
+    load = design.load.bare()
     return replace(
         design,
         controller=controller,

@@ -178,7 +178,7 @@ def fly(actuator: Actuator, until_s: float = 4.0) -> RollFlight:
 def drive_design() -> Design:
     """The drive of the canards, its hinge moment left to the flight."""
     design = load_design(DESIGN)
-    return replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0))
+    return replace(design, load=design.load.bare())
 
 
 def smooth_design() -> Design:

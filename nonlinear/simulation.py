@@ -164,7 +164,7 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
     probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
     rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
-    columns += at.ELASTIC_COLUMNS * int(row[at.ELASTIC_DRIVE])
+    columns += at.ELASTIC_COLUMNS * int(row[at.ELASTIC_DRIVE]) + int(row[at.VARYING_LOAD].any())
     if 8 * rows * columns > HISTORY_BYTES.most:
         message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
         raise InputError(f"{message}; use record_every, or simulate_many with reducers")
@@ -175,21 +175,14 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
     run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
-    return replace(run, load_Nm=_load(row, tables, run))
+    return replace(run, load_Nm=_load(row, history))
 
 
-def _load(row: Floats, tables: Floats, run: Trajectory) -> Floats | None:
-    """The moment on the output shaft at the recorded ticks, as the run had it."""
-    length = int(row[at.LOAD_TABLE_LENGTH])
-    if not (length or row[at.LOAD] or row[at.LOAD_SLOPE] or row[at.GRAVITY]):
+def _load(row: Floats, history: Floats) -> Floats | None:
+    """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
+    if not row[at.LOAD : at.TORQUE_TABLE].any():
         return None
-    y = run.output_angle_rad
-    moment = row[at.LOAD] + row[at.LOAD_SLOPE] * y + row[at.GRAVITY] * np.sin(y + row[at.GRAVITY_ANGLE])
-    if length:
-        first = int(row[at.LOAD_TABLE])
-        ticks = np.arange(y.size) * int(row[at.RECORD_EVERY])
-        moment = moment + tables[first + np.minimum(ticks, length - 1)]
-    return np.asarray(moment, dtype=float)
+    return history[-1] if row[at.VARYING_LOAD].any() else np.full(history.shape[1], row[at.LOAD])
 
 
 def _call(

@@ -31,7 +31,7 @@ def wrap(
         for k, point in enumerate(probing)
     }
     behind = at.HISTORY_PROBES + 2 * len(probing)
-    elastic = history[behind:] if row[at.ELASTIC_DRIVE] else [None] * at.ELASTIC_COLUMNS
+    elastic = list(history[behind:]) if row[at.ELASTIC_DRIVE] else [None] * at.ELASTIC_COLUMNS
     return Trajectory(
         design_name=design.name,
         axis=design.axis,

@@ -8,7 +8,9 @@ import numpy as np
 
 from actuator_lti.design.checks_control import check_control
 from actuator_lti.design.checks_elastic import check_elastic
+from actuator_lti.design.fields import Structure, fields_in
 from actuator_lti.design.model import Design
+from actuator_lti.design.sections import parts_of
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
@@ -32,6 +34,7 @@ def check_design(design: Design, where: str) -> None:
         _motor,
         _cascade,
         _sampling,
+        _most,
         check_control,
         check_elastic,
         _limits,
@@ -44,6 +47,18 @@ def check_design(design: Design, where: str) -> None:
 
 def _refuse(where: str, key: str, value: object, allowed: str) -> InputError:
     return InputError(f"{key} = {value}: {allowed}", where=where)
+
+
+def _most(design: Design, where: str) -> None:
+    """Keys that say themselves what bounds them."""
+    structure = Structure.of(design)
+    for section, path, part in parts_of(design):
+        for field in fields_in(section.template):
+            most, why = (inf, "") if field.most is None else field.most(design)
+            value, unit = getattr(part, field.attribute), field.unit(structure)
+            if field.most is not None and value > most:
+                allowed = f"{why}; allowed: at most {most:.4g} {unit}"
+                raise _refuse(where, f"{path}.{field.key}", f"{value:g} {unit}", allowed)
 
 
 def _motor(design: Design, where: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
@@ -41,7 +42,8 @@ class Field:
 
     ``unit_template`` is an SI unit in which ``{angle}``, ``{torque}`` and ``{inertia}`` stand for
     rad, N*m, kg*m^2 on a rotary axis and m, N, kg on a linear one, ``{drive}`` for A or V.
-    ``low`` and ``high`` are inclusive, in SI; ``low_open`` makes the lower one exclusive.
+    ``low`` and ``high`` are inclusive, in SI; ``low_open`` makes the lower one exclusive. ``most`` gives the
+    largest value in a design, where others decide it, and why.
     """
 
     path: str
@@ -56,6 +58,7 @@ class Field:
     choices: tuple[str, ...] = ()
     required: bool = False
     example: str = ""
+    most: Callable[[Design], tuple[float, str]] | None = None
 
     @property
     def section(self) -> str:

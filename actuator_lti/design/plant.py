@@ -4,9 +4,11 @@ All values are in SI units on the motor side unless a name says otherwise.  For 
 (``axis = "linear"``) read N for N m, m for rad, kg for kg m2 in every name.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi, sin
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
+
+import numpy as np
 
 from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
 
@@ -161,6 +163,22 @@ class Load:
         example="0 N*m/rad")] = 0.0
     friction: LoadFriction | None = None
     gravity: Gravity | None = None
+
+    def moment_Nm(self, angle_rad: Any, rate_rad_s: Any = 0.0) -> Any:
+        """The load's own moment on the output shaft at an angle and a speed of it; floats or arrays."""
+        moment = self.moment_slope_Nm_rad * angle_rad
+        if self.gravity is not None:
+            moment = moment + self.gravity.peak_Nm * np.sin(angle_rad + self.gravity.offset_rad)
+        return moment
+
+    def acting(self) -> tuple[str, ...]:
+        """The keys of the moments that act by themselves."""
+        keys = ("load.moment_slope",) if np.any(self.moment_slope_Nm_rad) else ()
+        return keys if self.gravity is None else (*keys, "load.gravity")
+
+    def bare(self) -> "Load":
+        """The same without moments of its own."""
+        return replace(self, moment_slope_Nm_rad=0.0, gravity=None)
 
 
 @dataclass(frozen=True, kw_only=True)

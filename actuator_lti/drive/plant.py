@@ -32,12 +32,13 @@ class Plant:
         th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop
         sees.
     A : ndarray, shape (..., n, n)
-        Without the load's stiffness, see `stiffness_Nm_rad`.
+        Without the load's own moments, see `moment`.
     B_u, B_T, B_M : ndarray, shape (..., n)
         Effect of the voltage (V, or the drive signal of a torque source), of a torque in N m that accelerates
         the motor, and of a moment in N m that pushes the output shaft forward.
-    stiffness_Nm_rad : float or ndarray
-        dM_ext/d(output angle), where the moment reaches the plant; M_ext is held over a tick.
+    moment : dict of str to float
+        The load's own moment on the output shaft as a combination of rows; M_ext is held over a tick. Empty
+        where it does not reach the plant.
     rows : dict of str to dict of str to float
         Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle
         behind the coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees).
@@ -48,7 +49,7 @@ class Plant:
     B_u: np.ndarray
     B_T: np.ndarray
     B_M: np.ndarray
-    stiffness_Nm_rad: Any
+    moment: dict[str, Any]
     rows: dict[str, dict[str, Any]]
 
 
@@ -101,7 +102,7 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
         A, B = _electrical(motor)
         names = ("i",)
         none = np.zeros(1)
-        return Plant(names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, 0.0, {})
+        return Plant(names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, {}, {})
     return _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
 
 
@@ -135,9 +136,15 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
         B_u=vector(names, B_u),
         B_T=vector(names, {"w": 1 / J}),
         B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}),
-        stiffness_Nm_rad=moment_slope(design, at) if reaches else 0.0,
+        moment=_own_moment(design, at) if reaches else {},
         rows={"output_angle": {"th": 1 / N}, "load_speed": {"w": 1.0}},
     )
+
+
+def _own_moment(design: Design, at: Operating) -> dict[str, Any]:
+    """The moments of `Load.moment_Nm`, made linear; those that are there."""
+    gains = {"output_angle": moment_slope(design, at)}
+    return {row: gain for row, gain in gains.items() if np.any(gain != 0)}
 
 
 def reaction(design: Design, at: Operating) -> Any:
@@ -169,7 +176,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
         B_u=vector(names, B_u),
         B_T=vector(names, {"w": 1 / J_m}),
         B_M=vector(names, {"W": 1 / (N_r * J_l)}),
-        stiffness_Nm_rad=moment_slope(design, at),
+        moment=_own_moment(design, at),
         rows={
             "output_angle": {name: value / N_r for name, value in phi.items()},
             "phi": phi,

@@ -137,9 +137,7 @@ class FlowWalk(Walk):
         """What acts on the plant."""
         plant = self.drive.plant
         self.signals.setdefault("u", u)
-        moment = Row.of("moment")
-        if plant.stiffness_Nm_rad:
-            moment = moment + plant.stiffness_Nm_rad * self.signals["output_angle"]
+        moment = self.moment()
         for r, name in enumerate(plant.states):
             acting = ((plant.B_u, u), (plant.B_T, Row.of("torque")), (plant.B_M, moment))
             self.rate[name] += total(float(B[r]) * row for B, row in acting)

@@ -141,10 +141,7 @@ class TickWalk(Walk):
         plant, hold = self.drive.plant, self.drive.hold
         self.signals.setdefault("u", u)
         held = [u, *(self.state(f"u{j}") for j in range(1, hold.memory + 1))]
-        moment = Row.of("moment")
-        if np.any(plant.stiffness_Nm_rad != 0):
-            moment = moment + plant.stiffness_Nm_rad * self.signals["output_angle"]
-        outer = (Row.of("torque"), moment)
+        outer = (Row.of("torque"), self.moment())
         angle = self.sensed_angle()
         x = [self.state(name) for name in plant.states]
         change: dict[str, Row] = {}

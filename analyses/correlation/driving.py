@@ -202,19 +202,15 @@ def supply_of(driven: Driven, record: Record, time_s: FloatArray) -> Supplied | 
 def load_of(
     design: Design, record: Record, time_s: FloatArray, notes: list[str]
 ) -> tuple[Design, LoadMoment]:
-    """The recorded load, which holds all of it; without one, the design's own slope and gravity act."""
+    """The recorded load, which holds all of it; without one, the design's own moments act."""
     from nonlinear import loads
 
-    name, own = LOADS[design.axis], []
-    if design.load.moment_slope_Nm_rad:
-        own.append("load.moment_slope")
-    if design.load.gravity is not None:
-        own.append("load.gravity")
+    name, own = LOADS[design.axis], design.load.acting()
     if name not in record.signals:
         notes.extend(f"load: the design's {key} acts" for key in own)
         return design, loads.constant(0.0)
     notes.extend(f"the recorded load holds all of it: the design's {key} is not added" for key in own)
-    bare = replace(design, load=replace(design.load, gravity=None, moment_slope_Nm_rad=0.0))
+    bare = replace(design, load=design.load.bare())
     return bare, loads.series(time_s, record[name], where=record.name)
 
 

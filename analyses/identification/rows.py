@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,17 +137,15 @@ def moment_of(
 ) -> tuple[FloatArray, str]:
     """The moment at the output and the signal that it comes from.
 
-    Without a recorded one, that of the design's own slope and (with ``gravity``) pendulum at the recorded
+    Without a recorded one, that of the design's own moments and (with ``gravity``) pendulum at the recorded
     angle; the signal is then empty.
     """
     name = "load_force" if design.axis == "linear" else "torque"
     if name in record.signals:
         return record[name], name
-    load = design.load
-    moment = load.moment_slope_Nm_rad * output_angle
-    if gravity and load.gravity is not None:
-        moment = moment + load.gravity.peak_Nm * np.sin(output_angle + load.gravity.offset_rad)
-    return np.asarray(moment), ""
+    load = design.load if gravity else replace(design.load, gravity=None)
+    rate = np.gradient(output_angle, period_of(record))
+    return np.asarray(load.moment_Nm(output_angle, rate)), ""
 
 
 def _friction_columns(

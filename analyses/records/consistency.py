@@ -166,9 +166,7 @@ def _twist_share(design: Design, record: Record) -> float:
         return 0.0
     own = record["output_angle"]
     moment = float(np.max(np.abs(record["torque"]))) if "torque" in record.signals else 0.0
-    moment = max(moment, abs(design.load.moment_slope_Nm_rad) * float(np.max(np.abs(own))))
-    if design.load.gravity is not None:
-        moment = max(moment, design.load.gravity.peak_Nm)
+    moment = max(moment, float(np.max(np.abs(design.load.moment_Nm(own)))))
     behind = design.ratio_behind_coupling
     twist = 0.5 * design.coupling.play_rad + moment / behind / design.coupling.stiffness_Nm_rad
     return twist / behind / max(float(np.std(own)), 1e-300)

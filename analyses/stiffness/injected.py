@@ -121,7 +121,7 @@ def lost_motion_seen(design: Design, moment_Nm: float | None = None, duration_s:
     held = replace(
         design,
         controller=replace(design.controller, position=position),
-        load=replace(design.load, moment_slope_Nm_rad=0.0, gravity=None),
+        load=design.load.bare(),
     )
     quarter = duration_s / 5.0
     times = quarter * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])

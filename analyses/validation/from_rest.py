@@ -81,7 +81,7 @@ def nonlinear_parts(design: Design) -> list[str]:
         "friction of the load": behind is not None
         and (behind.dry_torque_Nm, behind.offset_torque_Nm) != (0, 0),
         "friction of the coupling's torque": coupling is not None and friction.load_coefficient > 0.0,
-        "friction of the load's moment": friction.load_coefficient > 0.0 and load.moment_slope_Nm_rad != 0.0,
+        "friction of the load's moment": friction.load_coefficient > 0.0 and bool(load.acting()),
         "play": coupling is not None and coupling.play_rad > 0.0,
         "gravity": load.gravity is not None,
         "profile of the command": min(profile.rate_rad_s, profile.acceleration_rad_s2) < inf,

@@ -68,6 +68,8 @@ from actuator_lti.drive import signals
     VOLTAGE_START,
     LOAD,  # constant part of M_ext
     LOAD_SLOPE,  # N m per rad of output angle
+    GRAVITY,  # m g l, N m
+    GRAVITY_ANGLE,  # offset
     LOAD_TABLE,  # offset into the tables
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
@@ -124,8 +126,6 @@ from actuator_lti.drive import signals
     OUTPUT_NOISE,
     JITTER,  # s, rms
     SEED,
-    GRAVITY,  # m g l, N m
-    GRAVITY_ANGLE,  # offset
     RIGID,  # of an elastic drive train; 1: a friction map, but no coupling
     RATIO_TO_COUPLING,  # N_c; N without a coupling
     MOTOR_INERTIA,  # J_m; J without a coupling
@@ -378,7 +378,9 @@ IO_FLAGS = IO_ANGLE + 1
 IO_OUTPUT_SPEED = IO_FLAGS + 1  # of an elastic drive: speed of the output shaft, twist, T_s
 IO_TWIST = IO_OUTPUT_SPEED + 1
 IO_COUPLING_TORQUE = IO_TWIST + 1
-IO_SIZE = IO_COUPLING_TORQUE + 1
+IO_MOMENT = IO_COUPLING_TORQUE + 1  # on the output shaft, where it varies
+IO_SIZE = IO_MOMENT + 1
+VARYING_LOAD = slice(LOAD_SLOPE, SUPPLY_TABLE)  # what makes the load of a run change from tick to tick
 
 # --- signals that are recorded and reduced, in this order ------------------------------------------
 SIGNALS = (
@@ -401,7 +403,7 @@ SIGNALS = (
 BASE_SIGNALS = 7
 ALL_SIGNALS = 15
 # columns of the history: the base signals, then the motor angle, then before and after of each active probe,
-# then output speed, twist and coupling torque of an elastic drive
+# then output speed, twist and coupling torque of an elastic drive, then the load moment where it varies
 HISTORY_ANGLE = 7
 HISTORY_PROBES = 8
 ELASTIC_COLUMNS = 3

@@ -117,7 +117,8 @@ def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
         s[j] = s[j + 1]
     s[last] = applied_voltage(p, s, io)
     if p[layout.RARE_LOAD] > 0.0:
-        put_load(p, s, hinge_moment(p, s, io), io[layout.IN_TORQUE])
+        io[layout.IO_MOMENT] = hinge_moment(p, s, io)
+        put_load(p, s, io[layout.IO_MOMENT], io[layout.IN_TORQUE])
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:

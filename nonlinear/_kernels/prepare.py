@@ -82,9 +82,7 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
     p[layout.RARE_CURRENT] = max(more, any_of(p, layout.CURRENT_WINDUP, layout.CURRENT_TRACKING))
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
     p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
-    tables = p[layout.LOAD_TABLE_LENGTH] + p[layout.TORQUE_TABLE_LENGTH]
-    varying = p[layout.LOAD_SLOPE] != 0.0 or p[layout.GRAVITY] != 0.0 or tables > 0.0
-    p[layout.RARE_LOAD] = 1.0 if varying else 0.0
+    p[layout.RARE_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
 
 
 @scalar

@@ -18,13 +18,13 @@ def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-
     history[6 * rows + row] = io[layout.IO_SPEED_COMMAND]
     history[7 * rows + row] = io[layout.IO_ANGLE]
     flag_history[row] = int(io[layout.IO_FLAGS])
-    if p[layout.PROBING] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0:
+    if p[layout.PROBING] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0 or p[layout.RARE_LOAD] > 0.0:
         record_more(p, io, history, rows, row)
 
 
 @scalar
 def record_more(p, io, history, rows, row):  # type: ignore[no-untyped-def]
-    """Write both sides of each active probe, in the order of the points, then what an elastic drive adds."""
+    """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
     col = layout.HISTORY_PROBES
     for point in range(4):
         if p[layout.PROBES + point * layout.PROBE_SIZE] > 0.0:
@@ -34,3 +34,6 @@ def record_more(p, io, history, rows, row):  # type: ignore[no-untyped-def]
     if p[layout.ELASTIC_DRIVE] > 0.0:
         for j in range(layout.ELASTIC_COLUMNS):
             history[(col + j) * rows + row] = io[layout.IO_OUTPUT_SPEED + j]
+        col += layout.ELASTIC_COLUMNS
+    if p[layout.RARE_LOAD] > 0.0:
+        history[col * rows + row] = io[layout.IO_MOMENT]
