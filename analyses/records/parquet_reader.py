@@ -43,7 +43,7 @@ def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
         TABLE_ROWS.check(file.metadata.num_rows, where)
         CSV_COLUMNS.check(file.metadata.num_columns, where)
         table = file.read()
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last of names of columns
         raise InputError(f"is no Parquet file: {error}", where=where) from None
     result = {}
     for field in table.schema:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import socket
 from collections.abc import Callable, Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown_path
 from analyses.engine import Engine
 from reports.nightly import memory
 from reports.nightly import site as site_files
@@ -82,8 +84,27 @@ class Settings:
 
 
 def state_of(site: Path, settings: Settings) -> Path:
-    """Return the folder of history, cache and lock: beside the site, so that none of it is published."""
-    return settings.state if settings.state is not None else site.with_name(site.name + ".state")
+    """Return the folder of history, cache and lock: beside the site, so that none of it is published.
+
+    Raises
+    ------
+    InputError
+        For a state inside the site, or a site that has no folder beside it.
+    """
+    if settings.state is None:
+        place = Path(os.path.abspath(site))  # "." and ".." have names, too
+        if not place.name:
+            raise InputError(
+                "is the root of the disk: --site takes a folder below it", where=shown_path(site)
+            )
+        return place.with_name(place.name + ".state")
+    inside = os.path.realpath(settings.state), os.path.realpath(site)
+    if os.path.commonpath(inside) == inside[1]:
+        raise InputError(
+            "lies inside the site and would be published with it: --state takes a folder elsewhere",
+            where=shown_path(settings.state),
+        )
+    return settings.state
 
 
 def run_night(

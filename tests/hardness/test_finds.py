@@ -8,7 +8,7 @@ import re
 import pytest
 from fuzz import attack, written
 from mutate import damaged
-from targets import Target, history_file, small_report, targets
+from targets import Target, history_file, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
@@ -83,6 +83,19 @@ def test_a_history_whose_broken_schema_is_quoted_in_the_error() -> None:
     assert entry in history_file()
     line = refused("history", history_file().replace(entry, broken))
     assert "is no history" in line
+
+
+def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:
+    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
+    assert column in parquet_file()
+    broken = parquet_file().replace(column, unreadable)
+    assert "is no Parquet file" in refused("parquet", broken)
+
+
+def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
+    made = json.loads(small_report())
+    table_of(made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
+    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 
 def test_files_of_the_attack_lie_alone_in_their_folder() -> None:

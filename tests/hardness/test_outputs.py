@@ -9,6 +9,7 @@ import stat
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti import atomic
 from actuator_lti.errors import InputError
-from reports.nightly.night import run_night
+from reports.nightly.night import run_night, state_of
 
 SIMULATE = ("simulate", "ilr33-amber", "--duration", "0.01", "--quiet")
 
@@ -200,3 +201,23 @@ def test_a_report_folder_that_leads_elsewhere_is_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="is a symbolic link"):
         run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
     assert len(list(elsewhere.rglob("*"))) == count
+
+
+def test_a_site_is_where_one_stands_and_its_state_beside_it(tmp_path, monkeypatch) -> None:
+    (tmp_path / "site").mkdir()
+    monkeypatch.chdir(tmp_path / "site")
+    run_night(study(job("a")), Path(), INLINE, code=CODE)
+    assert sorted(os.listdir(tmp_path)) == ["site", "site.state"]
+    assert (tmp_path / "site" / "index.html").is_file()
+    with pytest.raises(InputError, match="root of the disk"):
+        state_of(Path("/"), INLINE)
+
+
+@pytest.mark.parametrize("state", ["site", "site/state", "elsewhere/../site/x", "link/state"])
+def test_a_state_inside_the_site_is_refused(state, tmp_path) -> None:
+    site = tmp_path / "site"
+    (tmp_path / "link").symlink_to(site)
+    inside = replace(INLINE, state=tmp_path / state)
+    with pytest.raises(InputError, match="lies inside the site"):
+        run_night(study(job("a")), site, inside, code=CODE)
+    assert not site.exists()

@@ -44,6 +44,36 @@ def test_an_interrupt_while_writing_leaves_the_old_file(
     assert os.listdir(tmp_path) == ["a"]
 
 
+def test_who_reads_the_old_file_reads_on_in_it(tmp_path: Path) -> None:
+    target = tmp_path / "a"
+    target.write_text("old" * 10_000)
+    with target.open() as reader:
+        begun = reader.read(3)
+        atomic.write_text(target, "new")
+        assert begun + reader.read() == "old" * 10_000
+    assert target.read_text() == "new"
+
+
+def test_all_is_on_the_disk_before_anything_is_in_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[str] = []
+    fsync, replace = os.fsync, os.replace
+
+    def flushed(handle: int) -> None:
+        steps.append(f"flush {os.fstat(handle).st_size}")
+        fsync(handle)
+
+    def moved(source: Path, target: Path) -> None:
+        steps.append(f"move {Path(target).name}")
+        replace(source, target)
+
+    monkeypatch.setattr(atomic.os, "fsync", flushed)
+    monkeypatch.setattr(atomic.os, "replace", moved)
+    atomic.write_together({tmp_path / "a": b"x" * 7, tmp_path / "b": b"y" * 9})
+    assert steps == ["flush 7", "flush 9", "move a", "move b"]
+
+
 def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path: Path) -> None:
     plain, written = tmp_path / "plain", tmp_path / "written"
     plain.write_text("x")

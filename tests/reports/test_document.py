@@ -97,6 +97,24 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"passed": True, "failed": 0},
+        {"total": 4},
+        {"not_judged": 0},
+        {"parts": {"requirements": {"failed": 0, "not_judged": 1, "total": 3}}},
+    ],
+)
+def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str, Any], tmp_path) -> None:
+    path = tmp_path / "report.json"
+    path.write_text(doc.dumps(made()), encoding="utf-8")
+    assert doc.load(path) == made()
+    path.write_text(doc.dumps({**made(), "verdict": made()["verdict"] | change}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"report\.json: verdict"):
+        doc.load(path)
+
+
 @pytest.mark.parametrize("format", ["sig:0", "short:0", "ms:0", "sig", "fix:99", "sig:3x", ""])
 def test_a_column_that_no_number_can_be_written_by_is_refused(format: str) -> None:
     table = doc.table("T", [doc.column("a", "A", format=format)], [{"a": 1.5}])
