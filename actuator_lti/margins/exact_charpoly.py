@@ -6,6 +6,8 @@ hundred of them. A chain is taken out before any determinant is formed.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from flint import fmpz, fmpz_mat, fmpz_poly
 
 Rows = list[list[int]]
@@ -16,14 +18,14 @@ _WORTH = 0.2  # of all states: a determinant takes the fourth power of their num
 def characteristic(rows: Rows) -> fmpz_poly:
     """det(z I - M).
 
-    A chain x_1 -> ... -> x_k hands x_1 on as g z^(1-k) x_1, g the product of its entries. With M_0 what is left
-    without x_2 ... x_k, and M_1 the same with x_1 read where x_k was: det = z^(k-1) P_0 - g (P_0 - P_1).
+    A chain x_1 -> ... -> x_k hands x_1 on as g z^(1-k) x_1, g the product of its entries. With M_0 what is
+    left without x_2 ... x_k, and M_1 the same with x_1 read where x_k was: det = z^(k-1) P_0 - g (P_0 - P_1).
     """
     chain = _longest_chain(rows)
     if len(chain) <= 1 + _WORTH * len(rows):
         return fmpz_mat(rows).charpoly() if rows else fmpz_poly([1])
     gain = fmpz(1)
-    for before, after in zip(chain, chain[1:], strict=False):
+    for before, after in pairwise(chain):
         gain *= rows[after][before]
     gone = set(chain[1:])
     kept = [k for k in range(len(rows)) if k not in gone]
@@ -61,7 +63,7 @@ def _longest_chain(rows: Rows) -> list[int]:
 
 
 def numerator(rows: Rows, b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
-    """c adj(z I - M) b, where ``below`` is det(z I - M): the polynomial part of ``below`` sum_k c M^k b z^(-1-k)."""
+    """c adj(z I - M) b, with ``below`` = det(z I - M): the polynomial part of ``below`` sum_k c M^k b z^(-1-k)."""
     n = len(rows)
     M, state, out = fmpz_mat(rows), fmpz_mat(n, 1, b), fmpz_mat(1, n, c)
     answer = []
