@@ -2,8 +2,8 @@
 
 Descartes' rule on intervals (Collins and Akritas 1976; Vincent): the roots of p in (a, b) are the positive
 ones of (1 + x)^n p((a + b x)/(1 + x)). No change of sign among the coefficients: no root; one change: one
-root; more: the interval is split. The coefficients are certified intervals, and their precision is doubled until each
-sign is told.
+root; more: the interval is split. The coefficients are certified intervals, and their precision is doubled
+until each sign is told.
 """
 
 from __future__ import annotations
