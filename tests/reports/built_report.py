@@ -24,3 +24,4 @@ class Built(NamedTuple):
 
 
 HOSTILE = "<script>alert(1)</script> \"quoted\" 'single' & $x^2$ ]]> \u202e {{ 7*7 }}"
+SEEN = HOSTILE.replace("\u202e", "⟨U+202E⟩")  # a page shows marks of direction, and does not obey them
