@@ -42,7 +42,7 @@ class DamagedError(Exception):
     """What was read is not what was written."""
 
 
-def _vector_sha(layout: int, numbers: bytes) -> bytes:
+def vector_sha(layout: int, numbers: bytes) -> bytes:
     """Half of the SHA-256 of a vector of numbers and its layout."""
     return bytes.fromhex(sha256(f"{layout}:".encode() + numbers))[:16]
 
@@ -128,7 +128,7 @@ class History:
         values = np.array([np.nan if f.value is None else f.value for f in result.figures], dtype="<f8")
         numbers = values.tobytes()
         vector = self._id(
-            "vectors", "sha", {"sha": _vector_sha(layout, numbers), "layout": layout, "numbers": numbers}
+            "vectors", "sha", {"sha": vector_sha(layout, numbers), "layout": layout, "numbers": numbers}
         )
         cursor = self.connection.execute(
             "INSERT INTO snapshots(key, vector, input) VALUES (?, ?, ?)", (result.key, vector, inputs)
@@ -351,7 +351,7 @@ class History:
             if len(rows) != len(part):
                 raise DamagedError("a result's figures are missing")
             for snapshot, layout, numbers, sha in rows:
-                if _vector_sha(layout, numbers) != sha:
+                if vector_sha(layout, numbers) != sha:
                     raise DamagedError(f"the figures of result {snapshot} are not what was written")
                 yield snapshot, layout, numbers
 

@@ -16,22 +16,22 @@ _RESULTS = (
     "SELECT r.run, s.name, s.kind, r.status, n.key, v.sha, i.sha, r.seconds, r.cached, r.failed, r.total,"
     " r.worst, r.worst_id, r.message FROM results r JOIN subjects s ON s.id = r.subject"
     " LEFT JOIN snapshots n ON n.id = r.snapshot LEFT JOIN vectors v ON v.id = n.vector"
-    " LEFT JOIN inputs i ON i.id = n.input ORDER BY r.run, r.subject"
+    " LEFT JOIN inputs i ON i.id = n.input WHERE {} ORDER BY r.run, r.subject"
 )
 _ROWS = {
     "run": "SELECT id, started, finished, code, code_commit, study_commit, libraries, host FROM runs"
-    " WHERE state = 'done'",
-    "figure": "SELECT id, name, unit, better, kind FROM figures",
+    " WHERE state = 'done' AND {}",
+    "figure": "SELECT id, name, unit, better, kind FROM figures WHERE {}",
     "approval": "SELECT b.id, b.run, b.at, b.by, b.reason, s.name FROM baselines b"
-    " LEFT JOIN subjects s ON s.id = b.subject",
+    " LEFT JOIN subjects s ON s.id = b.subject WHERE {}",
 }
+_ID = {"run": "id", "figure": "id", "approval": "b.id"}
+_EVERY = "1"
 
 
 def write(connection: sqlite3.Connection) -> None:
-    """Add the sums of rows that have none yet, within the transaction that is open."""
-    known = {(row[0], row[1]) for row in connection.execute("SELECT kind, id FROM sums")}
-    new = [(*key, sha) for *key, sha in _sums(connection) if tuple(key) not in known]
-    connection.executemany("INSERT INTO sums(kind, id, sha) VALUES (?, ?, ?)", new)
+    """Add the sums of rows that have none yet, within the transaction that is open; no others are read."""
+    connection.executemany("INSERT INTO sums(kind, id, sha) VALUES (?, ?, ?)", list(_sums(connection, new=True)))
 
 
 def forget(connection: sqlite3.Connection) -> None:
@@ -51,12 +51,17 @@ def damage(connection: sqlite3.Connection) -> str | None:
     return None
 
 
-def _sums(connection: sqlite3.Connection) -> Iterator[tuple[str, int, str]]:
+def _sums(connection: sqlite3.Connection, *, new: bool = False) -> Iterator[tuple[str, int, str]]:
+    """Sums of all rows, or of the ``new`` ones, which have none."""
+
+    def wanted(kind: str, column: str) -> str:
+        return f"{column} NOT IN (SELECT id FROM sums WHERE kind = '{kind}')" if new else _EVERY
+
     results: dict[int, list[object]] = {}
-    for row in connection.execute(_RESULTS):
+    for row in connection.execute(_RESULTS.format(wanted("run", "r.run"))):
         results.setdefault(row[0], []).append(_plain(row))
     for kind, query in _ROWS.items():
-        for row in connection.execute(query):
+        for row in connection.execute(query.format(wanted(kind, _ID[kind]))):
             body = [_plain(row), results.get(row[0], []) if kind == "run" else []]
             yield kind, int(row[0]), sha256(json.dumps(body))[:32]
 
