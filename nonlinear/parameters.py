@@ -138,6 +138,7 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
 def _load(design: Design, row: Floats) -> None:
     """Slope and gravity of the design act in every run, told or not."""
     row[at.LOAD_SLOPE] = design.load.moment_slope_Nm_rad
+    row[at.LOAD_DAMPING] = design.load.moment_damping_Nms_rad
     if design.load.gravity is not None:
         row[at.GRAVITY] = design.load.gravity.peak_Nm
         row[at.GRAVITY_ANGLE] = design.load.gravity.offset_rad

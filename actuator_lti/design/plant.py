@@ -6,11 +6,14 @@ All values are in SI units on the motor side unless a name says otherwise.  For 
 
 from dataclasses import dataclass, replace
 from math import inf, pi, sin
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
 
 # fmt: off
 FrictionLaw = Literal["coulomb", "tanh"]
@@ -145,11 +148,20 @@ class Gravity:
         return self.mass_kg * STANDARD_GRAVITY_m_s2 * self.arm_m
 
 
+def _largest_damping(design: "Design") -> tuple[float, str]:
+    """J/Ts, J all that turns with the output (with a coupling: behind it), at the output shaft."""
+    inertia = design.inertia_kgm2 * design.total_ratio**2
+    if design.coupling is not None:
+        inertia = design.load_side_inertia_kgm2 * design.ratio_behind_coupling**2
+    return inertia / design.controller.period_s, "held over a tick it would reverse the motion"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Load:
     """What hangs on the output shaft, and how its moment reaches the motor.
 
-    M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle + gravity.
+    M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle
+    - ``moment_damping_Nms_rad`` * output speed + gravity.
     """
 
     inertia_kgm2: Annotated[float, not_negative(
@@ -161,24 +173,31 @@ class Load:
     moment_slope_Nm_rad: Annotated[float, quantity(
         "moment_slope", "{torque}/{angle}", "", "load moment per output deflection",
         example="0 N*m/rad")] = 0.0
+    moment_damping_Nms_rad: Annotated[float, not_negative(
+        "moment_damping", "{torque}*s/{angle}", "D", "load moment against the motion, per output speed",
+        most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
     friction: LoadFriction | None = None
     gravity: Gravity | None = None
 
     def moment_Nm(self, angle_rad: Any, rate_rad_s: Any = 0.0) -> Any:
         """The load's own moment on the output shaft at an angle and a speed of it; floats or arrays."""
-        moment = self.moment_slope_Nm_rad * angle_rad
+        moment = self.moment_slope_Nm_rad * angle_rad - self.moment_damping_Nms_rad * rate_rad_s
         if self.gravity is not None:
             moment = moment + self.gravity.peak_Nm * np.sin(angle_rad + self.gravity.offset_rad)
         return moment
 
     def acting(self) -> tuple[str, ...]:
         """The keys of the moments that act by themselves."""
-        keys = ("load.moment_slope",) if np.any(self.moment_slope_Nm_rad) else ()
-        return keys if self.gravity is None else (*keys, "load.gravity")
+        there = {
+            "load.moment_slope": np.any(self.moment_slope_Nm_rad),
+            "load.moment_damping": np.any(self.moment_damping_Nms_rad),
+            "load.gravity": self.gravity is not None,
+        }
+        return tuple(key for key, acts in there.items() if acts)
 
     def bare(self) -> "Load":
         """The same without moments of its own."""
-        return replace(self, moment_slope_Nm_rad=0.0, gravity=None)
+        return replace(self, moment_slope_Nm_rad=0.0, moment_damping_Nms_rad=0.0, gravity=None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -149,10 +149,14 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     points = design.friction.map(direction)
     pieces: list[tuple[float, Any]]
     pieces = list(segments(points)) if points else [(0.0, design.friction.viscous(direction))]
-    behind = design.load.friction
-    if behind is None or design.coupling is None:
+    behind, damping = design.load.friction, design.load.moment_damping_Nms_rad
+    more: Any = 0.0
+    if behind is not None and design.coupling is not None:
+        more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
+    if present(damping):
+        more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
+    if not present(more):
         return pieces
-    more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     return [(start, slope + more) for start, slope in pieces]
 
 

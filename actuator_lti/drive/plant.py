@@ -143,7 +143,8 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
 
 def _own_moment(design: Design, at: Operating) -> dict[str, Any]:
     """The moments of `Load.moment_Nm`, made linear; those that are there."""
-    gains = {"output_angle": moment_slope(design, at)}
+    damping = design.load.moment_damping_Nms_rad / design.total_ratio
+    gains = {"output_angle": moment_slope(design, at), "load_speed": -damping}
     return {row: gain for row, gain in gains.items() if np.any(gain != 0)}
 
 

@@ -68,6 +68,7 @@ from actuator_lti.drive import signals
     VOLTAGE_START,
     LOAD,  # constant part of M_ext
     LOAD_SLOPE,  # N m per rad of output angle
+    LOAD_DAMPING,  # N m against the motion per rad/s of the output
     GRAVITY,  # m g l, N m
     GRAVITY_ANGLE,  # offset
     LOAD_TABLE,  # offset into the tables
@@ -142,7 +143,7 @@ from actuator_lti.drive import signals
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(127)
+) = range(128)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------

@@ -17,9 +17,14 @@ FINITE = 1e15
 
 @scalar
 def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
-    """M_ext of this tick: constant, series, slope and gravity."""
+    """M_ext of this tick: constant, series, slope, damping and gravity."""
     y = output_angle(p, s)
     M = p[layout.LOAD] + p[layout.LOAD_SLOPE] * y + io[layout.IN_LOAD]
+    if p[layout.LOAD_DAMPING] != 0.0:
+        elastic = p[layout.ELASTIC_DRIVE] > 0.0
+        M -= p[layout.LOAD_DAMPING] * (
+            s[layout.S_OUTPUT_SPEED] if elastic else s[layout.S_SPEED] / p[layout.RATIO]
+        )
     if p[layout.GRAVITY] != 0.0:
         M += p[layout.GRAVITY] * math.sin(y + p[layout.GRAVITY_ANGLE])
     return M

@@ -59,12 +59,18 @@ def test_every_file_that_the_architecture_names_exists() -> None:
             path = ROOT / name if "/" in name else ROOT / section / name
             assert path.exists() or path.stem == "NAME", name  # a file still to be written
             result += 1
-    assert result > 20
+    assert result >= 17
 
 
 @pytest.mark.parametrize(
     ("change", "most"),
-    [("limiter", 4), ("controller block", 3), ("figure", 3), ("requirement quantity", 2)],
+    [
+        ("plant effect", 6),
+        ("limiter", 4),
+        ("controller block", 3),
+        ("figure", 3),
+        ("requirement quantity", 2),
+    ],
 )
 def test_each_change_touches_no_more_files_than_promised(change: str, most: int) -> None:
     """Files of code that the page names for a change, and the number in its heading."""

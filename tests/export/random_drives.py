@@ -38,7 +38,7 @@ def maybe(rng: Rng, value: Any, other: Any, share: float = 0.5) -> Any:
 
 def random_drive(rng: Rng) -> Design:
     """A drive near a shipped one with any of the features."""
-    design = load_design("ilr33-amber")
+    design, own = load_design("ilr33-amber"), rng.spawn(1)[0]
     motor = design.motor
     assert motor.resistance_ohm is not None
     assert motor.inductance_H is not None
@@ -65,6 +65,7 @@ def random_drive(rng: Rng) -> Design:
             path=maybe(rng, "back-drivable", "self-locking"),
             moment_slope_Nm_rad=maybe(rng, -4.0, 0.0),
             gravity=maybe(rng, Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None),
+            moment_damping_Nms_rad=maybe(own, scaled(own, 0.05), 0.0),
         ),
         encoder=_encoder(rng),
         output_encoder=OutputEncoder(counts_per_rev=maybe(rng, 4096, None)),
@@ -95,6 +96,7 @@ def random_elastic_drive(rng: Rng) -> Design:
         load=replace(
             design.load,
             path="back-drivable",
+            moment_damping_Nms_rad=0.0,
             friction=LoadFriction(
                 dry_torque_Nm=maybe(rng, scaled(rng, 0.3), 0.0),
                 viscous_Nms_rad=scaled(rng, 0.05),

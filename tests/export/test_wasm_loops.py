@@ -152,6 +152,8 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
 def test_shipped_designs(tmp_path: Path) -> None:
     designs = [load_design(name) for name in shipped_designs()]
     assert any(design.coupling for design in designs)
+    damped = ("fin", "joint", "ilr33-amber-compliant")
+    designs.extend(load_design(name).with_values({"load.moment_damping": 0.2}) for name in damped)
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         assert figures_agree(design, ours) > 0
         responses_agree(design, ours)

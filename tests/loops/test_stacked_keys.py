@@ -19,7 +19,7 @@ def rich() -> Design:
     return with_overrides(load_design("joint"), {
         "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
         "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
-        "coupling.play": "0.2 mrad",
+        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
         "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
         "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
         "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",

@@ -137,6 +137,7 @@ def wide_designs(draw: st.DrawFn) -> Design:
         inertia_kgm2=J_l,
         path=draw(st.sampled_from(["back-drivable", "self-locking"])),
         moment_slope_Nm_rad=draw(st.sampled_from([0.0, -0.05 * k])),
+        moment_damping_Nms_rad=draw(st.sampled_from([0.0, 2e-4 * k])),
         friction=LoadFriction(viscous_Nms_rad=1e-4 * k),
     )
     command = Command(

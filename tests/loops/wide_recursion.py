@@ -185,7 +185,9 @@ def run(design: Design, command: np.ndarray, moment_Nm: float, contact: float) -
         past = [u, *past[:-1]]
         for name, each in zip(("th", "w", "phi", "u"), (th, w, phi, u), strict=True):
             out[name].append(each)
+        turning = W / design.ratio_behind_coupling if design.coupling else w / N
         held = moment_Nm + design.load.moment_slope_Nm_rad * angle
+        held -= design.load.moment_damping_Nms_rad * turning
         for (Phi, Gamma), j in zip(pieces, (q + 1, q), strict=True):
             x = Phi @ x + Gamma @ np.array([past[j], 0.0, held])
     return {name: np.array(values) for name, values in out.items()}

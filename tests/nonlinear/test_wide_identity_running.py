@@ -28,7 +28,11 @@ def linear_drive(case: int) -> Design:
         controller=replace(control, computing_delay_s=delay),
         friction=Friction(viscous_Nms_rad=2e-6),
         limits=Limits(voltage_V=1e12),
-        load=replace(load, moment_slope_Nm_rad=float(rng.choice([0.0, -200.0]))),
+        load=replace(
+            load,
+            moment_slope_Nm_rad=float(rng.choice([0.0, -200.0])),
+            moment_damping_Nms_rad=float(rng.choice([0.0, 3.0])),
+        ),
         encoder=replace(design.encoder, counts_per_rev=None),
         output_encoder=replace(design.output_encoder, counts_per_rev=None),
         command=Command(filter_time_s=design.command.filter_time_s, filter_order=design.command.filter_order),
