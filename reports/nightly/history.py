@@ -404,7 +404,7 @@ def _configure(connection: sqlite3.Connection, path: Path) -> str | None:
         if damage == "ok" and connection.execute("PRAGMA foreign_key_check").fetchone() is not None:
             damage = "an entry refers to one that is missing"
         if damage == "ok":
-            damage = sums.damage(connection) or "ok"
+            damage = schema.foreign_value(connection) or sums.damage(connection) or "ok"
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         if isinstance(error, sqlite3.OperationalError):
             raise

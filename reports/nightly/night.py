@@ -89,8 +89,16 @@ def state_of(site: Path, settings: Settings) -> Path:
     Raises
     ------
     InputError
-        For a state inside the site, or a site that has no folder beside it.
+        For a state that is no folder or lies inside the site, or a site that has no folder beside it.
     """
+    state = _state_of(site, settings)
+    for folder in (state, state / "cache"):
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
+    return state
+
+
+def _state_of(site: Path, settings: Settings) -> Path:
     if settings.state is None:
         place = Path(os.path.abspath(site))  # "." and ".." have names, too
         if not place.name:

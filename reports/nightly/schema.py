@@ -66,6 +66,13 @@ CREATE TABLE sums(
 STEPS: tuple[str, ...] = (_VERSION_1, _VERSION_2, _VERSION_3)
 VERSION = len(STEPS)
 
+_KINDS = {
+    "INTEGER": "'integer', 'null'",
+    "REAL": "'real', 'null'",
+    "TEXT": "'text', 'null'",
+    "BLOB": "'blob', 'null'",
+}
+
 
 def prepare(connection: sqlite3.Connection, path: Path) -> str | None:
     """Bring a database to this version; what was done in words, ``None`` where nothing had to be.
@@ -117,6 +124,26 @@ def checked_version(connection: sqlite3.Connection, path: Path) -> int:
             where=str(path),
         )
     return version
+
+
+def foreign_value(connection: sqlite3.Connection) -> str | None:
+    """A value of another kind than its column in words, which SQLite would keep; None where there is none."""
+    tables = connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+    for (table,) in tables:
+        columns = connection.execute("SELECT name, type FROM pragma_table_info(?)", (table,)).fetchall()
+        wrong = " OR ".join(
+            f"typeof({_quoted(name)}) NOT IN ({_KINDS[kind]})" for name, kind in columns if kind in _KINDS
+        )
+        found = (
+            wrong and connection.execute(f"SELECT 1 FROM {_quoted(table)} WHERE {wrong} LIMIT 1").fetchone()
+        )
+        if found:
+            return f"a value of {table} is of another kind than its column"
+    return None
+
+
+def _quoted(name: str) -> str:
+    return '"' + name.replace('"', '""') + '"'
 
 
 def _backup(connection: sqlite3.Connection, path: Path, version: int) -> Path:

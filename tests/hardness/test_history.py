@@ -13,6 +13,7 @@ from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti.errors import InputError
 from reports.cli.main import main
+from reports.nightly import sums
 from reports.nightly.history import open_history
 from reports.nightly.memory import HistoryLost, Memory, remembered
 from reports.nightly.night import Settings, approve, run_night
@@ -215,6 +216,30 @@ def test_a_changed_name_or_status_is_damage(site, change: str) -> None:
     database.close()
     assert changed
     with pytest.raises(InputError, match="is not what was written"), open_history(path):
+        pass
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE subjects SET name = x'ff00' WHERE id = 1",
+        "UPDATE figures SET better = 'x'",
+        "UPDATE figures SET unit = x'ff'",
+        "UPDATE baselines SET by = x'ff'",
+        "UPDATE results SET seconds = 'long'",
+        "UPDATE vectors SET numbers = 'none'",
+    ],
+)
+def test_a_value_of_another_kind_is_damage_even_with_its_sum(site, change: str) -> None:
+    path = state(site) / "history.sqlite"
+    database = sqlite3.connect(path)
+    database.row_factory = sqlite3.Row
+    with database:
+        assert database.execute(change).rowcount
+        database.execute("DELETE FROM sums")
+        sums.write(database)
+    database.close()
+    with pytest.raises(InputError, match="another kind than its column"), open_history(path):
         pass
 
 

@@ -221,3 +221,13 @@ def test_a_state_inside_the_site_is_refused(state, tmp_path) -> None:
     with pytest.raises(InputError, match="lies inside the site"):
         run_night(study(job("a")), site, inside, code=CODE)
     assert not site.exists()
+
+
+@pytest.mark.parametrize("place", ["site.state", "site.state/cache"])
+@pytest.mark.parametrize("target", [None, "nowhere", "/dev/zero", "cache"])
+def test_a_state_that_is_no_folder_is_named(place, target, tmp_path) -> None:
+    path = tmp_path / place
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("mine") if target is None else path.symlink_to(target)
+    with pytest.raises(InputError, match="is no folder"):
+        run_night(study(job("a")), tmp_path / "site", INLINE, code=CODE)
