@@ -65,7 +65,11 @@ def history_rows(folder: Path, nights: int) -> Iterator[Row]:
         night = overview(history, Cache(folder / "cache"), study)
         text = index(night, "nights/x")
         yield Row(
-            group=GROUP, name="index page from it", measured=time.process_time() - start, unit="s", target=0.5,
+            group=GROUP,
+            name="index page from it",
+            measured=time.process_time() - start,
+            unit="s",
+            target=0.5,
             note="processor time",
         )
         start = time.process_time()
@@ -88,7 +92,9 @@ def fill(history: History, nights: int) -> None:
         c.execute("BEGIN IMMEDIATE")
         for run, night in runs:
             in_bulk(history, run, night, rng)
-        c.executemany("UPDATE runs SET state = 'done', finished = started WHERE id = ?", [(run,) for run, _ in runs])
+        c.executemany(
+            "UPDATE runs SET state = 'done', finished = started WHERE id = ?", [(run,) for run, _ in runs]
+        )
     finish(history, nights - 1, names, rng)
 
 
@@ -113,7 +119,8 @@ def in_bulk(history: History, run: int, night: int, rng: np.random.Generator) ->
     c = history.connection
     layout = int(c.execute("SELECT id FROM layouts").fetchone()[0])
     vector, snapshot, given = (
-        int(c.execute(f"SELECT max(id) FROM {table}").fetchone()[0]) for table in ("vectors", "snapshots", "inputs")
+        int(c.execute(f"SELECT max(id) FROM {table}").fetchone()[0])
+        for table in ("vectors", "snapshots", "inputs")
     )
     body = canonical(inputs_of(night))
     c.execute(
@@ -130,8 +137,8 @@ def in_bulk(history: History, run: int, night: int, rng: np.random.Generator) ->
         [(snapshot + 1 + k, f"{k}-{night}", vector + 1 + k, given + 1) for k in range(DESIGNS)],
     )
     c.execute(
-        "INSERT INTO results SELECT subject, ?, status, snapshot + (? - (SELECT min(snapshot) FROM results WHERE"
-        " run = (SELECT min(run) FROM results))), seconds, cached, failed, total, worst, worst_id, message"
+        "INSERT INTO results SELECT subject, ?, status, snapshot + (? - (SELECT min(snapshot) FROM results"
+        " WHERE run = (SELECT min(run) FROM results))), seconds, cached, failed, total, worst, worst_id, message"
         " FROM results WHERE run = (SELECT min(run) FROM results)",
         (run, snapshot + 1),
     )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import dry_torque, segments
+from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:

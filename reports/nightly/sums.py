@@ -31,7 +31,9 @@ _EVERY = "1"
 
 def write(connection: sqlite3.Connection) -> None:
     """Add the sums of rows that have none yet, within the transaction that is open; no others are read."""
-    connection.executemany("INSERT INTO sums(kind, id, sha) VALUES (?, ?, ?)", list(_sums(connection, new=True)))
+    connection.executemany(
+        "INSERT INTO sums(kind, id, sha) VALUES (?, ?, ?)", list(_sums(connection, new=True))
+    )
 
 
 def forget(connection: sqlite3.Connection) -> None:
