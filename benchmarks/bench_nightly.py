@@ -138,7 +138,8 @@ def in_bulk(history: History, run: int, night: int, rng: np.random.Generator) ->
     )
     c.execute(
         "INSERT INTO results SELECT subject, ?, status, snapshot + (? - (SELECT min(snapshot) FROM results"
-        " WHERE run = (SELECT min(run) FROM results))), seconds, cached, failed, total, worst, worst_id, message"
+        " WHERE run = (SELECT min(run) FROM results))),"
+        " seconds, cached, failed, total, worst, worst_id, message"
         " FROM results WHERE run = (SELECT min(run) FROM results)",
         (run, snapshot + 1),
     )
