@@ -137,10 +137,9 @@ def in_bulk(history: History, run: int, night: int, rng: np.random.Generator) ->
         [(snapshot + 1 + k, f"{k}-{night}", vector + 1 + k, given + 1) for k in range(DESIGNS)],
     )
     c.execute(
-        "INSERT INTO results SELECT subject, ?, status, snapshot + (? - (SELECT min(snapshot) FROM results"
-        " WHERE run = (SELECT min(run) FROM results))),"
-        " seconds, cached, failed, total, worst, worst_id, message"
-        " FROM results WHERE run = (SELECT min(run) FROM results)",
+        "WITH first AS (SELECT * FROM results WHERE run = (SELECT min(run) FROM results))"
+        " INSERT INTO results SELECT subject, ?, status, snapshot + ? - (SELECT min(snapshot) FROM first),"
+        " seconds, cached, failed, total, worst, worst_id, message FROM first",
         (run, snapshot + 1),
     )
 

@@ -63,7 +63,10 @@ def _longest_chain(rows: Rows) -> list[int]:
 
 
 def numerator(rows: Rows, b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
-    """c adj(z I - M) b: the polynomial part of ``below`` sum_k c M^k b z^(-1-k), ``below`` = det(z I - M)."""
+    """c adj(z I - M) b, where ``below`` is det(z I - M).
+
+    It is the polynomial part of ``below`` times the sum of c M^k b z^(-1-k).
+    """
     n = len(rows)
     M, state, out = fmpz_mat(rows), fmpz_mat(n, 1, b), fmpz_mat(1, n, c)
     answer = []

@@ -1,6 +1,6 @@
 """The positive roots of a square-free integer polynomial of high degree, without its other roots.
 
-Descartes' rule on intervals (Collins and Akritas 1976; Vincent): the roots of p in (a, b) are the positive
+Descartes' rule on intervals (Vincent; Collins and Akritas 1976): the roots of p in (a, b) are the positive
 ones of (1 + x)^n p((a + b x)/(1 + x)). No change of sign among the coefficients: no root; one change: one
 root; more: the interval is split. The coefficients are certified intervals, and their precision is doubled
 until each sign is told.
@@ -40,8 +40,7 @@ def positive_axis_roots(p: fmpz_poly) -> list[arb]:
 def _intervals(coefficients: tuple[fmpz, ...]) -> tuple[tuple[float, float], ...]:
     """Intervals that hold one positive root each, in order, and no other is left."""
     p = fmpz_poly(list(coefficients))
-    axis = _Axis(p)
-    result: list[tuple[float, float]] = []
+    axis, result = _Axis(p), []
     low, high = _bounds(p)
     count = max(math.ceil((high - low) / _OCTAVES), 1)
     edges = [2.0 ** (low + (high - low) * k / count) * (1.0 if k else _ODD) for k in range(count + 1)]
@@ -99,7 +98,7 @@ class _Axis:
         raise NotIsolated("a coefficient could not be told from zero")
 
     def root(self, low: float, high: float) -> arb:
-        """The only root between two points, by Newton's method and bisection; proved by a change of sign."""
+        """The only root between two points, by Newton's method held by bisection; proved by a change of sign."""
         wanted = ctx.prec
         bits = max(2 * wanted, _FIRST_BITS)
         a, b = arb(low), arb(high)
@@ -122,7 +121,8 @@ class _Axis:
                 if not (ahead.is_finite() and ahead > a and ahead < b):
                     ahead = ((a + b) / 2).mid()
                 near = (arb(2) ** (-wanted - _SPARE_BITS) * abs(ahead)).mid()
-                if bool(abs(ahead - x) < near) and self._sign(ahead - near) * self._sign(ahead + near) < 0:
+                settled = bool(abs(ahead - x) < near)
+                if settled and self._sign(ahead - near) * self._sign(ahead + near) < 0:
                     return ahead + arb(0, 1) * near
                 x = ahead
         raise NotIsolated("a root did not settle")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class Comparison:
     cause: Cause = Cause()
     note: str = ""
 
-    @property
+    @cached_property
     def regressions(self) -> tuple[Change, ...]:
         """The changes for the worse."""
         return tuple(c for c in self.changes if c.worse)

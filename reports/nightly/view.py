@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -183,6 +184,7 @@ class _Reader:
         self.study = study
         self.runs = {r.id: r for r in runs}
         self.last = runs[-1]
+        self._nights = sorted(self.runs)
         self.baselines = [b for b in history.baselines() if b.run in self.runs]
         self.metas: dict[str, Mapping[str, Any]] = {}
         self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
@@ -232,7 +234,7 @@ class _Reader:
             return Comparison(note="first night of this design")
         if not good:
             return Comparison(note="no earlier night has a result")
-        skipped = sum(good[-1].run < i < result.run for i in self.runs)
+        skipped = bisect_left(self._nights, result.run) - bisect_right(self._nights, good[-1].run)
         note = (
             f"{skipped} night(s) without a result before; compared with the last that has one"
             if skipped
