@@ -25,7 +25,8 @@ _ALGEBRAIC = 1e12  # condition of an algebraic loop beyond which it has no solut
 class PlainDelaySystem:
     """``dx/dt = A x + B1 u + B2 z``, ``y = C1 x + D11 u + D12 z``, ``v = C2 x + D21 u + D22 z``.
 
-    ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take a `actuator_lti.delay_system.DelaySystem`.
+    ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take its
+    python-control face, `actuator_lti.delay_system.DelaySystem`.
 
     Attributes
     ----------

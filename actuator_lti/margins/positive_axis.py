@@ -98,7 +98,7 @@ class _Axis:
         raise NotIsolated("a coefficient could not be told from zero")
 
     def root(self, low: float, high: float) -> arb:
-        """The only root between two points, by Newton's method held by bisection; proved by a change of sign."""
+        """The only root between two points: Newton held by bisection, proved by a change of sign."""
         wanted = ctx.prec
         bits = max(2 * wanted, _FIRST_BITS)
         a, b = arb(low), arb(high)
