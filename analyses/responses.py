@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
+_ENTRIES = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,21 @@ def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
     a, b, c, d = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
     if not a.size or b.shape[1] != 1 or c.shape[0] != 1:
         return None
-    try:
-        states = np.linalg.solve(points[:, None, None] * np.eye(len(a)) - a, b[None, :, :].astype(complex))
-    except np.linalg.LinAlgError:
-        return None
-    return np.asarray((c @ states)[:, 0, 0] + d[0, 0])
+    result = np.empty(len(points), dtype=complex)
+    some = max(_ENTRIES // a.size, 1)  # as many points at once as the cache holds
+    matrix = np.empty((min(some, len(points)), *a.shape), dtype=complex)
+    own = np.arange(len(a))
+    for start in range(0, len(points), some):
+        part = points[start : start + some]
+        here = matrix[: len(part)]
+        here[...] = -a
+        here[:, own, own] += part[:, None]
+        try:
+            states = np.linalg.solve(here, b[None, :, :].astype(complex))
+        except np.linalg.LinAlgError:
+            return None
+        result[start : start + some] = (c @ states)[:, 0, 0] + d[0, 0]
+    return result
 
 
 def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:

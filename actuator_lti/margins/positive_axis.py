@@ -40,7 +40,8 @@ def positive_axis_roots(p: fmpz_poly) -> list[arb]:
 def _intervals(coefficients: tuple[fmpz, ...]) -> tuple[tuple[float, float], ...]:
     """Intervals that hold one positive root each, in order, and no other is left."""
     p = fmpz_poly(list(coefficients))
-    axis, result = _Axis(p), []
+    axis = _Axis(p)
+    result: list[tuple[float, float]] = []
     low, high = _bounds(p)
     count = max(math.ceil((high - low) / _OCTAVES), 1)
     edges = [2.0 ** (low + (high - low) * k / count) * (1.0 if k else _ODD) for k in range(count + 1)]
