@@ -7,16 +7,13 @@ two systems are joined and how one is evaluated stands here alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import InputError
 from actuator_lti.plain_system import PlainSystem, solved_at
-
-if TYPE_CHECKING:
-    from actuator_lti.delay_system import DelaySystem
 
 _ALGEBRAIC = 1e12  # condition of an algebraic loop beyond which it has no solution
 
@@ -25,8 +22,8 @@ _ALGEBRAIC = 1e12  # condition of an algebraic loop beyond which it has no solut
 class PlainDelaySystem:
     """``dx/dt = A x + B1 u + B2 z``, ``y = C1 x + D11 u + D12 z``, ``v = C2 x + D21 u + D22 z``.
 
-    ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take its
-    python-control face, `actuator_lti.delay_system.DelaySystem`.
+    The delays: ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take a
+    `actuator_lti.delay_system.DelaySystem`.
 
     Attributes
     ----------
@@ -83,13 +80,6 @@ class PlainDelaySystem:
             raise InputError("a system with delays is no finite state space")
         parts = (self.A, self.B1, self.C1, self.D11, 0.0)
         return PlainSystem(*parts, self.name, self.source, self.signal, self.states)
-
-    def to_control(self) -> DelaySystem:
-        """The same as a named `actuator_lti.delay_system.DelaySystem`, which python-control takes."""
-        from actuator_lti.delay_system import DelaySystem
-
-        names = {"inputs": [self.source], "outputs": [self.signal], "name": self.name}
-        return DelaySystem.of(self, **names)
 
     def __call__(self, points: npt.ArrayLike) -> Any:
         """The response of one input and one output at complex s, exactly; of the shape of ``points``."""

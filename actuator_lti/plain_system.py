@@ -1,8 +1,8 @@
 """A linear system as matrices and names only.
 
 `assemble_loops` works with these, and with `actuator_lti.plain_delays.PlainDelaySystem` where there are exact
-delays. The python-control system of one (`to_control`) is made where somebody asks for it: importing
-python-control takes longer than the margins of a drive.
+delays. The python-control system of one (`actuator_lti.as_control`) is made where somebody asks for it:
+importing python-control takes longer than the margins of a drive.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    import control
+    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class PlainSystem:
     states: tuple[str, ...] = ()
 
     def __call__(self, points: npt.ArrayLike) -> Any:
-        """Response at complex points (z, or s where ``dt`` is 0), of their shape; inf + nan j at a pole."""
+        """The response at complex points (z; s where ``dt`` is 0), of their shape; inf + nan j at a pole."""
         asked = np.asarray(points, dtype=complex)
         flat = asked.reshape(-1)
         matrix = flat[:, None, None] * np.eye(len(self.A)) - self.A
@@ -60,15 +60,6 @@ class PlainSystem:
         """The eigenvalues of A."""
         return np.asarray(np.linalg.eigvals(self.A).astype(complex) if self.A.size else np.empty(0, complex))
 
-    def to_control(self) -> control.StateSpace:
-        """The same as a named python-control system."""
-        import control
-
-        names = {"inputs": [self.source], "outputs": [self.signal], "name": self.name}
-        if self.states:
-            names["states"] = [state.replace(".", "_") for state in self.states]
-        return control.ss(self.A, self.B, self.C, self.D, self.dt, remove_useless_states=False, **names)
-
 
 def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve stacked equations; NaN where a matrix is singular."""
@@ -80,8 +71,3 @@ def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
         solved = np.linalg.solve(regular, right)
         solved[singular] = np.nan
         return solved
-
-
-def as_control(system: Any) -> Any:
-    """The python-control system of a plain one; anything else as it is."""
-    return system.to_control() if hasattr(system, "to_control") else system
