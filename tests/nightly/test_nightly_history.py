@@ -170,3 +170,21 @@ def test_the_history_of_one_study_is_not_taken_for_that_of_another(tmp_path) -> 
         history.claim("one")
         with pytest.raises(InputError, match="'one', not of 'two'"):
             history.claim("two")
+
+
+def test_each_row_has_a_sum_of_its_own_and_writing_one_reads_no_other(tmp_path) -> None:
+    path = tmp_path / "h.sqlite"
+    with open_history(path) as history:
+        for day in (1, 2, 3):
+            values = {"x": float(day), f"only {day}": 1.0}
+            history.finish_run(start(history, day), "x", [result(key=f"k{day}", values=values)])
+        known = {(row[0], row[1]): row[2] for row in history.connection.execute("SELECT * FROM sums")}
+        assert set(known) == {("run", 1), ("run", 2), ("run", 3)} | {("figure", k) for k in range(1, 5)}
+        history.connection.execute("UPDATE results SET message = 'changed' WHERE run = 2")
+        run = start(history, 4)
+        history.finish_run(run, "x", [result(key="k4", values={"x": 4.0})])
+        after = {(row[0], row[1]): row[2] for row in history.connection.execute("SELECT * FROM sums")}
+        assert {key: after[key] for key in known} == known
+        assert set(after) - set(known) == {("run", run)}
+    with pytest.raises(InputError, match="run 2 is not what was written"), open_history(path):
+        pass
