@@ -148,7 +148,7 @@ class _Work:
         self._warm_up()
         self.budget = Budget(self.settings.seconds)
         if replace(self.linear, command=self.design.command) != self.design:
-            self.notes.append("Small signals are measured with ideal instruments: without counts and noise.")
+            self.notes.append("small signals are measured with ideal instruments: without counts and noise")
 
     def _warm_up(self) -> None:
         """Have the simulator compiled, and libraries loaded, before the clock starts."""

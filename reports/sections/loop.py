@@ -52,7 +52,7 @@ def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures
         blocks.append(step(title, figures, locked, name=name))
     blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
     notes = [*evidence_notes({title: figures}), *figures.margins.notes, *figures.notes]
-    blocks += [doc.text(note) for note in notes]
+    blocks += [doc.remark(note) for note in notes]
     return doc.section(
         f"loop-{name}", title, blocks, result=result(figures), intro=_intro(name, figures), status=status
     )
