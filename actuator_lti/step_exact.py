@@ -178,7 +178,7 @@ def _final(loop: RationalLoop, f: Fraction, dc: flint.fmpq, seen: list[_Pole], w
         )
     if abs(final) <= dc_noise(loop):
         raise NumericalError(
-            f"the final value of the step response, {final:.3g}, is zero within the rounding of the entries: "
+            "the final value of the step response is zero within the rounding of the entries: "
             "it has no rise, overshoot or settling"
         )
     return final

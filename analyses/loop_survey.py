@@ -240,7 +240,10 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
-        points += [point("load driven by the motor", None, "driving"), point("by the load", None, "driven")]
+        points += [
+            point("load driven by the motor", None, "driving"),
+            point("motor driven by the load", None, "driven"),
+        ]
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
     for load in dict.fromkeys(design.validation.loads_Nm):

@@ -67,7 +67,19 @@ def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
         phase = np.asarray(unwrapped_phase_deg(system, omega_rad_s))
     except NumericalError:
         phase = np.degrees(np.unwrap(np.angle(values)))
-    return Curve(omega_rad_s, values, phase)
+    return Curve(omega_rad_s, values, phase - 360.0 * _turns(omega_rad_s, values, phase))
+
+
+def _turns(omega_rad_s: np.ndarray, values: np.ndarray, phase: np.ndarray) -> float:
+    """Whole turns by which the phase at the lowest frequency is off what its slope there leads to.
+
+    A slope of n decades a decade has 90 n deg, less 180 deg for a negative gain. A zero or pole within
+    rounding of zero frequency may have been counted on its other side.
+    """
+    if len(values) < 2 or not (values[:2] != 0.0).all() or not np.isfinite(phase[0]):
+        return 0.0
+    slope = np.log(np.abs(values[1] / values[0])) / np.log(omega_rad_s[1] / omega_rad_s[0])
+    return float(np.ceil((phase[0] - 90.0 * np.round(slope) - 90.0) / 360.0)) if np.isfinite(slope) else 0.0
 
 
 def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:

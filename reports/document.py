@@ -146,6 +146,19 @@ def text(content: str) -> Block:
     return {"kind": "text", "text": content}
 
 
+def remark(words: str) -> Block:
+    """Make a paragraph of what a computation had to say: a sentence.
+
+    Examples
+    --------
+    >>> remark("the loop is cut")["text"], remark("w_ref: no loop.")["text"]
+    ('The loop is cut.', 'w_ref: no loop.')
+    """
+    name = {"_", "."} & set(words.split(" ")[0].strip(".,:"))
+    start = words[:1] if name else words[:1].upper()
+    return text(start + words[1:] + ("." if words[-1:].isalnum() else ""))
+
+
 def fact(label: str, value: Any, unit: str = "") -> FactItem:
     """Make one item of `facts`."""
     return {"label": label, "value": plain(value), "unit": unit}

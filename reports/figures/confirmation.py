@@ -8,6 +8,7 @@ from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
 
 LEAST = 1e-9
+LOWEST = 0.02  # of the linear margin: a border below is drawn here
 
 
 class Margin(TypedDict):
@@ -64,15 +65,23 @@ def _released(panel: Panel, data: Data) -> None:
     for k, item in enumerate(data["released"]):
         x = [j + 0.06 * (k - len(data["released"]) / 2) for j in range(len(item["sizes"]))]
         look: dict[str, Any] = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
-        panel.curve(x, item["without"], item["label"], marker="o", **look)
-        panel.curve(x, item["with_friction"], item["label"], marker="s", hollow=True, dash=1, **look)
+        panel.curve(x, _drawn(item["without"]), item["label"], marker="o", **look)
+        panel.curve(x, _drawn(item["with_friction"]), item["label"], marker="s", hollow=True, dash=1, **look)
     panel.rule_y(1.0)
     sizes = data["released"][0]["sizes"]
     panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
     panel.x.limits(-0.4, len(sizes) - 0.6)
-    values = [x for item in data["released"] for key in ("without", "with_friction") for x in item[key] if x]
+    both = [_drawn(item[key]) for item in data["released"] for key in ("without", "with_friction")]
+    values = [x for each in both for x in each if x]
     panel.y.log, panel.by_point = True, True
     panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
-    panel.y.ticks = [(t, f"{t:g}") for t in (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)]
+    panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)]
+    if min([*values, 1.0]) <= LOWEST:
+        panel.y.ticks[0] = (LOWEST, f"≤ {LOWEST:g}")
     panel.x.label, panel.y.label = "initial deviation", "margin over linear margin"
     panel.title = "Released from rest (dashed: with dry friction)"
+
+
+def _drawn(values: Values) -> Values:
+    """The borders, none below the lowest that is drawn."""
+    return [None if value is None else max(value, LOWEST) for value in values]

@@ -6,6 +6,7 @@ from typing import Any, NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
+from reports.numbers import significant
 
 LEAST = 1e-12  # errors below this are drawn there
 
@@ -70,7 +71,9 @@ def _errors(panel: Panel, data: Data, part: Response) -> None:
     for unit, errors, allowed, colour, dash in both:
         values = [None if x is None else max(x, LEAST) for x in errors]
         panel.curve(f, values, f"difference, {unit}", colour=colour, dash=dash, width=1.5)
-        panel.rule_y(allowed, label=f"allowed: {allowed:g} {unit}", colour=colour, dash=4, width=1.3)
+        panel.rule_y(
+            allowed, label=f"allowed: {significant(allowed, 2)} {unit}", colour=colour, dash=4, width=1.3
+        )
     panel.y.log = True
     panel.y.limits(1e-12, 10.0)
     panel.y.ticks = style.powers((-12, -9, -6, -3, 0))

@@ -21,7 +21,7 @@ FIGURES = (
     ("phase_margin_deg", "phase_margin", "Phase margin", "deg", "fix:1"),
     ("delay_margin_ms", "delay_margin", "Delay margin", "ms", "sig:3"),
     ("s_peak_db", "sensitivity_peak", "Peak of S", "dB", "fix:2"),
-    ("minus3db_hz", "bandwidth", "Bandwidth, −3 dB", "Hz", "sig:3"),
+    ("minus3db_hz", "bandwidth", "−3\N{NO-BREAK SPACE}dB bandwidth", "Hz", "sig:3"),
 )
 SHOWN = 5
 

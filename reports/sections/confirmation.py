@@ -18,6 +18,7 @@ from reports.numbers import significant
 if TYPE_CHECKING:
     from reports.figures import confirmation as confirmation_figure
 
+NEXT_TO_NOTHING = 0.01  # of the linear margin
 SHORT = {
     "gain up": "gain up",
     "gain down": "gain down",
@@ -76,9 +77,9 @@ def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) 
     worst = max((abs(item.difference) for item in items if item.difference is not None), default=0.0)
     caption = (
         "Left: margin found in time relative to the linear margin, largest difference "
-        f"{significant(worst, 2)} "
-        f"(allowed up to {_allowed(items):.2g}, from its own error). Right: the same margins after release "
-        "from rest at small, medium and large deviations, limits active, with and without dry friction."
+        f"{significant(worst, 2)} (allowed up to {significant(_allowed(items), 2)}, from its own error). "
+        "Right: the same margins after release from rest at small, medium and large deviations, limits "
+        "active, with and without dry friction."
     )
     return doc.figure("confirmation", data, caption=caption, alt=caption)
 
@@ -103,18 +104,29 @@ def _remarks(released: Sequence[AmplitudeMargin]) -> list[str]:
 
 def _remark(item: AmplitudeMargin) -> str:
     """Say from where on a large motion keeps oscillating."""
-    border, linear = _text(item.border.value or 0.0, item), _text(item.linear, item)
+    value = item.border.value or 0.0
+    border, linear = _text(value, item), _text(item.linear, item)
     how = {
-        "gain up": f"its gain is raised by {border} or more",
-        "gain down": f"its gain is lowered by {border}",
+        "gain up": f"if its gain is raised by {border} or more",
+        "gain down": f"if its gain is lowered by {border}",
     }
-    cause = how.get(item.kind, f"a delay of {border} or more is added")
+    cause = how.get(item.kind, f"if a delay of {border} or more is added")
+    if _already(value, item):
+        cause = "as designed"
+    kind = "delay" if item.kind == "delay" else "gain"
+    quiet = "" if item.friction_on else ", without dry friction,"
     acting = f" The {item.limiter} limit acts." if item.limiter else ""
     return (
-        f"The {item.loop} loop sustains an oscillation if {cause} after release from {100.0 * item.part:.0f} "
-        "% of "
-        f"full range; the linear margin is {linear}.{acting}"
+        f"The {item.loop} loop{quiet} sustains an oscillation {cause} after release from "
+        f"{100.0 * item.part:.0f} % of full range; the linear {kind} margin is {linear}.{acting}"
     )
+
+
+def _already(value: float, item: AmplitudeMargin) -> bool:
+    """Whether the border is the drive as designed: less than a hundredth of the linear margin away."""
+    if item.kind == "delay":
+        return value < NEXT_TO_NOTHING * item.linear
+    return abs(math.log(value)) < NEXT_TO_NOTHING * abs(math.log(item.linear))
 
 
 def _series(released: Sequence[AmplitudeMargin]) -> list[confirmation_figure.Released]:

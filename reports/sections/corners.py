@@ -101,7 +101,7 @@ def _loop_table(rows: list[Row]) -> Block:
         doc.column("stable", "Stable", format="yesno"),
         doc.column("gain", "Gain margin", "dB", format="fix:1"),
         doc.column("phase", "Phase margin", "deg", format="fix:1"),
-        doc.column("bandwidth", "Bandwidth, −3 dB", "Hz", format="sig:3"),
+        doc.column("bandwidth", "−3\N{NO-BREAK SPACE}dB bandwidth", "Hz", format="sig:3"),
     ]
     return doc.table("Loops at the corners", columns, rows)
 

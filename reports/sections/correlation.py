@@ -45,7 +45,7 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
         *figures,
         result_input_table(result),
         finding_table(result.record, result.findings),
-        *[doc.text(note) for note in result.notes],
+        *[doc.remark(note) for note in result.notes],
     ]
     judged = verdict([result], error_limit)
     return doc.section(

@@ -167,7 +167,7 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
             )
     note = (
         "The third step at each load is 0.3 of the threshold, the fourth that of a predicted cycle. Errors "
-        "below 1e-6 "
+        "below 10⁻⁶ "
         "of the step are shown as 0."
     )
     return doc.table("Steady-state error after a step", columns, rows, note)

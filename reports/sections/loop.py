@@ -52,7 +52,7 @@ def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures
         blocks.append(step(title, figures, locked, name=name))
     blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
     notes = [*evidence_notes({title: figures}), *figures.margins.notes, *figures.notes]
-    blocks += [doc.text(note) for note in notes]
+    blocks += [doc.remark(note) for note in notes]
     return doc.section(
         f"loop-{name}", title, blocks, result=result(figures), intro=_intro(name, figures), status=status
     )
@@ -93,7 +93,7 @@ def _facts(figures: LoopFigures) -> Block:
         ("Gain crossover", margins["crossover_hz"], "Hz", None),
         ("Delay margin", margins["delay_margin_ms"], "ms", None),
         ("Peak of S", margins["s_peak_db"], "dB", 2),
-        ("Bandwidth, −3 dB", response["minus3db_hz"], "Hz", None),
+        ("−3\N{NO-BREAK SPACE}dB bandwidth", response["minus3db_hz"], "Hz", None),
     ]
     return doc.facts(doc.fact(label, _short(value, places), unit) for label, value, unit, places in chosen)
 

@@ -100,7 +100,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         if known:
             name = min(known, key=lambda n: known[n])
             words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
-    count = "The loop is" if len(rows) == 1 else f"All {len(rows)} loops are"
+    count = {1: "The loop is", 2: "Both loops are"}.get(len(rows), f"All {len(rows)} loops are")
     count = f"{count} stable, {evidence_words(figures)}"
     return to_minus(f"{count}; {' and '.join(words)}." if words else f"{count}.")
 

@@ -63,7 +63,7 @@ def section(result: MonteCarloResult, design: Design | None = None, at_least: fl
     blocks.append(_figure_table(result.columns.values()))
     if result.worst:
         blocks.append(doc.details("Parameters of the worst cases", [_worst_table(result)]))
-    blocks += [doc.text(note) for note in result.notes]
+    blocks += [doc.remark(note) for note in result.notes]
     blocks.append(doc.facts([
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
         doc.fact("Parameters that vary", ", ".join(result.paths)),

@@ -26,7 +26,7 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
         columns += [
             doc.column(f"{name}_phase", f"{label} PM", "deg", format="fix:1"),
             doc.column(f"{name}_gain", f"{label} GM", "dB", format="fix:1"),
-            doc.column(f"{name}_band", f"{label} −3 dB", "Hz", format="sig:3"),
+            doc.column(f"{name}_band", f"{label} −3\N{NO-BREAK SPACE}dB", "Hz", format="sig:3"),
         ]
     rows = [_row(point, 1.0 if linear else 1e3) for point in points]
     note = (

@@ -11,6 +11,7 @@ from reports import document as doc
 from reports.document import abscissa, rounded
 from reports.document_schema import Block, Section
 from reports.findings import Finding
+from reports.numbers import significant
 from reports.sections.large_signal import load_unit, output_unit
 from reports.sections.limits import words_of
 
@@ -37,8 +38,8 @@ def _result(result: Specification) -> str:
     if one is None:
         return ""
     rate, push = one.figures.output_rate_rad_s, one.figures.acceleration_rad_s2
-    parts = [f"{scale * rate:.3g} {unit}/s"] if rate is not None and math.isfinite(rate) else []
-    parts += [f"{scale * push:.3g} {unit}/s²"] if push is not None and math.isfinite(push) else []
+    parts = [f"{significant(scale * rate)} {unit}/s"] if rate is not None and math.isfinite(rate) else []
+    parts += [f"{significant(scale * push)} {unit}/s²"] if push is not None and math.isfinite(push) else []
     return (
         f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the output reaches "
         f"{' and '.join(parts)}."

@@ -154,7 +154,7 @@ def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
     rows += [_point_row(name, point) for name, point in points.items() if point.sweep is not None]
     note = (
         "Largest values over all points up to Nyquist. A point whose last two windows differ by more than "
-        "1e-5 is not reported as steady. Distortion at u and i_ref of a multirate drive holds the images of "
+        "10⁻⁵ is not reported as steady. Distortion at u and i_ref of a multirate drive holds the images of "
         "its periodic loop."
     )
     return doc.table("Agreement of measured and assembled loops", columns, rows, note)

@@ -60,7 +60,7 @@ def section(result: TuningResult) -> Section:
         blocks.append(_curve(result))
     if result.checks:
         blocks.append(checks(result))
-    blocks += [doc.text(note) for note in result.notes]
+    blocks += [doc.remark(note) for note in result.notes]
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
     return doc.section(

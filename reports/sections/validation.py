@@ -71,7 +71,7 @@ def summary(validation: Validation, *, timing: bool = True) -> Section:
             doc.details(f"{loop_name(name)}: every prediction", [ledger_table(rows, loop_name(name))])
         )
     if validation.notes:
-        blocks += [doc.text(note) for note in validation.notes]
+        blocks += [doc.remark(note) for note in validation.notes]
     if timing:
         blocks.append(doc.details("Where the time went", [_times(validation)]))
     intro = (

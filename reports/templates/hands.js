@@ -82,7 +82,7 @@
   const FIGURES = [
     ["gain_margin", "Gain margin", "dB", 1], ["phase_margin", "Phase margin", "deg", 1],
     ["delay_margin", "Delay margin", "ms", 1e3],
-    ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "Bandwidth, −3 dB", "Hz", 1],
+    ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "−3\u00a0dB bandwidth", "Hz", 1],
     ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
   ];
   const TIMED = ["overshoot", "settling_time", "rise_time"];
@@ -496,12 +496,13 @@
     for (let k = 0; k <= 320; k++) points.push(low * (top / low) ** (k / 320));
     return points;
   };
-  const unwrapped = (re, im) => {
+  const unwrapped = (re, im, hertz) => {
     const phase = [];
     let last = null, turn = 0;
+    const slope = Math.round(Math.log(Math.hypot(re[1], im[1]) / Math.hypot(re[0], im[0])) / Math.log(hertz[1] / hertz[0])) || 0;
     for (let k = 0; k < re.length; k++) {
       let angle = Math.atan2(im[k], re[k]) * 180 / Math.PI;
-      if (last === null && angle > 90) turn = -360;
+      if (last === null) turn = -360 * Math.ceil((angle - 90 * slope - 90) / 360); // as actuator_lti.phase's branch
       if (last !== null) turn -= 360 * Math.round((angle + turn - last) / 360);
       angle += turn;
       phase.push(angle);
@@ -519,7 +520,7 @@
       s.push(-db(distance));
       t.push(db(Math.hypot(re[k], im[k]) / distance));
     }
-    return { re, im, gain: re.map((_, k) => db(Math.hypot(re[k], im[k]))), phase: unwrapped(re, im), s, t };
+    return { re, im, gain: re.map((_, k) => db(Math.hypot(re[k], im[k]))), phase: unwrapped(re, im, hertz), s, t };
   };
   const CUT = 2.5 * 1.6;
   const near = (curves) => curves.re.map((value, k) => Math.hypot(1 + value, curves.im[k]) < CUT);

@@ -224,7 +224,7 @@ def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
     design = replace(base, coupling=coupling, friction=replace(base.friction, load_coefficient=0.01))
     survey = survey_loops(design)
     labels = [point.label for point in survey.operating_points]
-    assert labels[1:4] == ["load driven by the motor", "by the load", "in the gap of the play"]
+    assert labels[1:4] == ["load driven by the motor", "motor driven by the load", "in the gap of the play"]
     rows = section(survey.budgets)["blocks"][1]["rows"]
     assert all(row["torque notch 2 900 rad/s"] <= 0.0 for row in rows)
     assert rows[0]["torque notch 2 900 rad/s"] == 0.0  # the current loop has none

@@ -88,8 +88,20 @@ def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field
     )  # fmt: skip
     assert _remark(item) == (
         "The position loop sustains an oscillation if its gain is raised by 6.02 dB or more after release "
-        "from "
-        "50 % of full range; the linear margin is 20 dB. The current limit acts."
+        "from 50 % of full range; the linear gain margin is 20 dB. The current limit acts."
+    )
+
+
+@pytest.mark.parametrize(("kind", "value", "words"), [("gain up", 1.0, "20 dB"), ("delay", 1e-5, "1 ms")])
+def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, words: str) -> None:
+    border = Border(value=value, bracket=(value, value), frequency_hz=30.0, runs=1)
+    item = AmplitudeMargin(
+        loop="position", kind=kind, size="small", part=0.02, friction_on=False, linear=10.0, border=border,
+        period_s=1e-4, limiter="",
+    )  # fmt: skip
+    assert _remark(item) == (
+        "The position loop, without dry friction, sustains an oscillation as designed after release from 2 % "
+        f"of full range; the linear {kind.split()[0]} margin is {words}."
     )
 
 
