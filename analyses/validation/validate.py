@@ -461,7 +461,7 @@ class _Work:
         own = [settling_ticks_of(system, base, self.design.name, EVER_TICKS)]
         for name in self.settle:
             held = rig(self.linear, name).hold_ticks
-            own.append(settling_ticks_of(loops[name].closed_loop, held, self.design.name, EVER_TICKS))
+            own.append(settling_ticks_of(loops[name].plain_closed, held, self.design.name, EVER_TICKS))
         return max(own)
 
     def _steady(self) -> Entry:

@@ -246,6 +246,6 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
             sizes[signal * count + g] = largest
             change = largest_change(n, seen, signal, every, step, xs[g], state)
             sizes[(SEEN + signal) * count + g] = change / (step * q[layout.PERIOD])
-        for k in range(2):
-            at, beside = (CURRENT_COMMAND + k) * count + g, (BESIDE_CURRENT + k) * count + g
+        for j in range(2):
+            at, beside = (CURRENT_COMMAND + j) * count + g, (BESIDE_CURRENT + j) * count + g
             sizes[at] = max(sizes[at], sizes[beside])
