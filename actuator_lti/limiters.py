@@ -165,7 +165,8 @@ def _place(wired: Drive, limiter: Limiter) -> Place | None:
         return None
     stage = stages[signal]
     every = 1 if limiter.kind == "rms" else wired.interval.get(stage, 1)
-    first = "torque_command" if stage == "velocity" and wired.filters("torque") else (wired.target or {}).get(stage)
+    filtered = stage == "velocity" and bool(wired.filters("torque"))
+    first = "torque_command" if filtered else (wired.target or {}).get(stage)
     clamped = limiter.kind == "value" and signal == first and _integral_clamped(wired.design, stage)
     signals = (signal, f"{stage}_integral") if clamped else (signal,)
     return Place(limiter, signals, every, limit, acting.unit(wired.design.axis))
