@@ -16,6 +16,7 @@ from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
     from actuator_lti.drive.wiring import Drive
     from actuator_lti.loops.result import Loops
 
@@ -49,7 +50,10 @@ class LimiterPath:
     averaged_s: float | None = None
 
     def responses(self, omega_rad_s: Any) -> np.ndarray:
-        """T_k(jw), shape (M, len(omega)): a row for each update within a position period."""
+        """T_k(jw), shape (M, len(omega)): a row for each update within a position period.
+
+        Where the limit clamps an integral as well (anti-windup ``"clamped"``), its rows follow.
+        """
         omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
         if np.any(omega <= 0) or np.any(omega > self.nyquist_rad_s * (1 + 1e-12)):
             raise InputError(f"omega_rad_s: positive and at most {self.nyquist_rad_s:g} rad/s (Nyquist)")
@@ -131,10 +135,10 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
 
 @dataclass(frozen=True)
 class Place:
-    """Where a limiter acts: the signal in front of it, the ticks between its updates, the limit."""
+    """Where a limiter acts: the signals it clamps, the ticks between its updates, the limit."""
 
     limiter: Limiter
-    signal: str
+    signals: tuple[str, ...]
     every: int
     limit: float
     unit: str
@@ -159,16 +163,31 @@ def _place(wired: Drive, limiter: Limiter) -> Place | None:
     limit = acting.limit_of(limits)
     if not (limiter.always or np.any(np.isfinite(limit))):
         return None
-    every = 1 if limiter.kind == "rms" else wired.interval.get(stages[signal], 1)
-    return Place(limiter, signal, every, limit, acting.unit(wired.design.axis))
+    stage = stages[signal]
+    every = 1 if limiter.kind == "rms" else wired.interval.get(stage, 1)
+    filtered = stage == "velocity" and bool(wired.filters("torque"))
+    first = "torque_command" if filtered else (wired.target or {}).get(stage)
+    clamped = limiter.kind == "value" and signal == first and _integral_clamped(wired.design, stage)
+    signals = (signal, f"{stage}_integral") if clamped else (signal,)
+    return Place(limiter, signals, every, limit, acting.unit(wired.design.axis))
+
+
+def _integral_clamped(design: Design, stage: str) -> bool:
+    """Whether the limit of a stage clamps its integral as well: it may be reached before the output is.
+
+    A controller's output is the larger of both, as the integral lags its error by less than 90 degrees in
+    samples, unless a feed-forward adds to it.
+    """
+    law = {"velocity": design.controller.velocity, "current": design.controller.current}.get(stage)
+    return law is not None and law.integral_time_s is not None and law.anti_windup == "clamped"
 
 
 def limiter_paths(
     wired: Drive,
-    evaluate: Callable[[str, int, bool], Callable[[np.ndarray], np.ndarray]],
+    evaluate: Callable[[tuple[str, ...], int, bool], Callable[[np.ndarray], np.ndarray]],
     nyquist_rad_s: float,
 ) -> dict[str, LimiterPath]:
-    """All limiter paths; ``evaluate(signal, every, rate)`` gives the function of frequency."""
+    """All limiter paths; ``evaluate(signals, every, rate)`` gives the function of frequency."""
     time = wired.design.limits.overload_time_s
     return {
         place.limiter.name: LimiterPath(
@@ -176,7 +195,7 @@ def limiter_paths(
             place.limit,
             place.unit,
             nyquist_rad_s,
-            evaluate(place.signal, place.every, place.limiter.kind == "rate"),
+            evaluate(place.signals, place.every, place.limiter.kind == "rate"),
             time if place.limiter.kind == "rms" else None,
         )
         for place in limiter_places(wired)

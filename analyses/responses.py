@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
 _ENTRIES = 1 << 15
+LARGE = 60  # states
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,14 @@ def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
 def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
     """Evaluate a state space at all points in one call: C (z - A)^-1 B + D; None at a pole or without states.
 
-    python-control solves point by point, which takes most of the time of a report's figures.
+    python-control solves point by point, which takes most of the time of a report's figures.  A large system
+    (a break point over a whole position period) is made triangular first.
     """
     a, b, c, d = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
     if not a.size or b.shape[1] != 1 or c.shape[0] != 1:
         return None
+    if len(a) > LARGE and points.size > len(a) // 10:
+        return _triangular(a, b, c, d, points)
     result = np.empty(len(points), dtype=complex)
     some = max(_ENTRIES // a.size, 1)  # as many points at once as the cache holds
     matrix = np.empty((min(some, len(points)), *a.shape), dtype=complex)
@@ -113,6 +117,18 @@ def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
             return None
         result[start : start + some] = (c @ states)[:, 0, 0] + d[0, 0]
     return result
+
+
+def _triangular(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """C (z - A)^-1 B + D by Schur's form: substitution from the last state up, all points at once."""
+    from scipy.linalg import schur
+
+    upper, turned = schur(a, output="complex")
+    right, left = (turned.conj().T @ b)[:, 0], (c @ turned)[0]
+    states = np.empty((len(a), points.size), dtype=complex)
+    for k in reversed(range(len(a))):
+        states[k] = (right[k] + upper[k, k + 1 :] @ states[k + 1 :]) / (points - upper[k, k])
+    return np.asarray(left @ states + d[0, 0])
 
 
 def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:

@@ -25,12 +25,12 @@ def sampled_limiters(wired: Drive) -> dict[str, LimiterPath]:
     n, period = len(program.states), program.ticks * wired.tick_s
     A, B = compose(ticks)
 
-    def evaluate(signal: str, every: int, rate: bool) -> Response:
+    def evaluate(signals: tuple[str, ...], every: int, rate: bool) -> Response:
         rows = []
         for j in range(0, program.ticks, every):
             before = compose(ticks[:j]) if j else (np.eye(n), np.zeros_like(B))
-            row = ticks[j].signals[signal]
-            rows.append(np.concatenate([row[:n] @ before[0], [row[:n] @ before[1][:, 0] + row[n]]]))
+            seen = [ticks[j].signals[signal] for signal in signals]
+            rows += [np.append(row[:n] @ before[0], row[:n] @ before[1][:, 0] + row[n]) for row in seen]
         table = np.array(rows)
 
         def response(omega: np.ndarray) -> np.ndarray:
@@ -59,13 +59,13 @@ def continuous_limiters(wired: Drive, delays: frozenset[str]) -> dict[str, Limit
 
     flow = FlowProgram(wired, wired.outermost, None, (), delays).flow()
 
-    def evaluate(signal: str, every: int, rate: bool) -> Response:
-        parts = systems(flow, "ref", signal)
+    def evaluate(signals: tuple[str, ...], every: int, rate: bool) -> Response:
+        terms = [systems(flow, "ref", signal) for signal in signals]
 
         def response(omega: np.ndarray) -> np.ndarray:
             s = 1j * omega
-            values = sum((s**j * part(s) for j, part in enumerate(parts)), 0 * s)
-            return np.atleast_2d(s * values if rate else values)
+            values = [sum((s**j * part(s) for j, part in enumerate(parts)), 0 * s) for parts in terms]
+            return np.array(values) * s if rate else np.array(values)
 
         return response
 

@@ -5,8 +5,8 @@ What time is, the algebra says that a walk runs in: `actuator_lti.loops.tick` (s
 
 Signals that it leaves behind (motor side, before a cut): the plant's ``i``, ``w``, ``th``, ``W``, ``phi``,
 ``T_s`` and ``output_angle``; ``output``, the angle fed back; ``w_cmd`` and ``torque_command`` in front of
-their limiters; ``w_meas``; the errors ``e_*``; the break points ``u``, ``i_ref``, ``w_ref``. The friction
-feed-forward has a step in it and no linear part.
+their limiters; ``velocity_integral`` and ``current_integral``; ``w_meas``; the errors ``e_*``; the break
+points ``u``, ``i_ref``, ``w_ref``. The friction feed-forward has a step in it and no linear part.
 """
 
 from __future__ import annotations
@@ -198,7 +198,9 @@ class Walk(ABC):
     def velocity(self, reference: Row) -> Row:
         """PI on the speed, the feed-forward of acceleration, and the torque filters."""
         error = reference - self.measured_speed() if self.program.measures_speed else reference
-        value = self.apply("velocity", self.drive.law("velocity"), self.at_cut(ERRORS["velocity"], error))
+        error = self.at_cut(ERRORS["velocity"], error)
+        value = self.apply("velocity", self.drive.law("velocity"), error)
+        self.signals["velocity_integral"] = value - self.control.velocity.gain * error
         if "position" in self.program.stages and present(self.control.position_loop.acceleration_feedforward):
             every = self.drive.interval
             made = self.extra if self.updates(every["position"]) else None
@@ -215,7 +217,9 @@ class Walk(ABC):
         assert motor.back_emf_constant_Vs_rad is not None
         assert motor.resistance_ohm is not None
         error = reference if "current" in self.program.opened else reference - self.signals["i"]
-        value = self.apply("current", self.drive.law("current"), self.at_cut(ERRORS["current"], error))
+        error = self.at_cut(ERRORS["current"], error)
+        value = self.apply("current", self.drive.law("current"), error)
+        self.signals["current_integral"] = value - law.gain_V_A * error
         if self.program.feeds_back_emf:
             gain = law.back_emf_feedforward * motor.back_emf_constant_Vs_rad
             value = value + gain * self.speed_for_voltage()

@@ -11,6 +11,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops
+from analyses.large_signal.border import slow_protection
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, waveforms
 from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
@@ -47,7 +48,8 @@ class AmplitudeMap:
     linear : ndarray of complex, shape (f,)
         The same from the linear sampled loop, sliding.
     onset_rad : mapping of str to ndarray, shape (f,)
-        A_k(w) of each limiter from the linear loop, no load.
+        A_k(w) of each limiter from the linear loop, no load; without protection that is slow against the
+        tones, which acts later than they are simulated (`analyses.large_signal.border.slow_protection`).
     ticks : int
         Simulated in all.
     """
@@ -154,7 +156,7 @@ def amplitude_map(
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
     levels = amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
-    border = onset(loops, omega)
+    border, slow = onset(loops, omega), slow_protection(design, loops)
     which = np.tile(np.arange(len(omega)), len(levels))
     amplitude = np.repeat(levels, len(omega))
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
@@ -175,6 +177,6 @@ def amplitude_map(
         unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
         response=(result.phasor("output_angle_rad") / amplitude).reshape(shape),
         linear=start.output,
-        onset_rad=border.each_rad,
+        onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
         ticks=int(result.column("ticks").sum()),
     )

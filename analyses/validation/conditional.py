@@ -303,6 +303,9 @@ def _bisected(design: Design, settle_ticks: int) -> tuple[float | None, float | 
 def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:
     """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
 
+    An error larger than the step itself does not count as falling: an irregular swing against a limit has a
+    smaller window now and then.
+
     A controller without an integral comes to rest beside its target where the load has a slope; a drive that
     stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
     is kept going by something else (`lasting_rad`).
@@ -318,7 +321,8 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
     limited = _limited(result)
     held = rests & (limited > HELD)
     alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
-    return result.ok & ~held & (near | rests | alone | (errors[0] < LASTING * errors[1]))
+    falls = (errors[0] < LASTING * errors[1]) & (errors[0] < sizes_rad)
+    return result.ok & ~held & (near | rests | alone | falls)
 
 
 def _limited(result: BatchResult) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.rig import Rig, small_rig
+from nonlinear import Trajectory
 
 Floats = npt.NDArray[np.float64]
 SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
@@ -39,17 +40,24 @@ class StepMeasured:
     size: float = 0.0
 
 
-def step_response(setup: Rig, settle_ticks: int, size: float | None = None) -> StepMeasured:
+Course = tuple[Floats, Floats]  # in front of the instrument, and of the output
+
+
+def step_response(
+    setup: Rig, settle_ticks: int, size: float | None = None, steady: Course | None = None
+) -> StepMeasured:
     """Step added at the rig's point: what comes back is the step response of T.
 
-    ``size`` is what to begin with, by default a small part of the way to the nearest limit.
+    ``size`` is what to begin with, by default a small part of the way to the nearest limit; ``steady`` what
+    `without_step` gives for as many ticks.
     """
     signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
     room = setup.room[signal]
     if size is None:
         size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
+    steady = without_step(setup, settle_ticks) if steady is None else steady
     for _ in range(3):
-        time_s, response, reason, turned = _step(setup, size, settle_ticks)
+        time_s, response, reason, turned = _step(setup, size, settle_ticks, steady)
         bent = setup.design.load.gravity is not None and turned > SMALL_ANGLE_RAD
         if not reason and not bent:
             break
@@ -57,32 +65,38 @@ def step_response(setup: Rig, settle_ticks: int, size: float | None = None) -> S
     figures = step_figures_of(time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
         small = small_rig(setup.design, setup.loop, held=setup.held)
-        time_s, response, reason, _ = _step(small, size, settle_ticks)
+        time_s, response, reason, _ = _step(small, size, settle_ticks, without_step(small, settle_ticks))
         figures = step_figures_of(time_s, response, reason)
     return replace(figures, size=size)
 
 
-def _step(setup: Rig, size: float, settle_ticks: int) -> tuple[Floats, Floats, str, float]:
-    """Run the drive with a step and without; times and difference at the updates of the point.
+def without_step(setup: Rig, settle_ticks: int) -> Course:
+    """The drive as it starts: what that leaves to settle is no part of an answer."""
+    run = _run(setup, 0.0, settle_ticks)
+    return run.probes[setup.point].before, run.output_angle_rad
 
-    What the start leaves to settle is in both.  Then what limited it, and the largest difference of the
-    output angle.
+
+def _run(setup: Rig, size: float, settle_ticks: int) -> Trajectory:
+    """The drive with a step, recorded at the updates of the point."""
+    row, n = setup.row(), setup.hold_ticks
+    row["ticks"], row["record_every"] = settle_ticks + 4 * n, n
+    row.step(setup.point, size)
+    return row.trajectory()
+
+
+def _step(setup: Rig, size: float, settle_ticks: int, steady: Course) -> tuple[Floats, Floats, str, float]:
+    """Times, and the difference that a step makes, at the updates of the point.
+
+    Then what limited it, and the largest difference of the output angle.
     """
-    n, runs = setup.hold_ticks, []
-    for height in (0.0, size):
-        row = setup.row()
-        row["ticks"], row["record_every"] = settle_ticks + 4 * n, n
-        row.step(setup.point, height)
-        runs.append(row.trajectory())
-    steady, run = runs
+    run = _run(setup, size, settle_ticks)
     reason = next((f"{name} limit" for name, use in run.limits.items() if use.active), "")
     if run.status != "ok":
         reason = run.status
     elif not reason and run.events and setup.bias.delicate:
         reason = "speed reversal"
-    before, without = (one.probes[setup.point].before for one in (run, steady))
-    turned = float(np.abs(run.output_angle_rad - steady.output_angle_rad).max())
-    return run.time_s, (without - before) / size, reason, turned
+    turned = float(np.abs(run.output_angle_rad - steady[1]).max())
+    return run.time_s, (steady[0] - run.probes[setup.point].before) / size, reason, turned
 
 
 def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:

@@ -20,13 +20,14 @@ import numpy.typing as npt
 from analyses.validation.coherent import coherent
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig
-from analyses.validation.step import StepMeasured, step_response
+from analyses.validation.step import StepMeasured, step_response, without_step
 from analyses.validation.sweep import LONGEST_SETTLE_TICKS
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
 TIME_CONSTANTS = 20.0  # of the slowest mode that the run holds: 2e-9 of it is left
-LONGEST_ROWS, LONGEST_TICKS = 1_500_000, 6_000_000
+LEAST_CONSTANTS = 14.0  # of a run that would be too long else; its own error says what that leaves
+LONGEST_ROWS, LONGEST_TICKS = 4_000_000, 8_000_000
 SINE_TICKS = 8_000_000  # a sweep of so many is not too slow
 BLOCK = 2048  # samples in one sum
 BESIDE = 2  # points on either side whose error counts as well
@@ -98,8 +99,9 @@ def fourier_sum(response: Floats, frequency_hz: Floats, period_s: float) -> Comp
 
 def long_enough(slowest_ticks: float, hold_ticks: int) -> int | None:
     """Ticks of a step that ends settled; ``None`` where they are too many."""
-    ticks = int(TIME_CONSTANTS * slowest_ticks) + 40 * hold_ticks
-    return ticks if ticks <= min(LONGEST_ROWS * hold_ticks, LONGEST_TICKS) else None
+    longest = min(LONGEST_ROWS * hold_ticks, LONGEST_TICKS)
+    least, ticks = (int(n * slowest_ticks) + 40 * hold_ticks for n in (LEAST_CONSTANTS, TIME_CONSTANTS))
+    return min(ticks, longest) if least <= longest else None
 
 
 def transient_of(setup: Rig, slowest_ticks: float) -> Transient | None:
@@ -107,8 +109,9 @@ def transient_of(setup: Rig, slowest_ticks: float) -> Transient | None:
     ticks = long_enough(slowest_ticks, setup.hold_ticks)
     if ticks is None:
         return None
-    step = step_response(setup, ticks)
-    again = step_response(setup, ticks, 0.5 * step.size) if not step.reason else step
+    steady = without_step(setup, ticks)
+    step = step_response(setup, ticks, steady=steady)
+    again = step_response(setup, ticks, 0.5 * step.size, steady) if not step.reason else step
     return Transient(setup, step, replace(again, time_s=step.time_s))
 
 

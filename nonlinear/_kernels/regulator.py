@@ -35,17 +35,21 @@ def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
 def regulator(e, integral, gain, step, extra, limit, law, tracking):  # type: ignore[no-untyped-def]
     """PI with a feed-forward ``extra`` and any anti-windup law; the same three numbers as `pi`.
 
+    The limit acts where it clamps the output, and by law 1 where it clamps the integral.
+
     ``law`` 0: as there, with v = Kp e + I' + extra.  1: I' = clamp(I + Kp T/Tn e).  2, back-calculation:
     I' = I + Kp T/Tn e + (T/Tt)(out - v), ``tracking`` being T/Tt.
     """
     updated = integral + step * e
-    kind = int(law)
+    kind, held = int(law), 0.0
     if kind == CLAMPED:
-        updated = clamp(updated, limit)
+        within = clamp(updated, limit)
+        held = 0.0 if within == updated else 1.0
+        updated = within
     v = gain * e + updated + extra
     out = clamp(v, limit)
     if out == v:
-        return out, updated, 0.0
+        return out, updated, held
     if kind == CLAMPED:
         return out, updated, 1.0
     if kind == BACK_CALCULATION:

@@ -11,6 +11,7 @@ import math
 
 from actuator_lti.batch._complex import over
 from nonlinear._kernels import layout
+from nonlinear._kernels.regulator import CLAMPED
 from nonlinear._kernels.tick import tick
 from nonlinear.export.entries import derive, emitted, prepare_sizes
 from nonlinear.export.linear import (
@@ -30,9 +31,10 @@ from nonlinear.export.linear import (
 from nonlinear.export.linear_row import at_rest, linear_row
 
 MOST_TICKS = 16  # between two commands
-SPEED, CURRENT_COMMAND, VOLTAGE = range(3)  # signals in front of limiters
+# signals in front of limiters, and the integral that the limit of one clamps as well (0: none)
+SPEED, CURRENT_COMMAND, VOLTAGE, BESIDE_CURRENT, BESIDE_VOLTAGE = range(5)
 SIGNALS = ("w_ref", "i_ref", "u")
-SEEN = 3
+SEEN = 5
 
 
 @emitted
@@ -47,6 +49,12 @@ def noted_column(q, s, io, stage, every, size, places, count, angles, column, se
         seen[at + SPEED * (MOST + 1) + j] = s[layout.S_SPEED_COMMAND]
         seen[at + CURRENT_COMMAND * (MOST + 1) + j] = s[layout.S_CURRENT_BEFORE]
         seen[at + VOLTAGE * (MOST + 1) + j] = s[layout.S_VOLTAGE_BEFORE]
+        seen[at + BESIDE_CURRENT * (MOST + 1) + j] = seen[at + BESIDE_VOLTAGE * (MOST + 1) + j] = 0.0
+        if int(q[layout.VELOCITY_WINDUP]) == CLAMPED:
+            beside = BESIDE_CURRENT if q[layout.HAS_CURRENT] > 0.0 else BESIDE_VOLTAGE
+            seen[at + beside * (MOST + 1) + j] = s[layout.S_VELOCITY_INTEGRATOR]
+        if q[layout.HAS_CURRENT] > 0.0 and int(q[layout.CURRENT_WINDUP]) == CLAMPED:
+            seen[at + BESIDE_VOLTAGE * (MOST + 1) + j] = s[layout.S_CURRENT_INTEGRATOR]
     base = s[layout.S_ANGLE]
     for i in range(count):
         column[i] = s[int(places[i])]
@@ -182,9 +190,9 @@ def states_at(n, a, b, x, work, state):
 @emitted
 def signal_interval(q, signal, every):
     """Ticks between two updates of a signal in front of a limiter."""
-    if signal == VOLTAGE:
+    if signal == VOLTAGE or signal == BESIDE_VOLTAGE:
         return 1
-    if signal == CURRENT_COMMAND and q[layout.HAS_VELOCITY] > 0.0:
+    if (signal == CURRENT_COMMAND or signal == BESIDE_CURRENT) and q[layout.HAS_VELOCITY] > 0.0:
         return int(q[layout.EVERY_VELOCITY])
     return every
 
@@ -223,7 +231,8 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
     """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
 
     At each angle per interval of the command; ``sizes`` holds a row of ``count`` numbers for each signal,
-    then one for the rate of each, its change from update to update per second.
+    then one for the rate of each, its change from update to update per second.  What a limit clamps beside
+    its signal, an integral, counts as that signal.
     """
     for g in range(count):
         states_at(n, a, b, xs[g], work, state)
@@ -237,3 +246,6 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
             sizes[signal * count + g] = largest
             change = largest_change(n, seen, signal, every, step, xs[g], state)
             sizes[(SEEN + signal) * count + g] = change / (step * q[layout.PERIOD])
+        for j in range(2):
+            at, beside = (CURRENT_COMMAND + j) * count + g, (BESIDE_CURRENT + j) * count + g
+            sizes[at] = max(sizes[at], sizes[beside])

@@ -75,7 +75,8 @@ def _injection(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
         "correlated "
         "over whole periods, once two windows agree. One run gives open loop, closed loop and plant. The "
         "limits "
-        "of the drive are active; the amplitudes stay below them."
+        "of the drive are active; the amplitudes stay below them. A loop that is slow against its tick is "
+        "measured by one long step there instead, of which the Fourier sum is taken."
     )
     good = all(agrees(loop) for loop in shown.values())
     worst = [worst_below_third(loop) for loop in shown.values()]

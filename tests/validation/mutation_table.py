@@ -3,7 +3,9 @@
 
 Run as a script it prints a line a change::
 
-    python -m tests.validation.mutation_table
+    python -m tests.validation.mutation_table              # ilr33-amber
+    python -m tests.validation.mutation_table fin          # another shipped design
+    python -m tests.validation.mutation_table 3037         # a random drive
 """
 
 from __future__ import annotations
@@ -11,11 +13,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from math import isfinite
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design, Limits
 from analyses.large_signal.border import check_border
 from analyses.validation import validate
+from tests.validation.random_drives import full_drive
 from tests.validation.small_settings import SMALL
 
 SIZES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1e-2)
@@ -25,7 +29,9 @@ Change = Callable[[Design, float], Design]
 
 def motor(name: str) -> Change:
     """One constant of the motor times 1 + x."""
-    return lambda d, x: replace(d, motor=replace(d.motor, **{name: getattr(d.motor, name) * (1.0 + x)}))
+    return lambda d, x: replace(
+        d, motor=replace(d.motor, **{name: (getattr(d.motor, name) or 0.0) * (1.0 + x) or None})
+    )
 
 
 def friction(name: str) -> Change:
@@ -40,6 +46,8 @@ def loop(stage: str, name: str) -> Change:
 
     def change(d: Design, x: float) -> Design:
         one = getattr(d.controller, stage)
+        if one is None or getattr(one, name) is None:
+            return d
         one = replace(one, **{name: getattr(one, name) * (1.0 + x)})
         return replace(d, controller=replace(d.controller, **{stage: one}))
 
@@ -72,6 +80,23 @@ def command_filter(d: Design, x: float) -> Design:
     return replace(d, command=replace(d.command, filter_time_s=max(1e-2 * x, 0.4 * d.controller.period_s)))
 
 
+def back_emf_sign(d: Design, _: float) -> Design:
+    """The motor drives itself on instead of braking: a sign has no size."""
+    turned = -(d.motor.back_emf_constant_Vs_rad or 0.0)
+    return replace(d, motor=replace(d.motor, back_emf_constant_Vs_rad=turned))
+
+
+def coupling(name: str) -> Change:
+    """One number of the coupling times 1 + x."""
+
+    def change(d: Design, x: float) -> Design:
+        if d.coupling is None:
+            return d
+        return replace(d, coupling=replace(d.coupling, **{name: getattr(d.coupling, name) * (1.0 + x)}))
+
+    return change
+
+
 CHANGES: dict[str, Change] = {
     "inductance (pole of the current loop)": motor("inductance_H"),
     "resistance": motor("resistance_ohm"),
@@ -85,6 +110,9 @@ CHANGES: dict[str, Change] = {
     "velocity integral time": loop("velocity", "integral_time_s"),
     "position gain": loop("position", "gain"),
     "computing delay (of a tick)": delay,
+    "sign of the back-EMF": back_emf_sign,
+    "stiffness of the coupling": coupling("stiffness_Nm_rad"),
+    "damping of the coupling": coupling("damping_Nms_rad"),
     "viscous friction": friction("viscous_Nms_rad"),
     "dry friction": friction("dry_torque_Nm"),
     "breakaway ratio": friction("breakaway_ratio"),
@@ -94,10 +122,13 @@ CHANGES: dict[str, Change] = {
 LIMITS = {"speed_rad_s": 60.0, "peak_current_A": 1.0, "voltage_V": 3.0, "acceleration_rad_s2": 2e3}
 
 
-def main() -> None:
+def main(which: str = "ilr33-amber") -> None:
     """Print the table."""
-    design = load_design("ilr33-amber")
+    design = full_drive(int(which)) if which.isdigit() else load_design(which)
     for name, change in CHANGES.items():
+        if change(design, 1e-2) == design:
+            print(f"{name} | the drive has none | |", flush=True)
+            continue
         for size in SIZES:
             found = validate(design, SMALL, model=change(design, size))
             if found.failed:
@@ -108,7 +139,10 @@ def main() -> None:
         else:
             print(f"{name} | not seen up to {SIZES[-1]:g} | 0 |", flush=True)
     wide = Limits(voltage_V=1e3, speed_rad_s=1e5, acceleration_rad_s2=1e9, peak_current_A=1e3)
-    for limit, value in LIMITS.items():
+    own = {name: getattr(design.limits, name) for name in LIMITS}
+    for limit, value in (LIMITS if which == "ilr33-amber" else own).items():
+        if not isfinite(value):
+            continue
         alone = replace(design, limits=replace(wide, **{limit: value}))
         for size in LIMIT_SIZES:
             wrong = replace(design, limits=replace(wide, **{limit: value * (1.0 + size)}))
@@ -119,4 +153,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main(*sys.argv[1:2])

@@ -43,14 +43,18 @@ def look(design: Design) -> tuple[Conditional, int]:
 
 @pytest.mark.parametrize(
     ("seed", "ending", "limiter"),
-    [(91, "keeps oscillating", "current"), (333, "diverges", "torque-command")],
+    [
+        (91, "keeps oscillating", "current"),
+        (333, "diverges", "torque-command"),
+        (3108, "keeps oscillating", "voltage"),  # 45 times as large a step was named: an irregular swing
+    ],
 )
 def test_a_finding_on_a_random_drive_is_that_of_plain_integration(
     seed: int, ending: str, limiter: str
 ) -> None:
     """2 % below the threshold the error dies out, 2 % above it grows beyond the step itself."""
     design = full_drive(seed)
-    design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+    design = replace(design, encoder=replace(design.encoder, counts_per_rev=None), supply=None)
     found, settle = look(design)
     assert (found.ending, found.limiter) == (ending, limiter)
     assert found.limiter_share > 0.9

@@ -100,6 +100,7 @@ def test_a_wrong_slow_loop_is_seen() -> None:
 def test_a_step_that_would_take_too_long_is_not_run() -> None:
     assert long_enough(1e6, 1) is None
     assert long_enough(1e4, 1) == 200_040
+    assert long_enough(2.5e5, 1) == 4_000_000  # 16 time constants
 
 
 def test_a_swinging_transient_does_not_spoil_the_response_to_the_command() -> None:

@@ -1,0 +1,136 @@
+"""The limit that clamps an integral: where it acts first, by the z-transform of the drive written out here.
+
+An inertia J on an ideal torque source (gain k): with b = T k/J and every stage in every tick
+
+    W (z - 1) = b U,    TH (z - 1) = T W + T b U/2,    E = Kv (R - TH) - W,
+    I' = (Kp T/Tn) z/(z - 1) E,    U = Kp E + I' + F R,    F = k_aff (J/k) (1 - 1/z)^2/T^2.
+
+An acceleration feed-forward of three times the inertia makes the integral carry twice what the motor needs.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops
+from actuator_lti.design.model import (
+    Controller,
+    Design,
+    Friction,
+    Limits,
+    Load,
+    Motor,
+    PositionLoop,
+    Validation,
+    VelocityLoop,
+)
+from analyses.large_signal.border import check_border
+from analyses.large_signal.map import amplitude_map
+from nonlinear import Rows, commands, simulate
+
+T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
+
+
+def drive(law: str, feedforward: float = 3.0) -> Design:
+    """The drive of the docstring."""
+    velocity = VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)  # type: ignore[arg-type]
+    return Design(
+        name="clamped",
+        title="Clamped integral",
+        motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
+        load=Load(path="back-drivable"),
+        controller=Controller(
+            period_s=T,
+            computing_delay_s=0.0,
+            position=PositionLoop(gain=Kv, acceleration_feedforward=feedforward),
+            velocity=velocity,
+            current=None,
+        ),
+        limits=Limits(voltage_V=LIMIT),
+        friction=Friction(),
+        validation=Validation(full_deflection_rad=1.0),
+    )
+
+
+def sizes(hertz: Any, feedforward: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
+    """|U/R| and |I'/R| on the unit circle."""
+    z = np.exp(2j * np.pi * np.asarray(hertz) * T)
+    b = T * k / J
+    per_u = Kv * T * b * (z + 1.0) / (2.0 * (z - 1.0) ** 2) + b / (z - 1.0)
+    integral = Kp * T / Tn * z / (z - 1.0)
+    F = feedforward * J / k * (1.0 - 1.0 / z) ** 2 / T**2
+    u = ((Kp + integral) * Kv + F) / (1.0 + (Kp + integral) * per_u)
+    return np.abs(u), np.abs(integral * (Kv - per_u * u))
+
+
+def test_the_linear_border_knows_the_clamp() -> None:
+    hertz = np.geomspace(0.1, 100.0, 25)
+    output, integral = sizes(hertz)
+    omega = 2.0 * np.pi * hertz
+    for law, largest in (("clamped", np.maximum(output, integral)), ("conditional", output)):
+        found = assemble_loops(drive(law)).limiters["voltage"].onset_amplitude_rad(omega)
+        np.testing.assert_allclose(found, LIMIT / largest, rtol=1e-7)
+    assert (integral > 1.2 * output).any()
+    assert (integral < 0.8 * output).any()
+
+
+def test_the_border_check_judges_the_clamp() -> None:
+    for law in ("clamped", "conditional"):
+        design = drive(law)
+        border = check_border(design, assemble_loops(design), count=6)
+        assert border is not None
+        assert border.passed is True
+        assert border.left_out == ""
+        output, integral = sizes(border.frequency_hz)
+        largest = np.maximum(output, integral) if law == "clamped" else output
+        np.testing.assert_allclose(border.simulated_rad, LIMIT / largest, rtol=2e-3)
+
+
+def test_a_border_without_the_clamp_is_caught() -> None:
+    """Judged by the loops of the other law, which has no clamp of its integral."""
+    border = check_border(drive("clamped"), assemble_loops(drive("conditional")), count=6)
+    assert border is not None
+    assert border.passed is False
+
+
+def test_the_map_draws_the_border_that_is_judged() -> None:
+    design = drive("clamped")
+    loops = assemble_loops(design)
+    shown = amplitude_map(design, loops, counts=(12, 6))
+    output, integral = sizes(shown.frequency_hz)
+    lowest = LIMIT / np.maximum(output, integral)
+    np.testing.assert_allclose(shown.onset_rad["voltage"], lowest, rtol=1e-7)
+    acting = shown.limiter_fraction.max(axis=2) > 0.0
+    x = shown.amplitude_rad[:, None] / lowest[None, :]
+    assert not acting[x < 0.98].any()
+    assert acting[x > 1.02].all()
+
+
+@pytest.mark.parametrize("law", ["clamped", "conditional"])
+def test_a_run_says_that_the_integral_is_clamped(law: str) -> None:
+    """Between both borders nothing limits the output; the clamp alone acts, and is told of."""
+    hertz = 2.0
+    output, integral = (float(x) for x in sizes(hertz))
+    assert integral > 1.2 * output
+    amplitude = 0.5 * (LIMIT / output + LIMIT / integral)
+    design = drive(law)
+    run = simulate(design, commands.sine(amplitude, hertz), 3.0, limits_on=True)
+    late = run.limit_active("voltage")[run.time_s > 2.0]
+    assert bool(late.any()) == (law == "clamped")
+    assert np.abs(run.voltage_V[run.time_s > 2.0]).max() < LIMIT
+    assert Rows.of(design)["velocity_windup"][0] == (1.0 if law == "clamped" else 0.0)
+
+
+def test_without_feed_forward_the_output_is_first() -> None:
+    """The integral lags the error by less than 90 degrees in samples: what adds to it is larger."""
+    hertz = np.geomspace(0.1, 900.0, 40)
+    output, integral = sizes(hertz, feedforward=0.0)
+    assert (integral < output).all()
+    found = [
+        assemble_loops(drive(law, 0.0)).limiters["voltage"].onset_amplitude_rad(2.0 * np.pi * hertz)
+        for law in ("clamped", "conditional")
+    ]
+    np.testing.assert_allclose(*found, rtol=1e-10)
