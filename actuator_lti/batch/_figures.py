@@ -16,9 +16,9 @@ from ._response import (
     RESONANCE,
     SENSITIVITY,
     closed_loop,
-    evaluate,
     quantity,
     quantity_at,
+    response_at,
     root,
 )
 
@@ -88,9 +88,9 @@ def _hidden(mode, k, f1, f2, xs, rs, ss):
 
 @kernel
 def _value(mode, x, n, h, b, c, work, state, exchanged):
-    """The quantity of a mode at an angle."""
-    rr, ri, sr, si = evaluate(n, h, b, c, x, work, state, exchanged)
-    return quantity(mode, rr, ri, sr, si, 1.0, 0.0, 0.0)
+    """Gain or phase at an angle."""
+    rr, ri = response_at(n, h, b, c, x, work, state, exchanged)
+    return quantity(mode, rr, ri, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
 @kernel

@@ -127,6 +127,14 @@ def _again(n, c, work, state, exchanged):
 
 
 @kernel
+def response_at(n, h, b, c, x, work, state, exchanged):
+    """L alone at the angle x, with the bits of `evaluate`."""
+    _eliminated(n, h, b, x, work, state, exchanged)
+    response_r, response_i = _substituted(n, c, work, state)
+    return response_r, response_i
+
+
+@kernel
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
     delta_r, delta_i = _eliminated(n, h, b, x, work, state, exchanged)
@@ -197,7 +205,11 @@ def root(mode, level, lead, begin_x, begin_f, end_x, end_f, n, h, b, c, work, st
     x = begin_x
     for _round in range(80):
         x = x1 + t * (x2 - x1)
-        response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
+        slope_r, slope_i = 0.0, 0.0  # asked for by two modes alone
+        if mode == SENSITIVITY or mode == RESONANCE:  # noqa: SIM109  (no tuples in C)
+            response_r, response_i, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
+        else:
+            response_r, response_i = response_at(n, h, b, c, x, work, state, exchanged)
         f = quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead)
         if (f > 0.0 and f1 > 0.0) or (not f > 0.0 and not f1 > 0.0):
             x3, f3 = x1, f1

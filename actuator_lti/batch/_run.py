@@ -24,7 +24,7 @@ from ._figures import (
     resonance,
 )
 from ._linalg import balance, hessenberg
-from ._response import CAPACITY, DEEPEST, GAIN, PHASE, closed_loop, evaluate, scan
+from ._response import CAPACITY, DEEPEST, GAIN, PHASE, closed_loop, response_at, scan
 from ._step import step_figures
 
 TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
@@ -158,7 +158,7 @@ def _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged):
     row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
     dc = row[DC_GAIN]
     open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else math.inf
-    at_r, at_i, _slope_r, _slope_i = evaluate(n, a, b, c, math.pi, work, state, exchanged)
+    at_r, at_i = response_at(n, a, b, c, math.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     ends(open_dc, at_r, count, xs, rs, row)
