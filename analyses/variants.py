@@ -112,6 +112,8 @@ class Comparison:
         Of the base.
     refused : tuple of Variant
         Those that have no design, with the reason.
+    whole : Comparison, optional
+        What this one is a choice of, where its variants are not all.
     """
 
     study: Study
@@ -120,6 +122,12 @@ class Comparison:
     variants: tuple[Compared, ...]
     sensitivities: Sensitivities
     refused: tuple[Variant, ...]
+    whole: Comparison | None = None
+
+    @property
+    def everything(self) -> Comparison:
+        """All designs, also where this is a choice of them."""
+        return self.whole or self
 
     @property
     def all(self) -> tuple[Compared, ...]:
@@ -128,6 +136,13 @@ class Comparison:
 
     def ends(self, name: FigureName) -> tuple[float, float] | None:
         """Best and worst value of a figure over all designs; ``None`` if they hardly differ (0.005 %)."""
+        return self.everything._ends.get(name.key)
+
+    @cached_property
+    def _ends(self) -> dict[str, tuple[float, float]]:
+        return {name.key: ends for name in self.names if (ends := self._ends_of(name)) is not None}
+
+    def _ends_of(self, name: FigureName) -> tuple[float, float] | None:
         values = [v for c in self.all if (v := c.figures.get(name.key)) is not None and isfinite(v)]
         if name.better == 0 or len(values) < 2 or max(values) - min(values) <= _SEEN * max(map(abs, values)):
             return None

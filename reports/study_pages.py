@@ -36,13 +36,19 @@ def study_document(
 
 
 def write_pages(
-    made: Mapping[str, Any], folder: Path, stem: str, *, progress: Progress | None = None
+    made: Mapping[str, Any],
+    folder: Path,
+    stem: str,
+    *,
+    progress: Progress | None = None,
+    beside: Mapping[str, str] | None = None,
 ) -> tuple[Path, Path]:
-    """Write ``<stem>.html`` and ``<stem>.json``."""
+    """Write ``<stem>.html`` and ``<stem>.json``, and the texts that go with them by file name."""
     from reports.html import page
 
     content = doc.dumps(made)
     html = page(doc.loads(content), progress=progress)
     paths = (folder / f"{stem}.html", folder / f"{stem}.json")
-    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
+    more = {folder / name: text.encode() for name, text in (beside or {}).items()}
+    write_together({paths[0]: html.encode(), paths[1]: content.encode(), **more})
     return paths

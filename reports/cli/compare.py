@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from analyses.study import Study
     from analyses.variants import Comparison
 
+_MOST_NAMES = 12
+
 StudyArgument = Annotated[
     str | None, typer.Argument(metavar="STUDY", help="Study file (--example prints one), or a design.")
 ]
@@ -65,6 +67,7 @@ def compare(
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
     from reports.sections.compare import overview, sections
+    from reports.sections.compare_many import TABLE, table_text
     from reports.study_pages import study_document, write_pages
     from reports.terminal import print_blocks, print_verdict
 
@@ -86,7 +89,7 @@ def compare(
         kind="compare",
     )
     with progress("drawing figures", quiet=quiet) as drawing:
-        page, data = write_pages(made, out, "compare", progress=drawing)
+        page, data = write_pages(made, out, "compare", progress=drawing, beside={TABLE: table_text(result)})
     untrue = any(entry.passed is False for one in result.all for entry in one.ledger)
     passed = bool(made["verdict"]["passed"] and not result.refused and not untrue)
     if as_json:
@@ -94,7 +97,7 @@ def compare(
     else:
         print_verdict(passed, _verdict(result, untrue))
         print_blocks([overview(result)])
-        print_line(f"{page}\n{data}")
+        print_line(f"{page}\n{data}\n{out / TABLE}")
     leave_with(passed)
 
 
@@ -102,13 +105,19 @@ def _verdict(comparison: Comparison, untrue: bool) -> str:
     """Which designs meet their requirements, in one sentence."""
     failing = [one.variant.name for one in comparison.all if any(v.passed is False for v in one.verdicts)]
     said = (
-        f"{', '.join(failing)}: a requirement is not met"
+        f"{_listed(failing)}: a requirement is not met"
         if failing
         else "every requirement of every design met"
     )
     refused = [variant.name for variant in comparison.refused]
-    said += f"; no design: {', '.join(refused)}" if refused else ""
+    said += f"; no design: {_listed(refused)}" if refused else ""
     return said + ("; a prediction is not confirmed by the simulator" if untrue else "")
+
+
+def _listed(names: list[str]) -> str:
+    """Names in one sentence, the first few of many."""
+    more = len(names) - _MOST_NAMES
+    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def _print_example() -> None:

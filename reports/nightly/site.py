@@ -8,9 +8,11 @@ before it is put in place, and is removed only when no page of a kept night refe
 
 from __future__ import annotations
 
+import os
 import re
 import secrets
 import shutil
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -26,6 +28,7 @@ from reports.nightly.view import DesignView, Overview, report_folder
 MARKER = ".nightly-site"
 KEPT_NIGHTS = 3
 KEPT_CACHE_DAYS = 30.0
+_FOR_MACHINES = ("summary.json", "junit.xml", "summary.md")
 _NIGHT = re.compile(r"\d{6,}-[0-9a-f]{8}\Z")
 _CONTENT = re.compile(r"[0-9a-f]{16}\Z")
 
@@ -38,7 +41,7 @@ def check_place(site: Path) -> None:
     InputError
         In one line that names the folder.
     """
-    for name in ("", "nights", "reports"):
+    for name in ("", "nights", "reports", "index.html", *_FOR_MACHINES, MARKER):
         if (site / name).is_symlink():
             raise InputError("is a symbolic link: a site is a folder of its own", where=str(site / name))
     if site.exists() and not site.is_dir():
@@ -87,11 +90,8 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
 
 
 def _machine_files(night: Overview) -> Mapping[str, str]:
-    return {
-        "summary.json": machines.summary_text(night),
-        "junit.xml": machines.junit(night),
-        "summary.md": machines.markdown(night),
-    }
+    texts = (machines.summary_text(night), machines.junit(night), machines.markdown(night))
+    return dict(zip(_FOR_MACHINES, texts, strict=True))
 
 
 def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) -> None:
@@ -103,6 +103,9 @@ def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) 
         if part.is_symlink():
             raise InputError("is a symbolic link: a site holds its reports itself", where=str(part))
     wanted: Mapping[str, str] = design.meta.get("files", {})
+    for name in wanted:
+        if os.path.lexists(folder / name) and not stat.S_ISREG((folder / name).lstat().st_mode):
+            raise InputError("is no regular file: a site holds its reports itself", where=str(folder / name))
     missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
     if not missing:
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from reports import document as doc
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import significant
-from reports.sections import compare_best, compare_figures, compare_ledger
+from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
 from reports.sections.compare_best import limit_words, number
 from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label
@@ -26,22 +26,24 @@ _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
 def sections(comparison: Comparison) -> list[Section]:
-    """Make all sections of a comparison."""
+    """Make all sections of a comparison; of very many designs those at the ends are shown."""
+    shown = compare_many.choice(comparison)
+    best = compare_best.section(shown)
     made = [
-        compare_best.section(comparison),
-        verdicts(comparison),
-        figures(comparison),
-        differences(comparison),
+        {**best, "intro": f"{best['intro']} {compare_many.shown_words(shown)}".strip()},
+        verdicts(shown),
+        figures(shown),
+        differences(shown),
     ]
-    made += compare_ledger.sections(comparison)
-    made += compare_figures.sections(comparison)
+    made += compare_ledger.sections(shown)
+    made += compare_figures.sections(shown)
     return made
 
 
 def verdicts(comparison: Comparison) -> Section:
     """Verdicts of every design: a row a requirement, a column a design."""
-    wanted = comparison.base.verdicts
-    blocks: list[Block] = []
+    wanted, everything = comparison.base.verdicts, comparison.everything
+    blocks: list[Block] = compare_many.worst(comparison)
     if wanted:
         note = "In brackets the difference from the base, in the unit of the requirement."
         for k, designs in enumerate(batches(comparison)):
@@ -58,10 +60,12 @@ def verdicts(comparison: Comparison) -> Section:
         for one in comparison.all
         if one.verdicts
     ]
-    for variant in comparison.refused:
+    for variant in comparison.refused[: compare_many.MANY]:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
-    failed = sum(v.passed is False for one in comparison.all for v in one.verdicts)
-    count = sum(len(one.verdicts) for one in comparison.all)
+    if len(comparison.refused) > compare_many.MANY:
+        blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
+    failed = sum(v.passed is False for one in everything.all for v in one.verdicts)
+    count = sum(len(one.verdicts) for one in everything.all)
     result = f"{failed} of {count} verdicts fail." if failed else f"All {count} verdicts pass."
     status: Status = "fail" if failed or comparison.refused else "pass"
     return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
@@ -80,7 +84,8 @@ def design_columns(designs: Sequence[Compared]) -> list[Column]:
 
 
 def overview(comparison: Comparison) -> Block:
-    """One line a design: how many requirements it meets, and which it misses."""
+    """One line a design that the page shows: how many requirements it meets, and which it misses."""
+    comparison = compare_many.choice(comparison)
     columns = [doc.column("design", "Design"), doc.column("met", "Met"), doc.column("missed", "Missed")]
     rows = []
     for one in comparison.all:
@@ -90,7 +95,9 @@ def overview(comparison: Comparison) -> Block:
             "design": one.variant.name, "met": f"{met} of {len(one.verdicts)}", "missed": ", ".join(missed),
             "_status": "fail" if missed else "pass",
         })  # fmt: skip
-    return doc.table("Requirements", columns, rows)
+    left_out = len(comparison.everything.all) - len(rows)
+    note = f"{left_out} more designs are in {compare_many.TABLE}." if left_out else ""
+    return doc.table("Requirements", columns, rows, note)
 
 
 def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:
@@ -122,8 +129,9 @@ def figures(comparison: Comparison) -> Section:
         for k, designs in enumerate(batches(comparison) if names else []):
             heading = title if k == 0 else f"{title}, part {k + 1}"
             blocks.append(_group_table(heading, names, comparison, designs))
-    moved = sum(bool(one.differences) for one in comparison.variants)
-    result = f"{moved} of {len(comparison.variants)} variants change a figure of the base."
+    variants = comparison.everything.variants
+    moved = sum(bool(one.differences) for one in variants)
+    result = f"{moved} of {len(variants)} variants change a figure of the base."
     intro = "In brackets the difference from the base. ▲ best and ▽ worst of all designs."
     return doc.section("figures", "Figures side by side", blocks, result=result, intro=intro)
 
@@ -172,8 +180,9 @@ def differences(comparison: Comparison) -> Section:
         "explain "
         "is their interaction. Large-signal figures are not taken apart."
     )
-    changed = sum(bool(one.changed) for one in comparison.variants)
-    result = f"{changed} of {len(comparison.variants)} variants change a key of the base."
+    variants = comparison.everything.variants
+    changed = sum(bool(one.changed) for one in variants)
+    result = f"{changed} of {len(variants)} variants change a key of the base."
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 

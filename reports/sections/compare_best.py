@@ -25,16 +25,17 @@ def section(comparison: Comparison) -> Section:
     wanted = comparison.base.verdicts
     if not wanted:
         return doc.section("best", "Which variant for what", [], result="The base states no requirement.")
-    blocks = [_designs(comparison), _best(comparison)]
-    met = [one for one in comparison.all if _failed(one) == 0]
-    failed = len(met) < len(comparison.all) or bool(comparison.refused)
+    everything = comparison.everything
+    blocks = [_designs(comparison), _best(everything)]
+    met = [one for one in everything.all if failed(one) == 0]
+    missed = len(met) < len(everything.all) or bool(everything.refused)
     return doc.section(
-        "best", "Which variant for what", blocks, result=_result(comparison, met),
+        "best", "Which variant for what", blocks, result=_result(everything, met),
         intro=(
             "Distance is what is left to the limit, as part of the limit. The smallest one is the weakest "
             "point."
         ),
-        status="fail" if failed else "pass",
+        status="fail" if missed else "pass",
     )  # fmt: skip
 
 
@@ -43,15 +44,16 @@ def _result(comparison: Comparison, met: Sequence[Compared]) -> str:
     count = len(comparison.all)
     if not met:
         return f"None of the {count} designs meets every requirement."
-    best = max(met, key=lambda one: _weakest(one)[0])
-    nearness, verdict = _weakest(best)
+    best = max(met, key=lambda one: weakest(one)[0])
+    nearness, verdict = weakest(best)
     room = "" if verdict is None else f": {100.0 * nearness:.0f} % to its nearest limit ({label(verdict)})"
     return (
         f"{len(met)} of {count} designs meet every requirement; {best.variant.name} has the most room{room}."
     )
 
 
-def _failed(one: Compared) -> int:
+def failed(one: Compared) -> int:
+    """Number of requirements that a design does not meet."""
     return sum(v.passed is False for v in one.verdicts)
 
 
@@ -64,7 +66,8 @@ def nearness(verdict: RequirementVerdict) -> float | None:
     return verdict.distance / min(limits)
 
 
-def _weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
+def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
+    """The smallest distance to a limit as part of it, and whose it is."""
     known = [(near, v) for v in one.verdicts if (near := nearness(v)) is not None]
     return min(known, key=lambda pair: pair[0], default=(math.inf, None))
 
@@ -80,7 +83,7 @@ def _designs(comparison: Comparison) -> Block:
     ]
     rows = []
     for one in comparison.all:
-        near, verdict = _weakest(one)
+        near, verdict = weakest(one)
         gains, losses = _changes(one, comparison)
         rows.append({
             "design": one.variant.name,
@@ -88,7 +91,7 @@ def _designs(comparison: Comparison) -> Block:
             "weakest": "" if verdict is None else f"{label(verdict)}, {_percent(near)}",
             "gains": "the base" if one is comparison.base else _words(gains),
             "gives": "" if one is comparison.base else _words(losses),
-            "_status": "fail" if _failed(one) else "pass",
+            "_status": "fail" if failed(one) else "pass",
         })  # fmt: skip
     note = "Gains and losses are changes of the distance to the limit, in percent of the limit."
     return doc.table("Each design", columns, rows, note)

@@ -37,7 +37,7 @@ def overlays(comparison: Comparison) -> Section:
             continue
         blocks += _bode(name, title, drawn, closed=False) + _bode(name, title, drawn, closed=True)
         blocks += _step(name, title, drawn)
-    left_out = len(comparison.all) - len(drawn)
+    left_out = len(comparison.everything.all) - len(drawn)
     intro = f"{left_out} more designs are in the tables only." if left_out else ""
     result = f"Open loop, closed loop and step of {len(drawn)} designs; the base is black."
     return doc.section(

@@ -31,7 +31,9 @@ def sections(comparison: Comparison) -> list[Section]:
         batches = (tested[k : k + COLUMNS] for k in range(0, len(tested), COLUMNS))
         blocks += [_table(loop, condition, wanted, batch) for batch in batches]
     blocks += [doc.text(f"{one.variant.name}: not tested. {one.untested}") for one in tested if one.untested]
-    judged = [entry.passed for one in tested for entry in one.ledger if entry.passed is not None]
+    judged = [
+        entry.passed for one in comparison.everything.all for entry in one.ledger if entry.passed is not None
+    ]
     failed = judged.count(False)
     result = f"{len(judged) - failed} of {len(judged)} linear predictions agree with the simulation."
     intro = (

@@ -203,6 +203,33 @@ def test_a_report_folder_that_leads_elsewhere_is_refused(tmp_path) -> None:
     assert len(list(elsewhere.rglob("*"))) == count
 
 
+@pytest.mark.parametrize("name", ["index.html", "summary.json", "junit.xml", ".nightly-site"])
+def test_a_file_of_a_site_that_leads_elsewhere_is_refused(name, tmp_path) -> None:
+    site, mine = tmp_path / "site", tmp_path / "mine"
+    mine.write_text("mine")
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (site / name).unlink()
+    (site / name).symlink_to(mine)
+    with pytest.raises(InputError, match=f"{name}: is a symbolic link"):
+        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder", "device"])
+def test_a_report_on_a_site_that_is_no_file_is_refused_without_reading_it(kind, tmp_path) -> None:
+    site, mine = tmp_path / "site", tmp_path / "mine"
+    mine.write_text("mine")
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (report,) = site.glob("reports/*/*/report.html")
+    report.unlink()
+    make = {"pipe": os.mkfifo, "folder": os.mkdir}
+    target = {"link": mine, "device": "/dev/zero"}
+    make[kind](report) if kind in make else report.symlink_to(target[kind])
+    with pytest.raises(InputError, match=r"report\.html: is no regular file"):
+        run_night(study(job("a")), site, INLINE, code=CODE)
+    assert mine.read_text() == "mine"
+
+
 def test_a_site_is_where_one_stands_and_its_state_beside_it(tmp_path, monkeypatch) -> None:
     (tmp_path / "site").mkdir()
     monkeypatch.chdir(tmp_path / "site")

@@ -260,7 +260,12 @@ override = { "control.position.gain" = "90 1/s" }
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert" in page
     made = json.loads((tmp_path / "o" / "compare.json").read_text())
-    assert {p.name for p in (tmp_path / "o").iterdir()} == {"compare.html", "compare.json", "designs"}
+    assert {p.name for p in (tmp_path / "o").iterdir()} == {
+        "compare.html",
+        "compare.json",
+        "compare.csv",
+        "designs",
+    }
     kinds = [b["figure"] for s in made["sections"] for b in s["blocks"] if b["kind"] == "figure"]
     assert kinds.count("overlay") == 9
     assert "tornado" in kinds

@@ -1,0 +1,112 @@
+"""A comparison of more designs than a page can show: the ends on the page, the verdict and a table of all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import random
+from dataclasses import replace
+
+import pytest
+
+from actuator_lti import load_design
+from analyses.slugs import slug
+from analyses.study import Variant, study_of
+from analyses.variants import Comparison, compare
+from reports import document as doc
+from reports.sections.compare import overview, sections
+from reports.sections.compare_many import MANY, choice, table_text
+from reports.verdict_summary import summary
+
+COUNT = 3_000
+FAILING = "variant 1717"
+
+
+@pytest.fixture(scope="module")
+def one() -> Comparison:
+    return compare(study_of(load_design("ilr33-amber")))
+
+
+@pytest.fixture(scope="module")
+def many(one) -> Comparison:
+    """Thousands of designs with the figures of one, scaled at random; one of them fails a requirement."""
+    draw, variants = random.Random(18), []
+    for k in range(COUNT):
+        name, factor = f"variant {k}", draw.uniform(0.9, 1.1)
+        figures = {
+            key: None if v is None else v * draw.uniform(0.5, 2.0) for key, v in one.base.figures.items()
+        }
+        verdicts = [
+            replace(v, distance=None if v.distance is None else v.distance * factor)
+            for v in one.base.verdicts
+        ]
+        if name == FAILING:
+            verdicts[3] = replace(verdicts[3], distance=-1e-9, passed=False)
+        variant = Variant(name, slug(name), one.base.variant.design, {})
+        made = replace(one.base, variant=variant, figures=figures, verdicts=tuple(verdicts))
+        variants.append(made)
+    return replace(one, variants=tuple(variants))
+
+
+def test_few_designs_are_all_shown(many) -> None:
+    few = replace(many, variants=many.variants[:MANY])
+    assert choice(few) is few
+    assert few.everything is few
+
+
+def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> None:
+    shown = choice(many)
+    assert len(shown.variants) == MANY
+    assert shown.everything is many
+    names = {one.variant.name for one in shown.variants}
+    assert FAILING in names
+    for wanted in many.base.verdicts:
+        distances = {
+            one.variant.name: v.distance
+            for one in many.variants
+            for v in one.verdicts
+            if v.id == wanted.id and v.distance is not None
+        }
+        if distances:
+            assert min(distances, key=distances.__getitem__) in names
+            assert max(distances, key=distances.__getitem__) in names
+    order = [one.variant.name for one in many.variants if one.variant.name in names]
+    assert order == [one.variant.name for one in shown.variants]
+
+
+def test_marks_of_best_and_worst_are_those_of_all_designs(many) -> None:
+    shown = choice(many)
+    for name in many.names:
+        assert shown.ends(name) == many.ends(name)
+    values = [one.figures["position.gain_margin"] for one in many.all]
+    (name,) = (name for name in many.names if name.key == "position.gain_margin")
+    assert many.ends(name) == (max(values), min(values))
+
+
+def test_one_failing_design_of_thousands_fails_the_verdict_and_is_named(many, monkeypatch) -> None:
+    monkeypatch.setattr("reports.sections.compare_figures.sections", lambda _comparison: [])
+    made = {part["id"]: part for part in sections(many)}
+    counted = summary(block for part in made.values() for block in doc.walk(part))
+    assert counted["passed"] is False
+    assert made["verdicts"]["result"] == f"1 of {(COUNT + 1) * len(many.base.verdicts)} verdicts fail."
+    items = made["verdicts"]["blocks"][0]["items"]
+    assert len(items) == len(many.base.verdicts)
+    (worst,) = (one for one in items if one["passed"] is False)
+    assert worst["label"].endswith(f"met by {COUNT} of {COUNT + 1} designs; the worst is {FAILING}")
+    assert made["best"]["result"].startswith(f"{COUNT} of {COUNT + 1} designs meet every requirement;")
+    assert f"{MANY + 1} of {COUNT + 1} designs" in made["best"]["intro"]
+    assert made["best"]["status"] == "fail"
+    assert f"{COUNT - MANY} more designs" in overview(many)["note"]
+    document = doc.document(title="t", subtitle="", design={}, provenance={}, sections=list(made.values()))
+    assert len(doc.dumps(document)) < 2_000_000
+
+
+def test_the_table_has_every_figure_of_every_design(many) -> None:
+    rows = list(csv.DictReader(io.StringIO(table_text(many))))
+    assert [row["design"] for row in rows] == [one.variant.name for one in many.all]
+    for row, one in zip(rows, many.all, strict=True):
+        for name in many.names:
+            value = one.figures[name.key]
+            assert row[f"{name.key} [{name.unit}]"] == ("" if value is None else repr(float(value)))
+    failing = next(row for row in rows if row["design"] == FAILING)
+    assert (failing["not_met"], float(failing["room_percent"]) < 0.0) == ("1", True)
