@@ -200,7 +200,7 @@ class Walk(ABC):
         error = reference - self.measured_speed() if self.program.measures_speed else reference
         error = self.at_cut(ERRORS["velocity"], error)
         value = self.apply("velocity", self.drive.law("velocity"), error)
-        self.signals["velocity_integral"] = value - self.control.velocity.gain * error
+        self.signals["velocity_integral"] = value - self.control.velocity_loop.gain * error
         if "position" in self.program.stages and present(self.control.position_loop.acceleration_feedforward):
             every = self.drive.interval
             made = self.extra if self.updates(every["position"]) else None
