@@ -102,7 +102,7 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
     """
     if len(y) <= w.shape[1]:
         raise InputError(
-            f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s); allowed: a record that moves longer"
+            f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s); allowed: longer motion"
         )
     scale = np.linalg.norm(w, axis=0)
     values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
