@@ -51,7 +51,6 @@ def _ends(comparison: Comparison) -> Iterator[int]:
         }
         if values:
             yield from (min(values, key=values.__getitem__), max(values, key=values.__getitem__))
-    yield from range(len(variants))
 
 
 def _room(one: Compared, wanted: RequirementVerdict) -> float | None:
