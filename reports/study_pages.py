@@ -49,6 +49,7 @@ def write_pages(
     content = doc.dumps(made)
     html = page(doc.loads(content), progress=progress)
     paths = (folder / f"{stem}.html", folder / f"{stem}.json")
-    more = {folder / name: text.encode() for name, text in (beside or {}).items()}
-    write_together({paths[0]: html.encode(), paths[1]: content.encode(), **more})
+    texts = {paths[0]: html, paths[1]: content}
+    texts |= {folder / name: text for name, text in (beside or {}).items()}
+    write_together({path: text.encode() for path, text in texts.items()})
     return paths

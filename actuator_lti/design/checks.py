@@ -7,7 +7,7 @@ from math import inf, isfinite, log
 import numpy as np
 
 from actuator_lti.design.checks_control import check_control
-from actuator_lti.design.checks_elastic import check_elastic
+from actuator_lti.design.checks_elastic import check_elastic, check_place
 from actuator_lti.design.fields import Structure, fields_in
 from actuator_lti.design.model import Design
 from actuator_lti.design.sections import parts_of
@@ -31,6 +31,7 @@ def check_design(design: Design, where: str) -> None:
         One line: key, value and what is allowed.
     """
     checks = (
+        check_place,
         _motor,
         _cascade,
         _sampling,

@@ -9,15 +9,29 @@ from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
 
+def check_place(design: Design, where: str) -> None:
+    """Refuse a coupling after a gear that is none; whatever asks for an inertia needs its place.
+
+    Raises
+    ------
+    InputError
+    """
+    after = None if design.coupling is None else design.coupling.after
+    names = [gear.name for gear in design.gears]
+    if after is not None and after not in names:
+        known = ", ".join(names) or "none, as there are no gears; leave it out"
+        raise InputError(f"coupling.after = {shown(after)}: is no gear; allowed: {known}", where=where)
+
+
 def check_elastic(design: Design, where: str) -> None:
     """Refuse a drive train that the event-driven plant cannot be.
 
     Raises
     ------
     InputError
-        One line: a coupling after a gear that is none, without an inertia behind it, with the tanh law, or
-        before the self-locking stage; a self-locking stage whose friction would give energy; friction of a
-        load that has no coupling before it; a breakaway ratio below 1.
+        One line: a coupling or play without an inertia behind it, with the tanh law, or before the
+        self-locking stage; a self-locking stage whose friction would give energy; friction of a load that
+        has no coupling before it; a breakaway ratio below 1.
     """
 
     def refuse(key: str, value: object, allowed: str) -> InputError:
@@ -32,10 +46,6 @@ def check_elastic(design: Design, where: str) -> None:
                 "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
             )
         return
-    names = [gear.name for gear in design.gears]
-    if coupling.after is not None and coupling.after not in names:
-        known = ", ".join(names) or "none, as there are no gears; leave it out"
-        raise refuse("coupling.after", shown(coupling.after), f"is no gear; allowed: {known}")
     if design.load_side_inertia_kgm2 <= 0.0:
         raise refuse(
             "coupling.stiffness",

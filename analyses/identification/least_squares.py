@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from actuator_lti.errors import InputError
 from analyses.identification.means import correlation_time
 
 FloatArray = NDArray[np.float64]
@@ -88,12 +89,21 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
     ends : sequence of int
         Where each record ends, so that no block of rows reaches over two of them.
 
+    Raises
+    ------
+    InputError
+        Where there are no more rows than values.
+
     Notes
     -----
     ``white``: variance of the residual about its mean, over n - 1 rows, as in the published EMPS figures.
     ``correlated``: the sums of ``w' e`` over blocks of five correlation times of the residual (at least eight
     blocks) scatter as the blocks are; blocks are taken as independent.
     """
+    if len(y) <= w.shape[1]:
+        raise InputError(
+            f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s); allowed: longer motion"
+        )
     scale = np.linalg.norm(w, axis=0)
     values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
     residual = np.asarray(y - w @ values)

@@ -29,8 +29,9 @@ def sections(comparison: Comparison) -> list[Section]:
     """Make all sections of a comparison; of very many designs those at the ends are shown."""
     shown = compare_many.choice(comparison)
     best = compare_best.section(shown)
+    best["intro"] = f"{best['intro']} {compare_many.shown_words(shown)}".strip()
     made = [
-        {**best, "intro": f"{best['intro']} {compare_many.shown_words(shown)}".strip()},
+        best,
         verdicts(shown),
         figures(shown),
         differences(shown),

@@ -51,7 +51,6 @@ def _ends(comparison: Comparison) -> Iterator[int]:
         }
         if values:
             yield from (min(values, key=values.__getitem__), max(values, key=values.__getitem__))
-    yield from range(len(variants))
 
 
 def _room(one: Compared, wanted: RequirementVerdict) -> float | None:
@@ -63,14 +62,15 @@ def worst(comparison: Comparison) -> list[Block]:
     whole = comparison.whole
     if whole is None:
         return []
-    count, items = len(whole.all), []
+    count, items = len(whole.all), list[VerdictItem]()
     for wanted in whole.base.verdicts:
         found = [(one, v) for one in whole.all for v in one.verdicts if v.id == wanted.id]
         one, verdict = min(found, key=lambda pair: _rank(pair[1]))
         made: VerdictItem = item(verdict)
         met = sum(v.passed is True for _, v in found)
         label = f"{made['label']}: met by {met} of {count} designs; the worst is {one.variant.name}"
-        items.append({**made, "id": f"worst/{made['id']}", "label": label})
+        made["id"], made["label"] = f"worst/{made['id']}", label
+        items.append(made)
     return [doc.verdicts(items)]
 
 

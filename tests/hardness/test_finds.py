@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from fuzz import attack, written
 from mutate import damaged
@@ -12,6 +13,7 @@ from targets import Target, history_file, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
+from analyses.identification.least_squares import solve
 
 BY_NAME = {target.name: target for target in targets()}
 
@@ -96,6 +98,13 @@ def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
     made = json.loads(small_report())
     table_of(made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
     BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
+    with pytest.raises(InputError, match=rf"{rows} sample\(s\) are left to fit 2 parameter"):
+        solve(np.eye(3)[:rows, :2], np.ones(rows))
+    assert solve(np.eye(3)[:, :2], np.ones(3)).values == pytest.approx([1.0, 1.0])
 
 
 def test_files_of_the_attack_lie_alone_in_their_folder() -> None:

@@ -56,7 +56,7 @@ def test_few_designs_are_all_shown(many) -> None:
 
 def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> None:
     shown = choice(many)
-    assert len(shown.variants) == MANY
+    assert 2 * len(many.base.verdicts) <= len(shown.variants) <= MANY
     assert shown.everything is many
     names = {one.variant.name for one in shown.variants}
     assert FAILING in names
@@ -94,9 +94,10 @@ def test_one_failing_design_of_thousands_fails_the_verdict_and_is_named(many, mo
     (worst,) = (one for one in items if one["passed"] is False)
     assert worst["label"].endswith(f"met by {COUNT} of {COUNT + 1} designs; the worst is {FAILING}")
     assert made["best"]["result"].startswith(f"{COUNT} of {COUNT + 1} designs meet every requirement;")
-    assert f"{MANY + 1} of {COUNT + 1} designs" in made["best"]["intro"]
+    shown = len(choice(many).all)
+    assert f"{shown} of {COUNT + 1} designs" in made["best"]["intro"]
     assert made["best"]["status"] == "fail"
-    assert f"{COUNT - MANY} more designs" in overview(many)["note"]
+    assert f"{COUNT + 1 - shown} more designs" in overview(many)["note"]
     document = doc.document(title="t", subtitle="", design={}, provenance={}, sections=list(made.values()))
     assert len(doc.dumps(document)) < 2_000_000
 
