@@ -199,8 +199,9 @@ class Walk(ABC):
         """PI on the speed, the feed-forward of acceleration, and the torque filters."""
         error = reference - self.measured_speed() if self.program.measures_speed else reference
         error = self.at_cut(ERRORS["velocity"], error)
-        value = self.apply("velocity", self.drive.law("velocity"), error)
-        self.signals["velocity_integral"] = value - self.control.velocity_loop.gain * error
+        value, law = self.apply("velocity", self.drive.law("velocity"), error), self.control.velocity
+        assert law is not None
+        self.signals["velocity_integral"] = value - law.gain * error
         if "position" in self.program.stages and present(self.control.position_loop.acceleration_feedforward):
             every = self.drive.interval
             made = self.extra if self.updates(every["position"]) else None
