@@ -39,6 +39,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
             )
     yield from start_rows(1 if quick else 7)
     yield from drawing_rows(quick)
+    yield from static_rows(quick)
 
 
 def start_rows(times: int) -> Iterable[Row]:
@@ -79,6 +80,33 @@ def drawing_rows(quick: bool = False) -> Iterable[Row]:
         group="cli", name="whole report with validation", measured=whole, unit="s", target=3.0,
         note="processor time beyond start-up, kernels compiled",
     )  # fmt: skip
+
+
+STATIC = {
+    "ilr33-amber": ({}, 1.5),
+    "joint": ({}, 6.0),
+    "ballscrew": ({}, 6.0),
+    "fin": ({"control.computing_delay": "20 ms"}, 30.0),
+}
+"""Values changed and the goal in s; the last three have loops of about a hundred states."""
+
+
+def static_rows(quick: bool = False) -> Iterable[Row]:
+    """Measure the processor time of the figures of a report without validation, certified margins and all."""
+    from actuator_lti import load_design
+    from reports.build import design_report
+
+    design_report(load_design("ctms-motor-position"))  # imports what it needs
+    for name, (changes, target) in STATIC.items():
+        if quick and changes:
+            continue
+        design = load_design(name).with_values(changes)
+        taken = processor_s(lambda design=design: design_report(design))
+        what = "".join(f", {key} = {value}" for key, value in changes.items())
+        yield Row(
+            group="cli", name=f"figures of a report without validation: {name}{what}", measured=taken,
+            unit="s", target=target, note="processor time beyond start-up",
+        )  # fmt: skip
 
 
 def process_s(arguments: Sequence[str]) -> float:
