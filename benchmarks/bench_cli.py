@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from benchmarks.row import Row
 
@@ -101,7 +102,7 @@ def static_rows(quick: bool = False) -> Iterable[Row]:
         if quick and changes:
             continue
         design = load_design(name).with_values(changes)
-        taken = processor_s(lambda design=design: design_report(design))
+        taken = processor_s(partial(design_report, design))
         what = "".join(f", {key} = {value}" for key, value in changes.items())
         yield Row(
             group="cli", name=f"figures of a report without validation: {name}{what}", measured=taken,
