@@ -65,9 +65,13 @@ def verdicts(comparison: Comparison) -> Section:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
     if len(comparison.refused) > compare_many.MANY:
         blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
-    failed = sum(v.passed is False for one in everything.all for v in one.verdicts)
+    failed = [(one, v) for one in everything.all for v in one.verdicts if v.passed is False]
     count = sum(len(one.verdicts) for one in everything.all)
-    result = f"{failed} of {count} verdicts fail." if failed else f"All {count} verdicts pass."
+    result = f"All {count} verdicts pass."
+    if failed:
+        first = ", ".join((failed[0][0].variant.name, label(failed[0][1])))
+        which = first if len(failed) == 1 else f"{first}, and {len(failed) - 1} more"
+        result = f"{len(failed)} of {count} verdicts {'fails' if len(failed) == 1 else 'fail'}: {which}."
     status: Status = "fail" if failed or comparison.refused else "pass"
     return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
 

@@ -145,14 +145,21 @@ def _best(comparison: Comparison) -> Block:
         row = {"what": label(wanted), "limit": limit_words(wanted), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
-            same = high[0] - low[0] <= _SEEN * max(abs(high[0]), 1e-9)
+            seen = _SEEN * max(abs(high[0]), 1e-9)
+            same = high[0] - low[0] <= seen
+            alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
             row |= {
-                "best": "all alike" if same else high[1],
+                "best": "all alike" if same else _first(alike),
                 "value": number(high[2].value),
                 "worst": "" if same else f"{low[1]}: {number(low[2].value)}",
             }
         rows.append(row)
     return doc.table("Best design of each requirement", columns, rows)
+
+
+def _first(names: Sequence[str]) -> str:
+    """Name the first design, and say how many are as good."""
+    return names[0] if len(names) == 1 else f"{names[0]}; {len(names) - 1} alike"
 
 
 def limit_words(verdict: RequirementVerdict) -> str:
