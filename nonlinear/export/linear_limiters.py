@@ -34,7 +34,7 @@ MOST_TICKS = 16  # between two commands
 # signals in front of limiters, and the integral that the limit of one clamps as well (0: none)
 SPEED, CURRENT_COMMAND, VOLTAGE, BESIDE_CURRENT, BESIDE_VOLTAGE = range(5)
 SIGNALS = ("w_ref", "i_ref", "u")
-SEEN = 5
+SHOWN, SEEN = 3, 5
 
 
 @emitted
@@ -50,7 +50,7 @@ def noted_column(q, s, io, stage, every, size, places, count, angles, column, se
         seen[at + CURRENT_COMMAND * (MOST + 1) + j] = s[layout.S_CURRENT_BEFORE]
         seen[at + VOLTAGE * (MOST + 1) + j] = s[layout.S_VOLTAGE_BEFORE]
         seen[at + BESIDE_CURRENT * (MOST + 1) + j] = seen[at + BESIDE_VOLTAGE * (MOST + 1) + j] = 0.0
-        if int(q[layout.VELOCITY_WINDUP]) == CLAMPED:
+        if int(q[layout.VELOCITY_WINDUP]) == CLAMPED and q[layout.TORQUE_FILTERS] <= 0.0:
             beside = BESIDE_CURRENT if q[layout.HAS_CURRENT] > 0.0 else BESIDE_VOLTAGE
             seen[at + beside * (MOST + 1) + j] = s[layout.S_VELOCITY_INTEGRATOR]
         if q[layout.HAS_CURRENT] > 0.0 and int(q[layout.CURRENT_WINDUP]) == CLAMPED:
@@ -243,9 +243,10 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
                 real, imaginary = seen_at(n, seen, signal, k, state)
                 largest = max(largest, math.hypot(real, imaginary))
                 k += step
-            sizes[signal * count + g] = largest
-            change = largest_change(n, seen, signal, every, step, xs[g], state)
-            sizes[(SEEN + signal) * count + g] = change / (step * q[layout.PERIOD])
-        for j in range(2):
-            at, beside = (CURRENT_COMMAND + j) * count + g, (BESIDE_CURRENT + j) * count + g
-            sizes[at] = max(sizes[at], sizes[beside])
+            if signal < SHOWN:
+                sizes[signal * count + g] = largest
+                change = largest_change(n, seen, signal, every, step, xs[g], state)
+                sizes[(SHOWN + signal) * count + g] = change / (step * q[layout.PERIOD])
+            else:
+                at = (CURRENT_COMMAND + signal - BESIDE_CURRENT) * count + g
+                sizes[at] = max(sizes[at], largest)

@@ -13,7 +13,7 @@ from actuator_lti.drive_figure import drive_figure
 from actuator_lti.limiters import limiter_places
 from nonlinear._kernels import layout as at
 from nonlinear.emit.kinds import c_float
-from nonlinear.export.linear_limiters import SEEN, SIGNALS
+from nonlinear.export.linear_limiters import SIGNALS as SEEN
 from nonlinear.export.trace import Tape, Traced, used_statements
 from nonlinear.parameters import design_row
 
@@ -28,9 +28,9 @@ LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in
 
 def line_of(limiter: Limiter) -> int | None:
     """The line of `linear_limiters.limiter_sizes` in front of a limiter; None where there is none."""
-    if limiter.signal not in SIGNALS or limiter.kind not in ("value", "rate"):
+    if limiter.signal not in SEEN or limiter.kind not in ("value", "rate"):
         return None
-    return SIGNALS.index(limiter.signal) + (SEEN if limiter.kind == "rate" else 0)
+    return SEEN.index(limiter.signal) + (len(SEEN) if limiter.kind == "rate" else 0)
 
 
 def limits_seen(design: Design) -> list[tuple[str, int, int]]:

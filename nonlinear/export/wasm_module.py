@@ -66,6 +66,7 @@ _SIZES = {
     "PERIODIC": linear.PERIODIC,
     "MOST_TICKS": linear_limiters.MOST_TICKS,
     "SEEN": linear_limiters.SEEN,
+    "SHOWN": linear_limiters.SHOWN,
     "STAGES": linear.AT_VOLTAGE + 1,
     "POSITION": linear.POSITION,
     "COMMAND": linear.COMMAND,

@@ -103,17 +103,18 @@ def test_a_step_that_would_take_too_long_is_not_run() -> None:
     assert long_enough(2.5e5, 1) == 4_000_000  # 16 time constants
 
 
-def test_a_swinging_transient_does_not_spoil_the_response_to_the_command() -> None:
-    """Seed 3018: a mode of 24 000 ticks that swings at 0.05 Hz hid from two windows of 2000 ticks."""
-    work = _Work(full_drive(3018), TRIAL, None, full_drive(3018))
+@pytest.mark.parametrize("seed", [3018, 3099])
+def test_a_swinging_transient_does_not_spoil_the_response_to_the_command(seed: int) -> None:
+    """3018: a mode of 24 000 ticks that swings at 0.05 Hz hid from two windows of 2000 ticks."""
+    work = _Work(full_drive(seed), TRIAL, None, full_drive(seed))
     work.loops = work._assemble()
     sweep = work._answer()
     assert sweep is not None
     assert sweep.error is not None
     linear = linear_response(work.answer_loops.reference_to_output, sweep.frequency_hz)
     off = np.abs(sweep.closed_loop / linear - 1.0)
-    assert off.max() < 1e-7
-    assert (off <= allowed(sweep.error, 1.0)).all()
+    assert off[np.abs(linear) > 1e-3].max() < 1e-7
+    assert (off <= allowed(sweep.error, 1.0)).all()  # 3099: 1e-11 at 1.4 kHz is all rounding, and says so
 
 
 def test_sines_and_a_step_give_the_closed_form_of_the_response_to_the_command() -> None:

@@ -234,7 +234,7 @@ static double whole_b[MOST];
  */
 EXPORT("limiters") int limiters(int count)
 {
-    if (2 * SEEN * count > 2 * MOST_OUT) {
+    if (2 * SHOWN * count > 2 * MOST_OUT) {
         return 0;
     }
     const int n = drive_limiters_assembled(p, q, other_s, other_io, whole_a, whole_b, places, column, seen);
