@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from actuator_lti.quantities import ANALYSIS_QUANTITIES
+from actuator_lti.quantities import ANALYSIS_QUANTITIES, QUANTITIES
 from analyses.corners.result import Asked, Corner, Corners
 from analyses.loop_figures import all_loop_figures
 from analyses.sampling import Factor
@@ -21,7 +21,7 @@ from analyses.sensitivity import population_figures
 from analyses.verdicts import judged
 
 _TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
-MARGINS = {"gain_margin": "worst gain margin", "phase_margin": "worst phase margin"}
+MARGINS = {name: f"worst {QUANTITIES[name].words}" for name in ("gain_margin", "phase_margin")}
 
 
 def corners(design: Design, asked: Asked | None = None) -> Corners:
