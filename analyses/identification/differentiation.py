@@ -66,7 +66,7 @@ def filtered_motion(
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
     if (2.0 * cutoff_hz * period_s) ** order < np.finfo(float).eps:
         raise InputError(
-            f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows, "
+            f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows "
             "or a higher cut-off"
         )
     padding = 3 * order
