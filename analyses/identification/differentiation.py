@@ -57,12 +57,18 @@ def filtered_motion(
     Raises
     ------
     InputError
-        If the cut-off is not between zero and half the sampling frequency, or the record is too short.
+        If the cut-off is not between zero and half the sampling frequency or so low that the filter's
+        coefficients cancel to their last digit, or the record is too short.
     """
     from scipy.signal import butter, filtfilt
 
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
+    if (2.0 * cutoff_hz * period_s) ** order < np.finfo(float).eps:
+        raise InputError(
+            f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows "
+            "or a higher cut-off"
+        )
     padding = 3 * order
     if len(position) <= max(padding, 3):
         raise InputError(f"{len(position)} samples: more than {padding} are needed")

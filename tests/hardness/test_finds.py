@@ -13,6 +13,7 @@ from targets import Target, history_file, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
+from analyses.identification.differentiation import filtered_motion
 from analyses.identification.least_squares import solve
 
 BY_NAME = {target.name: target for target in targets()}
@@ -105,6 +106,12 @@ def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
     with pytest.raises(InputError, match=rf"{rows} sample\(s\) are left to fit 2 parameter"):
         solve(np.eye(3)[:rows, :2], np.ones(rows))
     assert solve(np.eye(3)[:, :2], np.ones(3)).values == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize("period_s", [5e-324, 1e-300, 1e-9])
+def test_rows_too_close_for_the_filter(period_s: float) -> None:
+    with pytest.raises(InputError, match="too low for rows"):
+        filtered_motion(np.linspace(0.0, 1.0, 100), period_s, cutoff_hz=50.0, order=4)
 
 
 def test_files_of_the_attack_lie_alone_in_their_folder() -> None:
