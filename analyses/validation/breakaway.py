@@ -5,6 +5,8 @@ No other check sees the breakaway ratio, which acts at rest alone (model.md sect
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from actuator_lti.design.model import Design
@@ -33,12 +35,12 @@ def breakaway_entry(design: Design, model: Design) -> Entry | None:
     reason = _not_comparable(design)
     if reason:
         return not_judged(name, "breakaway_torque", "N*m", None, None, reason, CONDITION)
-    scale = float(breakaway_torque_Nm(design, 0.0, 1))
+    scale = float(breakaway_torque_Nm(_relaxed(design), 0.0, 1))
     low, high = _started(design, WIDE[0] * scale, WIDE[1] * scale)
     if high is not None:
         middle = 0.5 * (low + high)
         low, high = _started(design, NEAR[0] * middle, NEAR[1] * middle)
-    predicted = float(breakaway_torque_Nm(model, 0.0, 1))
+    predicted = float(breakaway_torque_Nm(_relaxed(model), 0.0, 1))
     found = Reading(None) if high is None else Reading(0.5 * (low + high), 0.5 * (high - low))
     return entry(name, "breakaway_torque", "N*m", predicted, found, CONDITION)
 
@@ -47,13 +49,21 @@ def _not_comparable(design: Design) -> str:
     """Why a ramp of torque does not show the static friction; empty where it does."""
     if design.friction.law == "tanh":
         return "the tanh law has no friction at rest"
-    if design.coupling is not None:
-        return "the motor winds the coupling up before the load breaks away"
-    if design.load.gravity is not None or design.load.moment_slope_Nm_rad != 0.0:
-        return "the load changes with the angle"
-    if breakaway_torque_Nm(design, 0.0, 1) == 0.0 or breakaway_torque_Nm(design, 0.0, -1) == 0.0:
+    if design.load.gravity is not None:
+        return "the load's weight pulls at rest"
+    behind = design.load.friction if design.coupling is not None else None
+    free = behind is not None and abs(behind.offset_torque_Nm) > behind.dry_torque_Nm
+    motor = _relaxed(design)
+    if free or breakaway_torque_Nm(motor, 0.0, 1) == 0.0 or breakaway_torque_Nm(motor, 0.0, -1) == 0.0:
         return "the offset torque moves the drive by itself"
     return ""
+
+
+def _relaxed(design: Design) -> Design:
+    """What a motor at rest at zero feels: before a coupling that is not wound up, itself alone."""
+    if design.coupling is None:
+        return design
+    return replace(design, coupling=None, load=replace(design.load, friction=None, gravity=None))
 
 
 def _started(design: Design, low: float, high: float) -> tuple[float, float | None]:

@@ -468,10 +468,11 @@ class _Work:
         return max(own)
 
     def _steady(self) -> Entry:
-        return steady_entry(self.linear, on_the_bench(self.model), max(self.settle.values()))
+        bench = on_the_bench(self.design)  # its own friction, also where the loops stand without some of it
+        return steady_entry(bench, on_the_bench(self.model), max(self.settle.values()))
 
     def _breakaway(self) -> Entry | None:
-        return breakaway_entry(self.linear, self.model)
+        return breakaway_entry(on_the_bench(self.design), on_the_bench(self.model))
 
     @cached_property
     def _model_steered(self) -> Design:

@@ -41,10 +41,33 @@ def test_without_dry_friction_there_is_nothing_to_see() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "why"), [("fin", "coupling"), ("ilr33-amber-tanh", "tanh law has no friction at rest")]
+    ("name", "why"),
+    [("joint", "weight pulls at rest"), ("ilr33-amber-tanh", "tanh law has no friction at rest")],
 )
 def test_what_is_not_judged_says_why(name: str, why: str) -> None:
     design = load_design(name)
     row = breakaway_entry(design, design)
     assert row.passed is None
     assert why in row.reason
+
+
+@pytest.mark.parametrize("name", ["fin", "ballscrew"])
+def test_behind_a_coupling_that_is_not_wound_up_the_motor_holds_by_its_own_friction(name: str) -> None:
+    """T = r Tc + T_offset of the motor alone, by hand: no torque of the spring before the motor moves."""
+    design = load_design(name)
+    own = design.friction
+    row = breakaway_entry(design, design)
+    assert row.passed
+    assert row.measured == pytest.approx(
+        own.breakaway_ratio * own.dry_torque_Nm + own.offset_torque_Nm, rel=3e-5
+    )
+    doubled = replace(design, friction=replace(own, dry_torque_Nm=2.0 * own.dry_torque_Nm))
+    assert breakaway_entry(design, doubled).passed is False
+
+
+def test_a_load_that_moves_by_itself_is_not_judged() -> None:
+    design = load_design("fin")
+    behind = replace(design.load.friction, offset_torque_Nm=2.0 * design.load.friction.dry_torque_Nm)
+    row = breakaway_entry(*[replace(design, load=replace(design.load, friction=behind))] * 2)
+    assert row.passed is None
+    assert "moves the drive by itself" in row.reason

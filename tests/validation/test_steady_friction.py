@@ -1,0 +1,46 @@
+"""Friction at a constant speed, on drives whose load changes with the angle too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from actuator_lti import load_design
+from analyses.validation.bench import on_the_bench
+from analyses.validation.bias_motion import bias_motion
+from analyses.validation.steady import level, steady_entry
+
+SETTLE = 20_000  # ticks
+
+
+def test_the_fin_s_friction_by_hand() -> None:
+    """kM i = Tc + b w + k_L |T_s| + T_s/N with T_s = Tc_l + b_l w/N - M, without the slope of M."""
+    design = on_the_bench(load_design("fin"))
+    row = steady_entry(design, design, SETTLE)
+    motion = bias_motion(level(design))
+    w, M = motion.speed_rad_s, motion.load_Nm
+    spring = 0.05 + 0.02 * w / 60.0 - M
+    wanted = (8e-3 + 1e-5 * w + 1.7e-3 * abs(spring) + spring / 60.0) / 0.03
+    assert row.passed
+    assert "slope and gravity left out" in row.condition
+    assert row.predicted == pytest.approx(wanted, rel=1e-12)
+    assert row.measured == pytest.approx(wanted, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["fin", "joint"])
+@pytest.mark.parametrize("part", ["dry_torque_Nm", "viscous_Nms_rad"])
+def test_wrong_friction_is_seen_though_the_load_changes_with_the_angle(name: str, part: str) -> None:
+    design = on_the_bench(load_design(name))
+    wrong = replace(design.friction, **{part: getattr(design.friction, part) * 1.01})
+    assert steady_entry(design, replace(design, friction=wrong), SETTLE).passed is False
+
+
+def test_a_heavy_drive_with_short_ticks_is_judged_by_what_a_tick_can_add() -> None:
+    """A current below ulp(w) J/(kM T) moves no speed: the figure cannot be known better."""
+    amber = on_the_bench(load_design("ilr33-amber"))
+    heavy = replace(
+        amber, motor=replace(amber.motor, rotor_inertia_kgm2=1e6 * amber.motor.rotor_inertia_kgm2)
+    )
+    light, slow = (steady_entry(one, one, SETTLE) for one in (amber, heavy))
+    assert slow.tolerance > light.tolerance
