@@ -69,7 +69,7 @@ def test_names_of_records_may_hold_anything(name, tmp_path, monkeypatch) -> None
 
     monkeypatch.chdir(tmp_path)
     record, design = f"{name}.csv", ("--design", "ilr33-amber")
-    assert main(["simulate", "ilr33-amber", "--csv", record, "--duration", "0.5", "--quiet"]) == 0
+    assert main(["simulate", "ilr33-amber", "--csv", record, "--command", "triangle", "--quiet"]) == 0
     assert main(["correlate", "ilr33-amber", record, "--out", "c", "--quiet"]) in (0, 1)
     assert main(["pdf", "c/correlation.json"]) == 0
     assert main(["identify", record, *design, "--accept", "--out", "i", "--quiet"]) in (0, 1)
