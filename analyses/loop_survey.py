@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int], None]
 FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)
+MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
 
 @dataclass(frozen=True)
@@ -218,6 +219,10 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 
     loop = loops.break_points[name]
     exact = exact_margins(loops, name) if loop.periodic else None
+    states = len(loop.plain_open.A)
+    if exact is not None and states > MOST_STATES:
+        why = f"the fundamental has {states} states; up to {MOST_STATES} are certified in a report"
+        return BreakPoint(None, exact, f"{why}; the exact borders of stability are below")
     try:
         return BreakPoint(loop_figures(loop, bandwidth=False, step=False, certify=True), exact)
     except (InputError, NumericalError) as error:
