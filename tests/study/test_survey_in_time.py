@@ -8,7 +8,8 @@ from analyses.loop_survey import MOST_STATES, survey_loops
 
 
 def test_a_fundamental_of_very_many_states_has_exact_borders_and_a_reason() -> None:
-    design = with_values(load_design("ballscrew"), {"control.position.every": 40, "control.position.gain": 5.0})
+    changed = {"control.position.every": 40, "control.position.gain": 5.0}
+    design = with_values(load_design("ballscrew"), changed)
     states = {name: len(loop.plain_open.A) for name, loop in assemble_loops(design).break_points.items()}
     points = survey_loops(design).break_points
     large = [name for name, count in states.items() if count > MOST_STATES]
