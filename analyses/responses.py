@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
-_ENTRIES = 1 << 15
-LARGE = 60  # states
+_ENTRIES = 1 << 15  # of the matrices solved in one call: what the cache holds
+LARGE = 60  # states: a triangular form pays from here on
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
     if len(a) > LARGE and points.size > len(a) // 10:
         return _triangular(a, b, c, d, points)
     result = np.empty(len(points), dtype=complex)
-    some = max(_ENTRIES // a.size, 1)  # as many points at once as the cache holds
+    some = max(_ENTRIES // a.size, 1)  # points at once
     matrix = np.empty((min(some, len(points)), *a.shape), dtype=complex)
     own = np.arange(len(a))
     for start in range(0, len(points), some):
@@ -119,12 +119,16 @@ def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
     return result
 
 
-def _triangular(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """C (z - A)^-1 B + D by Schur's form: substitution from the last state up, all points at once."""
+def _triangular(
+    a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, points: np.ndarray
+) -> np.ndarray | None:
+    """C (z - A)^-1 B + D by Schur's form, from the last state up, all points at once; None at a pole."""
     from scipy.linalg import schur
 
     upper, turned = schur(a, output="complex")
     right, left = (turned.conj().T @ b)[:, 0], (c @ turned)[0]
+    if (points[:, None] == np.diagonal(upper)).any():
+        return None
     states = np.empty((len(a), points.size), dtype=complex)
     for k in reversed(range(len(a))):
         states[k] = (right[k] + upper[k, k + 1 :] @ states[k + 1 :]) / (points - upper[k, k])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive import signals
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.large_signal.classify import limiter_fractions
@@ -22,7 +23,6 @@ FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)
 TOLERANCE = 0.01
 LONG = 0.1  # periods of the highest tone
-SLOW = {"overload": "overload protection"}
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def check_border(
     left_out = ""
     if not friction_on:
         design = replace(on_the_bench(design), supply=None)
-        slow = [SLOW[name] for name in slow_protection(design, loops)]
+        slow = [signals.LIMITERS[name].words for name in slow_protection(design, loops)]
         left_out = ", ".join([*_bent(design), *slow])
         if left_out:
             design = _straight(design)
