@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-_LEAST = (1e-9, 1e-12, 1e-15)  # of the largest: a state of less is zero, if the equations then hold as well
-_ROUNDED = 1e-11  # over its terms, what is left of a sum that is zero: matrix exponentials lose some digits
+LEAST = (1e-9, 1e-12, 1e-15)  # of the largest: a state of less is zero, if the equations then hold as well
+ROUNDED = 1e-11  # over its terms, what is left of a sum that is zero: matrix exponentials lose some digits
 
 
 def without_rest_mode(
@@ -70,9 +70,9 @@ def _at_rest(A: np.ndarray, C: np.ndarray, at: float, j: int) -> np.ndarray | No
         both = np.vstack([scaled, unseen])
         v[o] = np.linalg.lstsq(both[:, o] * size, -both[:, j], rcond=None)[0] * size
         weight = np.maximum(allowed @ np.abs(v), 1e-30 * largest)
-    for least in _LEAST:
+    for least in LEAST:
         u = np.where(np.abs(v) > least * np.abs(v).max(), v, 0.0)
-        at_rest = (np.abs(rows @ u) <= _ROUNDED * (allowed @ np.abs(u))).all()
-        if at_rest and abs(c @ u) <= _ROUNDED * (np.abs(c) @ np.abs(u)) and u[o].any():
+        at_rest = (np.abs(rows @ u) <= ROUNDED * (allowed @ np.abs(u))).all()
+        if at_rest and abs(c @ u) <= ROUNDED * (np.abs(c) @ np.abs(u)) and u[o].any():
             return u
     return None

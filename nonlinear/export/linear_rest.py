@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from actuator_lti import rest_mode as rest_mode_rule
 from actuator_lti.batch._figures import (
     DC_GAIN,
     FINAL,
@@ -19,11 +20,11 @@ from actuator_lti.batch._figures import (
     MODULUS,
     MODULUS_X,
 )
+from actuator_lti.rest_mode import ROUNDED
 from nonlinear.export.entries import emitted
 from nonlinear.export.linear_limiters import states_at
 
-LEAST = np.array([1e-9, 1e-12, 1e-15])  # as actuator_lti.rest_mode
-ROUNDED = 1e-11
+LEAST = np.array(rest_mode_rule.LEAST)
 
 
 @emitted
