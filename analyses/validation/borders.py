@@ -31,6 +31,7 @@ Progress = Callable[[int, int], None]
 
 CUT = "the search was cut for lack of time"
 GROUP_TICKS = 2_000_000  # in one batch: time is looked at in between
+MOST_TICKS = 80_000_000  # of a search in one round: some seconds
 VALUES = 12  # of each search in one round
 ROUNDS = 6
 CLOSE = 3e-3  # relative width at which the bracket is interpolated
@@ -412,6 +413,9 @@ def find_borders(
     2.95
     """
     hunts = [_Hunt(search, search.grid()) for search in searches]
+    for hunt in hunts:
+        if hunt.search.ticks * hunt.values.size > MOST_TICKS:
+            hunt.spoiled = f"an oscillation of {hunt.search.frequency_hz:.2g} Hz takes too many ticks to be followed"
     for k in range(ATTEMPTS):
         open_ = [hunt for hunt in hunts if hunt.bracketed is None and not hunt.spoiled]
         if not _hunt(open_, threads, progress):

@@ -7,7 +7,7 @@ rest, follows a ramp underneath.  The profile of the command is left out: a fain
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
@@ -27,6 +27,7 @@ STEADY = 1e-5  # relative change of the fundamental from one window to the next
 FINE = 1e-6  # beyond it a point is waited for once more: a swinging transient shows little of itself
 TRIES = 5
 SMALL_ANGLE_RAD = 1e-3  # of the output, with gravity
+BETWEEN = "between two ticks the speed reverses or the coupling comes free"
 SIGNAL = {"position": "output_angle_rad", "velocity": "motor_speed_rad_s", "current": "current_A"}
 
 
@@ -143,6 +144,9 @@ def _point(
     for attempt in range(TRIES):
         run = _run(design, motion, amplitude, hertz, settle_ticks + 2 * ticks, base)
         point = _read(design, motion, run, amplitude, hertz, ticks // base)
+        if not point.reason and motion.delicate:
+            settled = _run(design, motion, amplitude, hertz, settle_ticks, base)
+            point = replace(point, reason=BETWEEN if run.events > settled.events else "")
         hiding = not point.reason and not waited and point.unsteadiness > FINE
         if (not point.reason and not hiding) or attempt == TRIES - 1:
             break

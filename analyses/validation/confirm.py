@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 SETTLE_CYCLES = 20
-LONG_TICKS, FEWEST = 10_000, 0.3  # a window longer than this holds fewer periods, down to this share
+LONG_TICKS, FEWEST = 10_000, 0.15  # a window longer than this holds fewer periods, down to this share
 LEAST_DELAY = 1e-3  # samples
 LONGEST_SETTLE_TICKS = 5_000  # at first; what then contradicts is looked at again
 AGAIN = 16  # times the wait
@@ -35,7 +35,9 @@ LONGEST_DRIFT_TICKS = 60_000  # a window is as long as the wait
 WAY, DRIFTING, DIED_DOWN = 12, 1e-9, 5.0  # gains looked at; a pole at 1; time constants
 LONGEST_BLIND_TICKS = 20_000  # nobody knows what to wait for: several of the slowest time constants
 GRID, DIPS = 1000, 6  # frequencies looked at, and how many of the nearest approaches to -1 are refined
-SLOWEST = 1e-4  # of half the sampling frequency: a border below is a drift, no oscillation
+SLOWEST = 1e-4  # of half the sampling frequency: where looking begins, at least
+REST = 1e-9  # of half the sampling frequency: a border below is a drift, no oscillation
+BESIDE = (0.99, 1.01)  # of a gain at its border: a pole is outside on one side
 AT_NYQUIST = 1e-6  # relative: a real pole at -1
 FAR = 300.0  # margins beyond this factor count as none
 
@@ -233,17 +235,48 @@ def point_questions(
 
 
 def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
-    """About where a loop oscillates at its border: the frequency at which ``gain L`` comes nearest to -1.
+    """About where a loop oscillates at its border: at the angle of the pole that leaves the unit circle there.
 
-    0, and half the sampling frequency, where a real pole leaves the unit circle at 1 or -1.
+    0, and half the sampling frequency, where a real pole leaves it at 1 or -1.  With a delay, or where no pole
+    does (a periodically time-varying loop is one at one rate only about), the frequency at which
+    ``gain L exp(-jwd)`` comes nearest to -1.
     """
+    pole = None if delay_s else _leaving(loop.plain_open, gain)
+    if pole is None:
+        return _nearest_hz(loop, gain, delay_s)
+    return float(abs(np.angle(pole))) / (2.0 * pi * loop.period_s)
+
+
+def _leaving(open_loop: Any, gain: float) -> complex | None:
+    """The pole of the closed loop that crosses the unit circle at a gain."""
+    beside = [closed_poles(open_loop, gain * factor) for factor in BESIDE]
+    out = max(beside, key=lambda poles: float(np.abs(poles).max(initial=0.0)))
+    sizes = [float(np.abs(poles).max(initial=0.0)) for poles in beside]
+    if not min(sizes) <= 1.0 + DRIFTING < max(sizes):
+        return None
+    leaves = out[int(np.argmax(np.abs(out)))]
+    there = closed_poles(open_loop, gain)
+    return complex(there[int(np.argmin(np.abs(there - leaves)))])
+
+
+def closed_poles(open_loop: Any, gain: float) -> npt.NDArray[np.complex128]:
+    """Poles of the loop closed with a gain."""
+    A, B, C, D = (np.asarray(x) for x in (open_loop.A, open_loop.B, open_loop.C, open_loop.D))
+    return np.asarray(np.linalg.eigvals(A - gain / (1.0 + gain * D[0, 0]) * B @ C), dtype=complex)
+
+
+def _nearest_hz(loop: Any, gain: float, delay_s: float) -> float:
+    """Where ``gain L exp(-jwd)`` comes nearest to -1."""
     from scipy.optimize import minimize_scalar
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
         omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
         return np.abs(1.0 + gain * response_at(loop.plain_open, omega) * np.exp(-1j * omega * delay_s))
 
-    grid = np.log(np.geomspace(SLOWEST, 0.999, GRID) * 0.5 / loop.period_s)
+    poles = closed_poles(loop.plain_open, 1.0)
+    moving = np.abs(np.log(np.where(poles == 0.0, 1e-300, poles)))
+    slowest = min(SLOWEST, 0.1 * float(moving[moving > DRIFTING].min(initial=pi)) / pi)
+    grid = np.log(np.geomspace(slowest, 0.999, GRID) * 0.5 / loop.period_s)
     values = distance(grid)
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
@@ -269,7 +302,7 @@ def _gain(
     hertz, tick_s = omega / (2.0 * pi), setup.design.controller.period_s
     halves = {0.5 / setup.period_s, 0.5 / (setup.base_ticks * tick_s), 0.5 / tick_s}
     alternating = [half for half in halves if abs(hertz / half - 1.0) < AT_NYQUIST]
-    if hertz <= SLOWEST * min(halves):
+    if hertz <= REST * min(halves):
         alternating = [0.0]
         settle_ticks = max(settle_ticks, _on_the_way(loop, ratio, setup.hold_ticks))
     if alternating:
@@ -284,10 +317,9 @@ def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
     On its way there a loop may swing more slowly than it ever does at its nominal gain, and a window shorter
     than the swing takes a part of it for growth.
     """
-    system, slowest = loop.plain_open, 0.0
-    A, B, C, D = (np.asarray(x) for x in (system.A, system.B, system.C, system.D))
+    slowest = 0.0
     for gain in np.geomspace(1.0, ratio, WAY)[1:-1]:
-        sizes = np.abs(np.linalg.eigvals(A - gain / (1.0 + gain * D[0, 0]) * B @ C))
+        sizes = np.abs(closed_poles(loop.plain_open, gain))
         slowest = max(slowest, float(sizes[sizes < 1.0 - DRIFTING].max(initial=0.0)))
     samples = DIED_DOWN / -log(slowest) if slowest > 0.0 else 0.0
     return min(ceil(samples) * hold_ticks, LONGEST_DRIFT_TICKS)

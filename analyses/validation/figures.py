@@ -28,7 +28,8 @@ from analyses.validation.reading import (
     value_at,
 )
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig, producer
+from analyses.validation.rig import Rig
+from analyses.validation.rounding import angle_rounding
 from analyses.validation.step import ROUNDING, StepMeasured, step_response
 from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
 from analyses.validation.transient import Transient
@@ -189,7 +190,6 @@ def _fall(f: Floats, values: Floats, level: float) -> float:
 
 
 BESIDE = 2  # points on either side
-FEW_BITS = 8.0  # a motion beyond so many last bits of the angle spreads its rounding
 
 
 def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
@@ -213,37 +213,6 @@ def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
     ``d/(1 - exp(-W/tau))`` with its time constant tau.
     """
     return change / -np.expm1(-np.asarray(window) / slowest)
-
-
-def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], ticks: Floats, seen: Floats) -> Floats:
-    """What rounding of the growing angle leaves in a fundamental in front of the instrument.
-
-    A speed made from angles divides their last bit by the time between them; over the samples of a window
-    that is noise, of which the fundamental keeps ``sqrt(2/N)``.  A motion of few such bits does not spread
-    its rounding: it may be lost whole, alike in every window.
-
-    Parameters
-    ----------
-    window, ticks : ndarray, shape (K,)
-        Length of a window and of the whole run.
-    seen : ndarray, shape (K,)
-        The fundamental, in the unit of the point.
-    """
-    control, encoder = setup.design.controller, setup.design.encoder
-    velocity = control.velocity
-    if velocity is None or encoder.speed == "ideal" or setup.outer == "current":
-        return np.zeros(window.size)
-    tick_s = control.period_s
-    span = encoder.difference_samples * velocity.every * tick_s
-    per_angle = 1.0 / span if encoder.speed == "difference" else 2.0 * (encoder.bandwidth_rad_s or 0.0)
-    angle = abs(setup.bias.speed_rad_s) * ticks * tick_s
-    speed = np.spacing(np.maximum(angle, 1e-300)) * per_angle
-    stage = producer(setup.design, setup.point)
-    gain = 1.0 if stage == "position" else velocity.gain
-    if stage == "current" and control.current is not None:
-        gain *= control.current.gain_V_A
-    bit = speed * gain
-    return np.where(seen > FEW_BITS * bit, bit * np.sqrt(2.0 * setup.hold_ticks / window), bit)
 
 
 def _decibel(value: Reading, more_db: float = 0.0) -> Reading:

@@ -8,12 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.rig import Rig, small_rig
+from analyses.validation.rounding import speed_bit
 from nonlinear import Trajectory
 
 Floats = npt.NDArray[np.float64]
 SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
 SETTLED = 0.02  # band of the settling time
 UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
+STEADY = 0.95  # share from tenth to tenth: what is nearer to 1 is rounding, or not settled
 ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
 STEP_PART = 0.02  # of the room of the signal
 
@@ -23,7 +25,8 @@ class StepMeasured:
     """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
 
     ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
-    the final value (what its last tenth still moves), the other two what it does to the times.  ``size`` is
+    the final value (what its last tenth still moves, carried on to the end, and rounding of the angle), the
+    other two what it does to the times.  ``size`` is
     that of the step, in the unit of the point; the response is per unit.
     """
 
@@ -62,12 +65,26 @@ def step_response(
         if not reason and not bent:
             break
         size *= SMALL_ANGLE_RAD / turned if bent else 0.2
-    figures = step_figures_of(time_s, response, reason)
+    figures = _figures(setup, size, settle_ticks, time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
         small = small_rig(setup.design, setup.loop, held=setup.held)
         time_s, response, reason, _ = _step(small, size, settle_ticks, without_step(small, settle_ticks))
-        figures = step_figures_of(time_s, response, reason)
+        figures = _figures(small, size, settle_ticks, time_s, response, reason)
     return replace(figures, size=size)
+
+
+def _figures(
+    setup: Rig, size: float, ticks: int, time_s: Floats, response: Floats, reason: str
+) -> StepMeasured:
+    """The figures, to what rounding of the speed leaves of them.
+
+    Every tick rounds by half a bit, of which the loop forgets what is older than its rise time.
+    """
+    figures = step_figures_of(time_s, response, reason)
+    memory = max(figures.rise_time_s / setup.design.controller.period_s, 2.0)
+    if not np.isfinite(memory):
+        return figures
+    return step_figures_of(time_s, response, reason, 0.5 * memory * float(speed_bit(setup, ticks)) / size)
 
 
 def without_step(setup: Rig, settle_ticks: int) -> Course:
@@ -99,25 +116,45 @@ def _step(setup: Rig, size: float, settle_ticks: int, steady: Course) -> tuple[F
     return run.time_s, (steady[0] - run.probes[setup.point].before) / size, reason, turned
 
 
-def step_figures_of(time_s: Floats, response: Floats, reason: str = "") -> StepMeasured:
-    """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response."""
+def step_figures_of(
+    time_s: Floats, response: Floats, reason: str = "", rounding: float = 0.0
+) -> StepMeasured:
+    """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response.
+
+    ``rounding`` is what the response may be off by, per unit of the step.
+    """
     final = float(response[-1])
     nothing = float("nan")
     if not np.isfinite(response).all() or final == 0.0:
         return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
     y = response / final
-    moved = float(np.ptp(y[-max(y.size // 10, 2) :]))
+    moved, before = _last_changes(y)
     if not reason and moved > UNSETTLED:
         reason = (
             f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
         )
-    error = moved + ROUNDING
+    error = _still_to_come(moved, before) + ROUNDING + rounding / abs(final)
     settled = [_settled(time_s, y, SETTLED + part * error) for part in (0.0, 1.0, -1.0)]
     rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
     over = max(100.0 * (float(y.max()) - 1.0), 0.0)
     return StepMeasured(
         rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
     )
+
+
+def _last_changes(y: Floats) -> tuple[float, float]:
+    """What the last tenth still moves, and the one before it."""
+    n = max(y.size // 10, 2)
+    return float(np.ptp(y[-n:])), float(np.ptp(y[-2 * n : -n])) if y.size >= 2 * n else 0.0
+
+
+def _still_to_come(moved: float, before: float) -> float:
+    """What a motion that changes by r of itself from tenth to tenth has before it: r + r^2 + ... of the last.
+
+    At least what it moved last: it may swing.
+    """
+    share = min(moved / before, STEADY) if before > 0.0 else 0.0
+    return moved * max(1.0, share / (1.0 - share))
 
 
 def _rise(time_s: Floats, y: Floats) -> float:
