@@ -68,7 +68,8 @@ class Counts:
         Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias.
     linear_seen_rad : float or None
         Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than
-        5 % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much.
+        5 % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or
+        the drive is unstable without friction.
     off : ndarray
         What that response is off by (relative) at `TRIED` times ``linear_rad``.
     """
@@ -230,11 +231,13 @@ def _linearity(
     gain = abs(complex(linear_response(loops.plain_response, window.frequency_hz)[0]))
     wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
     amplitude = wanted * TRIED
-    seen = []
+    seen, there = [], np.ones(TRIED.size, dtype=bool)
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
         rows.sine("command", amplitude, window.frequency_hz[0])
         rows["ticks"] = settle_ticks + 2 * window.ticks[0]
         rows.window(window.ticks[0], window.cycles[0])
-        seen.append(rows.run().phasor("output_angle_rad"))
-    return np.abs(seen[0] / seen[1] - 1.0)
+        run = rows.run()
+        seen.append(run.phasor("output_angle_rad"))
+        there &= run.ok  # without friction a drive may be unstable
+    return np.abs(np.divide(seen[0], seen[1], out=np.full(TRIED.size, inf, complex), where=there) - 1.0)
