@@ -103,7 +103,9 @@ def check_border(
     """Bisect the amplitude at which a limit first acts in steady state, at each of several frequencies.
 
     Every run begins in the linear steady state just below the border and is judged by its last window, so
-    that no start-up counts. ``None`` where the loop is unstable: it has no border.
+    that no start-up counts. Where it then acts early the tone swells up from rest instead: what a start
+    lacks, the states of filters, may reach the limit, and a drive that is limited may stay so. ``None`` where
+    the loop is unstable: it has no border.
 
     Parameters
     ----------
@@ -130,28 +132,30 @@ def check_border(
     if not start.stable:
         return None
     tries, limited = WIDE if friction_on else TIGHT, np.flatnonzero(np.isfinite(border.amplitude_rad))
-    simulated, names = np.full(len(omega), np.nan), [""] * len(omega)
-    if len(limited):
-        foreseen = border.amplitude_rad[limited]
+    simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
+
+    def search(which: np.ndarray, tries: tuple[float, float], *, swelling: bool = False) -> None:
+        foreseen = border.amplitude_rad[which]
 
         def acting(amplitude: np.ndarray) -> np.ndarray:
-            begin = np.minimum(amplitude, 0.99 * foreseen)
+            begin = 0.0 * amplitude if swelling else np.minimum(amplitude, 0.99 * foreseen)
             result = run_tones(
-                design, chosen, limited, amplitude, start, begin,
-                load_Nm=load_Nm, friction_on=friction_on, harmonics=1,
+                design, chosen, which, amplitude, start, begin,
+                load_Nm=load_Nm, friction_on=friction_on, harmonics=1, swelling=swelling,
             )  # fmt: skip
             return limiter_fractions(result)
 
-        amplitudes, first = _bisect(acting, foreseen, tries, rounds)
-        if tries != WIDE and np.isnan(amplitudes).any():  # it is not about where it was foreseen: look for it
-            further, names_further = _bisect(acting, foreseen, WIDE, rounds)
-            first = [
-                b if np.isnan(x) else a for a, b, x in zip(first, names_further, amplitudes, strict=True)
-            ]
-            amplitudes = np.where(np.isnan(amplitudes), further, amplitudes)
-        simulated[limited] = amplitudes
-        for place, name in zip(limited, first, strict=True):
-            names[place] = name
+        simulated[which], names[which] = _bisect(acting, foreseen, tries, rounds)
+
+    if len(limited):
+        search(limited, tries)
+    if not friction_on:
+        early = limited[~(simulated[limited] > (1.0 - TOLERANCE) * border.amplitude_rad[limited])]
+        if len(early):  # what a run begins without (states of filters) may reach the limit, and stay there
+            search(early, tries, swelling=True)
+        lost = limited[np.isnan(simulated[limited])]
+        if len(lost):  # it is not about where it was foreseen: look for it
+            search(lost, WIDE, swelling=True)
     return BorderCheck(
         friction_on,
         omega / (2.0 * np.pi),
@@ -207,7 +211,7 @@ def _straight(design: Design) -> Design:
 
 def _bisect(
     acting: Callable[[np.ndarray], np.ndarray], foreseen: np.ndarray, tries: tuple[float, float], rounds: int
-) -> tuple[np.ndarray, list[str]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Close in on the border from both sides, all frequencies at once, on a logarithmic scale."""
     low, high = np.log(tries[0] * foreseen), np.log(tries[1] * foreseen)
     at_low, at_high = acting(np.exp(low)), acting(np.exp(high))
@@ -220,4 +224,4 @@ def _bisect(
         low, high = np.where(hit, low, middle), np.where(hit, middle, high)
         last = np.where(hit[:, None], seen, last)
     names = [LIMITERS[int(np.argmax(row))] if ok else "" for row, ok in zip(last, valid, strict=True)]
-    return np.where(valid, np.exp(0.5 * (low + high)), np.nan), names
+    return np.where(valid, np.exp(0.5 * (low + high)), np.nan), np.array(names, dtype=object)

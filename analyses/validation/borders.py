@@ -415,7 +415,9 @@ def find_borders(
     hunts = [_Hunt(search, search.grid()) for search in searches]
     for hunt in hunts:
         if hunt.search.ticks * hunt.values.size > MOST_TICKS:
-            hunt.spoiled = f"an oscillation of {hunt.search.frequency_hz:.2g} Hz takes too many ticks to be followed"
+            hunt.spoiled = (
+                f"an oscillation of {hunt.search.frequency_hz:.2g} Hz takes too many ticks to be followed"
+            )
     for k in range(ATTEMPTS):
         open_ = [hunt for hunt in hunts if hunt.bracketed is None and not hunt.spoiled]
         if not _hunt(open_, threads, progress):

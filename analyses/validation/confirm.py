@@ -235,10 +235,10 @@ def point_questions(
 
 
 def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
-    """About where a loop oscillates at its border: at the angle of the pole that leaves the unit circle there.
+    """About where a loop oscillates at its border: the angle of the pole that leaves the unit circle there.
 
-    0, and half the sampling frequency, where a real pole leaves it at 1 or -1.  With a delay, or where no pole
-    does (a periodically time-varying loop is one at one rate only about), the frequency at which
+    0, and half the sampling frequency, where a real pole leaves it at 1 or -1.  With a delay, or where no
+    pole does (a periodically time-varying loop is one at one rate only about), the frequency at which
     ``gain L exp(-jwd)`` comes nearest to -1.
     """
     pole = None if delay_s else _leaving(loop.plain_open, gain)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from analyses.validation.budget import OutOfTime
 from analyses.validation.coherent import LEAST_SAMPLES, coherent
+from analyses.validation.own_error import ROUNDING, angle_rounding, carried_on
 from analyses.validation.reading import (
     NEAREST,
     NOTHING,
@@ -29,8 +30,7 @@ from analyses.validation.reading import (
 )
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig
-from analyses.validation.rounding import angle_rounding
-from analyses.validation.step import ROUNDING, StepMeasured, step_response
+from analyses.validation.step import StepMeasured, step_response
 from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
 from analyses.validation.transient import Transient
 
@@ -110,9 +110,9 @@ def measure_figures(
     transient : Transient, optional
         Where the sweep comes from it: its step, and its points in between.
     """
-    cut = ""
+    cut, slowest = "", slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS
     try:
-        step = step_response(setup, step_ticks) if transient is None else transient.step
+        step = step_response(setup, step_ticks, slowest) if transient is None else transient.step
     except OutOfTime:
         step, cut = StepMeasured(nan, nan, nan, nan, np.empty(0), np.empty(0), NO_TIME), "step response"
     lost = step.reason or not np.isfinite(step.final_value) or step.final_value == 0.0
@@ -130,7 +130,7 @@ def measure_figures(
         cut = ", ".join([*([cut] if cut else []), "points about each figure"])
     f = fine.frequency_hz
     if transient is None:
-        each = point_errors(setup, fine, slowest_ticks or step_ticks / SETTLE_TIME_CONSTANTS)
+        each = point_errors(setup, fine, slowest)
         own = dict.fromkeys(RESPONSES, each)
     else:
         own = transient.errors(fine)
@@ -205,14 +205,6 @@ def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
     seen = np.maximum(np.abs(sweep.closed_loop * sweep.amplitude), 1e-300)
     rounding = angle_rounding(setup, window, sweep.ticks, seen) / seen
     return carried_on(own, window, slowest) + ROUNDING + np.where(np.isfinite(rounding), rounding, 0.0)
-
-
-def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
-    """What a transient that changes by d from one window W to the next still holds.
-
-    ``d/(1 - exp(-W/tau))`` with its time constant tau.
-    """
-    return change / -np.expm1(-np.asarray(window) / slowest)
 
 
 def _decibel(value: Reading, more_db: float = 0.0) -> Reading:

@@ -19,7 +19,8 @@ from analyses.loop_figures import LoopFigures
 from analyses.validation.borders import LONGEST_DELAY_SAMPLES
 from analyses.validation.coherent import coherent
 from analyses.validation.confirm import Confirmation
-from analyses.validation.figures import ROUNDING, Measured, carried_on, hertz, most_frequent
+from analyses.validation.figures import Measured, hertz, most_frequent
+from analyses.validation.own_error import ROUNDING, carried_on
 from analyses.validation.reading import Reading
 from analyses.validation.response import Sweep, SweepErrors, linear_response
 from analyses.validation.tolerance import PREDICTED, allowed

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from analyses.validation.own_error import ROUNDING, carried_on, speed_bit
 from analyses.validation.rig import Rig, small_rig
-from analyses.validation.rounding import speed_bit
 from nonlinear import Trajectory
 
 Floats = npt.NDArray[np.float64]
 SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
 SETTLED = 0.02  # band of the settling time
-UNSETTLED = 2e-4  # of a step: so much may its last tenth still change for its end to count as the final value
-STEADY = 0.95  # share from tenth to tenth: what is nearer to 1 is rounding, or not settled
-ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
+UNSETTLED = 1e-3  # of a step: so much may be left to come for its end to count as the final value
 STEP_PART = 0.02  # of the room of the signal
 
 
@@ -25,7 +23,7 @@ class StepMeasured:
     """Step response of a loop in the simulator; figures as `actuator_lti.step.StepFigures`.
 
     ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
-    the final value (what its last tenth still moves, carried on to the end, and rounding of the angle), the
+    the final value (what its last tenth moves, carried on to the end of the slowest mode, and rounding), the
     other two what it does to the times.  ``size`` is
     that of the step, in the unit of the point; the response is per unit.
     """
@@ -47,12 +45,25 @@ Course = tuple[Floats, Floats]  # in front of the instrument, and of the output
 
 
 def step_response(
-    setup: Rig, settle_ticks: int, size: float | None = None, steady: Course | None = None
+    setup: Rig,
+    settle_ticks: int,
+    slowest_ticks: float,
+    size: float | None = None,
+    steady: Course | None = None,
 ) -> StepMeasured:
     """Step added at the rig's point: what comes back is the step response of T.
 
-    ``size`` is what to begin with, by default a small part of the way to the nearest limit; ``steady`` what
-    `without_step` gives for as many ticks.
+    Parameters
+    ----------
+    setup : Rig
+    settle_ticks : int
+        Length of the run.
+    slowest_ticks : float
+        Slowest time constant of the loop: what the end of a run that does not hold it leaves to come.
+    size : float, optional
+        What to begin with, by default a small part of the way to the nearest limit.
+    steady : Course, optional
+        What `without_step` gives for as many ticks.
     """
     signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
     room = setup.room[signal]
@@ -65,26 +76,29 @@ def step_response(
         if not reason and not bent:
             break
         size *= SMALL_ANGLE_RAD / turned if bent else 0.2
-    figures = _figures(setup, size, settle_ticks, time_s, response, reason)
+    figures = _figures(setup, size, slowest_ticks, time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
         small = small_rig(setup.design, setup.loop, held=setup.held)
         time_s, response, reason, _ = _step(small, size, settle_ticks, without_step(small, settle_ticks))
-        figures = _figures(small, size, settle_ticks, time_s, response, reason)
+        figures = _figures(small, size, slowest_ticks, time_s, response, reason)
     return replace(figures, size=size)
 
 
 def _figures(
-    setup: Rig, size: float, ticks: int, time_s: Floats, response: Floats, reason: str
+    setup: Rig, size: float, slowest_ticks: float, time_s: Floats, response: Floats, reason: str
 ) -> StepMeasured:
     """The figures, to what rounding of the speed leaves of them.
 
     Every tick rounds by half a bit, of which the loop forgets what is older than its rise time.
     """
-    figures = step_figures_of(time_s, response, reason)
-    memory = max(figures.rise_time_s / setup.design.controller.period_s, 2.0)
+    tick_s = setup.design.controller.period_s
+    slowest_s = slowest_ticks * tick_s
+    figures = step_figures_of(time_s, response, slowest_s, reason)
+    memory = max(figures.rise_time_s / tick_s, 2.0)
     if not np.isfinite(memory):
         return figures
-    return step_figures_of(time_s, response, reason, 0.5 * memory * float(speed_bit(setup, ticks)) / size)
+    rounding = 0.5 * memory * float(speed_bit(setup, time_s[-1] / tick_s)) / size
+    return step_figures_of(time_s, response, slowest_s, reason, rounding)
 
 
 def without_step(setup: Rig, settle_ticks: int) -> Course:
@@ -117,44 +131,30 @@ def _step(setup: Rig, size: float, settle_ticks: int, steady: Course) -> tuple[F
 
 
 def step_figures_of(
-    time_s: Floats, response: Floats, reason: str = "", rounding: float = 0.0
+    time_s: Floats, response: Floats, slowest_s: float, reason: str = "", rounding: float = 0.0
 ) -> StepMeasured:
     """Rise (10 to 90 %), overshoot and settling (2 %) at the samples of a response.
 
-    ``rounding`` is what the response may be off by, per unit of the step.
+    ``slowest_s`` is the slowest time constant; ``rounding`` what the response may be off by, per unit of the
+    step.
     """
     final = float(response[-1])
     nothing = float("nan")
     if not np.isfinite(response).all() or final == 0.0:
         return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
-    y = response / final
-    moved, before = _last_changes(y)
-    if not reason and moved > UNSETTLED:
+    y, last = response / final, max(response.size // 10, 2)
+    left = float(carried_on(np.ptp(y[-last:]), time_s[-1] - time_s[-last], slowest_s))
+    if not reason and left > UNSETTLED:
         reason = (
-            f"not settled at the end of the longest run of {time_s[-1]:.3g} s (still moves by {moved:.1g})"
+            f"not settled at the end of the longest run of {time_s[-1]:.3g} s ({left:.1g} of it is to come)"
         )
-    error = _still_to_come(moved, before) + ROUNDING + rounding / abs(final)
+    error = left + ROUNDING + rounding / abs(final)
     settled = [_settled(time_s, y, SETTLED + part * error) for part in (0.0, 1.0, -1.0)]
     rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
     over = max(100.0 * (float(y.max()) - 1.0), 0.0)
     return StepMeasured(
         rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
     )
-
-
-def _last_changes(y: Floats) -> tuple[float, float]:
-    """What the last tenth still moves, and the one before it."""
-    n = max(y.size // 10, 2)
-    return float(np.ptp(y[-n:])), float(np.ptp(y[-2 * n : -n])) if y.size >= 2 * n else 0.0
-
-
-def _still_to_come(moved: float, before: float) -> float:
-    """What a motion that changes by r of itself from tenth to tenth has before it: r + r^2 + ... of the last.
-
-    At least what it moved last: it may swing.
-    """
-    share = min(moved / before, STEADY) if before > 0.0 else 0.0
-    return moved * max(1.0, share / (1.0 - share))
 
 
 def _rise(time_s: Floats, y: Floats) -> float:

@@ -110,8 +110,8 @@ def transient_of(setup: Rig, slowest_ticks: float) -> Transient | None:
     if ticks is None:
         return None
     steady = without_step(setup, ticks)
-    step = step_response(setup, ticks, steady=steady)
-    again = step_response(setup, ticks, 0.5 * step.size, steady) if not step.reason else step
+    step = step_response(setup, ticks, slowest_ticks, steady=steady)
+    again = step_response(setup, ticks, slowest_ticks, 0.5 * step.size, steady) if not step.reason else step
     return Transient(setup, step, replace(again, time_s=step.time_s))
 
 

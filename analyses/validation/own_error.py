@@ -1,4 +1,4 @@
-"""What rounding of a growing angle leaves in a measurement."""
+"""What a measurement is off by itself: transients that have not ended, and rounding of a growing angle."""
 
 from __future__ import annotations
 
@@ -8,14 +8,23 @@ import numpy.typing as npt
 from analyses.validation.rig import Rig, producer
 
 Floats = npt.NDArray[np.float64]
+ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
 FEW_BITS = 8.0  # a motion beyond so many last bits of the angle spreads its rounding
+
+
+def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
+    """What a transient that changes by d from one window W to the next still holds.
+
+    ``d/(1 - exp(-W/tau))`` with its time constant tau.
+    """
+    return change / -np.expm1(-np.asarray(window) / slowest)
 
 
 def speed_bit(setup: Rig, ticks: npt.ArrayLike) -> Floats:
     """The last bit of the speed after so many ticks on the bias motion, as it is seen at the point.
 
-    That of the speed w itself, ``ulp(w)``.  A speed made from angles divides also the last bit of the angle by
-    the time between them: ``ulp(w t)/t_d`` (a difference) or ``2 b ulp(w t)`` (a tracking estimator of
+    That of the speed w itself, ``ulp(w)``.  A speed made from angles divides also the last bit of the angle
+    by the time between them: ``ulp(w t)/t_d`` (a difference) or ``2 b ulp(w t)`` (a tracking estimator of
     bandwidth b).  The controllers in front of the point multiply it.  0 where none of them sees the speed.
 
     Returns
