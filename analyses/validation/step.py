@@ -24,8 +24,8 @@ class StepMeasured:
 
     ``reason`` is empty where neither a limit nor a reversal took part.  ``error`` is the relative error of
     the final value (what its last tenth moves, carried on to the end of the slowest mode, and rounding), the
-    other two what it does to the times.  ``size`` is
-    that of the step, in the unit of the point; the response is per unit.
+    other two what it does to the times.  ``size`` is that of the step, in the unit of the point; the response
+    is per unit.  ``to_come`` is the part of the error by which the response has not ended.
     """
 
     rise_time_s: float
@@ -39,6 +39,7 @@ class StepMeasured:
     rise_error_s: float = 0.0
     settling_error_s: float = 0.0
     size: float = 0.0
+    to_come: float = 0.0
 
 
 Course = tuple[Floats, Floats]  # in front of the instrument, and of the output
@@ -153,7 +154,17 @@ def step_figures_of(
     rises = [_rise(time_s, y * (1.0 + part * error)) for part in (0.0, 1.0, -1.0)]
     over = max(100.0 * (float(y.max()) - 1.0), 0.0)
     return StepMeasured(
-        rises[0], over, settled[0], final, time_s, response, reason, error, _spread(rises), _spread(settled)
+        rises[0],
+        over,
+        settled[0],
+        final,
+        time_s,
+        response,
+        reason,
+        error,
+        _spread(rises),
+        _spread(settled),
+        to_come=left,
     )
 
 

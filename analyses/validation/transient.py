@@ -83,7 +83,7 @@ class Transient:
 
         T, S = np.abs(sweep.closed_loop), np.abs(sweep.sensitivity)
         both = maximum_filter1d(sweep.unsteadiness * T, 2 * BESIDE + 1)
-        own = both + self.step.error * abs(self.step.final_value)
+        own = both + self.step.to_come * abs(self.step.final_value)
         return {"open_loop": own / (T * S), "closed_loop": own / T, "sensitivity": own / S}
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import exp
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,12 +16,15 @@ from analyses.validation.confirm import (
     Confirmation,
     confirm_margins,
     instrument_delay,
+    oscillation_hz,
     point_questions,
     stage_questions,
 )
 from analyses.validation.release import release_margins
-from analyses.validation.rig import rig
+from analyses.validation.rig import rig, small_rig
 from analyses.validation.sweep import settling_ticks_of
+from analyses.validation.validate import _Work
+from tests.validation.random_drives import full_drive
 
 SMALL = Settings(
     frequencies=12,
@@ -183,3 +187,46 @@ def test_a_loop_that_alternates_at_its_border() -> None:
     assert item.border.value == pytest.approx((1.0 + a) / (b * at_minus_one), rel=1e-6)
     assert item.border.frequency_hz == pytest.approx(0.5 / Ts)
     assert item.passed
+
+
+def test_the_frequency_of_a_border_below_any_grid() -> None:
+    """Three integrators and two zeros at a, ``L = K (z - a)^2/(z - 1)^3``: it oscillates below a gain.
+
+    With ``z = exp(j theta)`` on the circle ``z - 1 = 2j sin(theta/2) exp(j theta/2)``, so that
+    ``z - a = r exp(j (pi/4 + 3 theta/4))``, ``r^2 K = 8 sin(theta/2)^3``: imaginary and real part give r, a.
+    """
+    theta, T = 4e-5, 1e-3
+    turn = 0.25 * np.pi + 0.75 * theta
+    r = np.sin(theta) / np.sin(turn)
+    c = (2.0 * np.sin(0.5 * theta) ** 2 + r * np.cos(turn)) / theta  # (1 - a)/theta
+    K = 8.0 * np.sin(0.5 * theta) ** 3 / r**2
+    open_loop = SimpleNamespace(  # in s = (z - 1)/theta, where its poles lie apart
+        A=np.eye(3) + theta * np.eye(3, k=-1),
+        B=np.array([[theta], [0.0], [0.0]]),
+        C=np.array([[1.0, 2.0 * c, c**2]]),
+        D=np.zeros((1, 1)),
+    )
+    loop = SimpleNamespace(plain_open=open_loop, period_s=T)
+    assert oscillation_hz(loop, gain=K / theta) == pytest.approx(theta / (2.0 * np.pi * T), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("seed", "kind", "hertz"), [(30005, "gain up", 0.00572), (30011, "gain down", 0.0822)]
+)
+def test_an_oscillation_that_is_slow_against_its_tick_is_followed(seed: int, kind: str, hertz: float) -> None:
+    """Periods of 189 000 and 52 000 ticks, taken for another mode and for a drift: 22.6 dB for 1.9."""
+    design = full_drive(seed)
+    work = _Work(design, SMALL, None, design)
+    work.loops = work._assemble()
+    asked = point_questions({"u": small_rig(work.linear, "u")}, work.loops, 1000)
+    (item,) = confirm_margins([one for one in asked if one.kind == kind])
+    assert item.predicted_hz == pytest.approx(hertz, rel=1e-2)
+    assert item.border.value == pytest.approx(item.predicted, rel=1e-4)
+    assert item.passed
+
+
+def test_an_oscillation_too_slow_to_be_followed_is_said() -> None:
+    setup = rig(load_design("ilr33-amber"), "velocity")
+    (border,) = find_borders([Search(setup, "gain up", 1e-3, 1000)])
+    assert border.value is None
+    assert "too many ticks" in border.unknown

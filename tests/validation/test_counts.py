@@ -18,6 +18,7 @@ from analyses.validation.counts import Counts, counted_gain, counts_of, linear_r
 from analyses.validation.sweep import settling_ticks_of
 from nonlinear import commands, simulate
 from reports.sections.counts import section
+from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")
 
@@ -123,3 +124,10 @@ def test_the_report_says_it_in_a_sentence() -> None:
     assert "steps of 61.4 rad/s in the speed estimate" in made["result"]
     assert "the drive comes to rest" in made["result"]
     assert made["status"] == "info"
+
+
+def test_a_drive_that_only_friction_holds_has_no_linear_amplitude() -> None:
+    """Seed 40018: without friction its response grows without bound; NaN was compared with NaN."""
+    design = full_drive(40018)
+    found = counts_of(design, assemble_loops(design), 9020)
+    assert all(np.isinf(one.off).all() and one.linear_seen_rad is None for one in found)

@@ -18,6 +18,8 @@ from analyses.large_signal.map import AmplitudeMap, amplitude_map
 from analyses.large_signal.steady_start import PLACES, linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.static_threshold import static_threshold
+from analyses.validation.bench import on_the_bench
+from tests.validation.random_drives import full_drive
 
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
 
@@ -234,3 +236,18 @@ def test_every_start_has_a_state_of_the_linear_drive() -> None:
         for state in assemble_loops(load_design(name)).tick_system.states
     }
     assert set(PLACES) <= names
+
+
+@pytest.mark.parametrize(
+    ("seed", "frequency"),
+    [
+        (30007, 6),  # an integral clamped by the start of a torque filter: 3 % early
+        (20020, 13),  # a derivative part at its start held the voltage at its limit, from half the border on
+    ],
+)
+def test_a_start_up_that_reaches_a_limit_moves_no_border(seed: int, frequency: int) -> None:
+    design = full_drive(seed)
+    border = check_border(design, assemble_loops(on_the_bench(design)))
+    assert border is not None
+    assert border.passed
+    assert border.ratio[frequency] == pytest.approx(1.0, abs=1e-3)

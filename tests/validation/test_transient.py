@@ -167,3 +167,16 @@ def test_the_transient_is_that_of_the_running_drive() -> None:
     assert transient is not None
     again = transient.sweep(sines.frequency_hz)
     np.testing.assert_allclose(again.closed_loop, sines.closed_loop, rtol=2e-5)
+
+
+def test_a_coupling_that_comes_free_between_two_ticks_is_seen() -> None:
+    """Seed 40004 at 598 Hz: pressed at every tick, and free in between; the response was off by 0.5 %."""
+    design = full_drive(40004)
+    work = _Work(design, TRIAL, None, design)
+    work.loops = work._assemble()
+    sweep = work._answer()
+    assert sweep is not None
+    k = int(np.argmin(np.abs(sweep.frequency_hz - 598.0)))
+    assert sweep.amplitude[k] < 0.1 * sweep.amplitude[0]  # a smaller one, that leaves the coupling pressed
+    linear = linear_response(work.answer_loops.reference_to_output, sweep.frequency_hz)
+    np.testing.assert_allclose(sweep.closed_loop, linear, rtol=1e-5)

@@ -1,0 +1,50 @@
+"""Step responses as measured: their final value, and the error that it states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analyses.validation.result import LoopValidation
+from analyses.validation.step import UNSETTLED, step_figures_of
+from analyses.validation.validate import _Work
+from tests.validation.random_drives import TRIAL, full_drive
+
+T = 1e-3
+
+
+@pytest.mark.parametrize("share", [2e-3, 1e-5, 0.0])
+@pytest.mark.parametrize("slow_s", [2.0, 50.0, 3e3])
+def test_a_creeping_end_is_carried_on(share: float, slow_s: float) -> None:
+    """``y = 1 - (1 - p) exp(-t/0.1) - p exp(-t/tau)`` ends at 1; after 2 s ``p exp(-2/tau)`` is left."""
+    t = T * np.arange(2001)
+    y = 1.0 - (1.0 - share) * np.exp(-t / 0.1) - share * np.exp(-t / slow_s)
+    figures = step_figures_of(t, y, slow_s)
+    left = share * np.exp(-t[-1] / slow_s)
+    assert abs(1.0 / figures.final_value - 1.0) <= figures.error * (1.0 + 1e-3)
+    fast = 1.4e-8 * (1.0 + slow_s / 0.2)  # what the fast part moves in the last 0.2 s, carried on as well
+    assert figures.to_come <= 1.2 * left + fast
+    assert (figures.reason != "") == (left > UNSETTLED)
+
+
+def measured(seed: int, name: str) -> LoopValidation:
+    design = full_drive(seed)
+    work = _Work(design, TRIAL, None, design)
+    work.loops = work._assemble()
+    return work._loop(name, work.loops.present[name], 1.0)
+
+
+def test_a_final_value_is_known_to_the_rounding_of_the_speed() -> None:
+    """Seed 20016: a speed of two bits a step, where each tick moves it by less than half a bit."""
+    step = measured(20016, "velocity").measured.step  # type: ignore[union-attr]
+    off = abs(step.final_value - 1.0)  # a current controller with an integral: speed is what is commanded
+    assert 1e-6 < off < 3.0 * step.error < 1e-4
+
+
+def test_a_mode_that_no_run_holds_leaves_the_final_value_unknown() -> None:
+    """Seed 41051: an integral of 10 387 s in a run of 291 s; 1.6e-3 were missing, unseen."""
+    loop = measured(41051, "position")
+    assert loop.measured is not None
+    step = loop.measured.step
+    assert step.error == pytest.approx(step.final_value - 1.0, rel=0.05)
+    assert "not settled" in step.reason
