@@ -171,11 +171,22 @@ def standing(design: Design) -> BiasMotion:
 
 def full_torque_Nm(design: Design) -> float:
     """Torque that the motor reaches at its limits, at standstill."""
+    return _torque_Nm(design, design.limits.peak_current_A)
+
+
+def lasting_torque_Nm(design: Design) -> float:
+    """The same that an overload protection leaves for long."""
+    limits = design.limits
+    lasting = inf if limits.peak_time_s is None else limits.continuous_current_A
+    return _torque_Nm(design, min(limits.peak_current_A, lasting))
+
+
+def _torque_Nm(design: Design, current_A: float) -> float:
     motor, limits = design.effective_motor, design.limits
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V * limits.voltage_V
     short = limits.voltage_V / (motor.resistance_ohm or 1.0)
-    return (motor.torque_constant_Nm_A or 0.0) * min(limits.peak_current_A, short)
+    return (motor.torque_constant_Nm_A or 0.0) * min(current_A, short)
 
 
 def _felt(design: Design) -> float:

@@ -23,7 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
-from analyses.validation.bias_motion import full_torque_Nm
+from analyses.validation.bias_motion import lasting_torque_Nm
+from analyses.validation.budget import OutOfTime
 from analyses.validation.confirm import oscillation_hz
 from analyses.validation.release import full_range
 from analyses.validation.rig import points_of
@@ -48,6 +49,7 @@ OWN = tuple(name for name in LIMITERS if name != "profile")  # limits of the dri
 AGAIN = (1, 4, 16)  # times the wait
 WINDOWS = 20.0  # time constants of the loop that are waited for, beside the travel
 SETTLED = 14.0  # time constants in the settling ticks
+LONGEST_TICKS = 40_000_000  # of a run
 LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
 
 
@@ -270,21 +272,21 @@ def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, flo
     given that time.
     """
     for longer in AGAIN:
-        low, high = _bisected(design, longer * settle_ticks)
+        low, high = _bisected(design, settle_ticks, longer)
         if high is None:
             break
-        if not settles(design, np.array([high]), AGAIN[1] * longer * settle_ticks)[0]:
+        if not settles(design, np.array([high]), settle_ticks, AGAIN[1] * longer)[0]:
             return low, high
     return None, None
 
 
-def _bisected(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
+def _bisected(design: Design, settle_ticks: int, longer: int) -> tuple[float | None, float | None]:
     """The threshold with one time to settle; 0 where not even the smallest step tried settles."""
     full = design.validation.full_deflection_rad
     sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS)
     low, high, least = 0.0, None, SMALLEST_PART
     while True:
-        bad = np.flatnonzero(~settles(design, sizes, settle_ticks))
+        bad = np.flatnonzero(~settles(design, sizes, settle_ticks, longer))
         if not bad.size:
             if high is None:
                 return None, None
@@ -300,7 +302,7 @@ def _bisected(design: Design, settle_ticks: int) -> tuple[float | None, float | 
         sizes = np.geomspace(low, high, STEPS + 2)[1:-1]
 
 
-def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray[np.bool_]:
+def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> npt.NDArray[np.bool_]:
     """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
 
     An error larger than the step itself does not count as falling: an irregular swing against a limit has a
@@ -308,9 +310,18 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int) -> npt.NDArray
 
     A controller without an integral comes to rest beside its target where the load has a slope; a drive that
     stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
-    is kept going by something else (`lasting_rad`).
+    is kept going by something else (`lasting_rad`).  A swing against a limit dies out by a constant amount a
+    period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
+
+    Raises
+    ------
+    OutOfTime
+        Where one run would take most of the time of a validation.
     """
-    result = step_rows(design, sizes_rad, settle_ticks).run()
+    rows = step_rows(design, sizes_rad, settle_ticks, longer)
+    if rows["ticks"].max() > LONGEST_TICKS:
+        raise OutOfTime
+    result = rows.run()
     errors = []
     for last in (0, 1):
         low, high = result.span("output_angle_rad", last)
@@ -338,7 +349,7 @@ def lasting_rad(design: Design, settle_ticks: int) -> float:
     """
     full = design.validation.full_deflection_rad
     sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, 3)
-    result = step_rows(design, sizes, AGAIN[1] * settle_ticks).run()
+    result = step_rows(design, sizes, settle_ticks, AGAIN[1]).run()
     spans = [np.subtract(*result.span("output_angle_rad", last)[::-1]) for last in (0, 1)]
     limited = _limited(result)
     goes_on = result.ok & (limited == 0.0) & (spans[0] > RESTING * sizes) & (spans[0] > LASTING * spans[1])
@@ -362,16 +373,16 @@ def _standing(design: Design) -> float:
     return 2.0 * dry / (per_unit * gain) / design.total_ratio + play
 
 
-def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int) -> Rows:
-    """Runs of steps from rest, long enough to travel and to settle."""
+def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> Rows:
+    """Runs of steps from rest, long enough to travel and to settle, with windows ``longer`` times as long."""
     rows = Rows.of(design, sizes_rad.size)
     way, tick_s = sizes_rad * design.total_ratio, design.controller.period_s
     asked, ratio = design.command, design.total_ratio  # a profile may be slower than the drive
     speed = min(full_range(design)["velocity"], asked.rate_rad_s * ratio)
-    speeding = min(full_torque_Nm(design) / design.inertia_kgm2, asked.acceleration_rad_s2 * ratio)
+    speeding = min(lasting_torque_Nm(design) / design.inertia_kgm2, asked.acceleration_rad_s2 * ratio)
     travel = way / (speed * tick_s)
     swing = 4.0 * (np.sqrt(2.0 * way / speeding) + np.cbrt(way / (asked.jerk_rad_s3 * ratio))) / tick_s
-    window = np.ceil(np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
+    window = np.ceil(longer * np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
     rows["ticks"] = np.ceil(2.0 * travel) + 4 * window
     rows.window(window, 1, 0)
     rows.step("command", sizes_rad)
@@ -390,7 +401,7 @@ class _End:
 
 def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
     """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
-    result = step_rows(design, np.array([size_rad]), AGAIN[1] * settle_ticks).run()
+    result = step_rows(design, np.array([size_rad]), settle_ticks, AGAIN[1]).run()
     spans = [float(np.subtract(*result.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
     used = result.window_limit_fraction if result.ok[0] else result.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in OWN}

@@ -33,27 +33,44 @@ def _reference() -> ModuleType:
 def output_of_step(design: Design, size_rad: float, ticks: int, parts: int = 4) -> np.ndarray:
     """The output angle (rad) at every tick after a step of the command from rest.
 
-    For a rigid drive without dry friction of the switching law: J dw/dt = kM i - Tc tanh(w/w_s) - b w + c th,
-    L di/dt = u - R i - kE w, u the controller's voltage, one computing delay late.
+    For a rigid drive: J dw/dt = kM i - F(w) - b w + c th, L di/dt = u - R i - kE w, u the controller's voltage,
+    one computing delay late.  F is Tc tanh(w/w_s), or Tc sign(w): then a part of a tick that would reverse the
+    speed ends at rest, where the drive stays until the torque exceeds that of breakaway.
     """
     motor, friction, N = design.effective_motor, design.friction, design.total_ratio
     R, L = motor.resistance_ohm or 0.0, motor.inductance_H or 1.0
     kM, kE = motor.torque_constant_Nm_A or 0.0, motor.back_emf_constant_Vs_rad or 0.0
     J, b = design.inertia_kgm2, friction.viscous_Nms_rad
     Tc, ws, off = friction.dry_torque_Nm, friction.smoothing_speed_rad_s, friction.offset_torque_Nm
-    assert friction.law == "tanh" or Tc == 0.0
+    back = Tc if friction.dry_torque_reverse_Nm is None else friction.dry_torque_reverse_Nm
+    switching = friction.law == "coulomb" and Tc > 0.0
     assert design.coupling is None
+    assert not friction.points
     slope = design.load.moment_slope_Nm_rad / N**2 if design.load.path == "back-drivable" else 0.0
+    sense = 0.0  # of the motion, for the switching law
 
     def rate(x: tuple[float, float, float], u: float) -> tuple[float, float, float]:
         i, w, th = x
-        dry = Tc * tanh(w / ws) if Tc else 0.0
-        return (u - R * i - kE * w) / L, (kM * i - dry - b * w - off + slope * th) / J, w
+        if switching:
+            dry = Tc if sense > 0.0 else -back
+        else:
+            dry = Tc * tanh(w / ws) if Tc else 0.0
+        bent = 0.0 if switching and sense == 0.0 else (kM * i - dry - b * w - off + slope * th) / J
+        return (u - R * i - kE * w) / L, bent, w
+
+    def sense_of(x: tuple[float, float, float]) -> float:
+        if x[1] != 0.0:
+            return 1.0 if x[1] > 0.0 else -1.0
+        torque = kM * x[0] - off + slope * x[2]
+        loose = (Tc if torque > 0.0 else back) * friction.breakaway_ratio
+        return 0.0 if abs(torque) <= loose else (1.0 if torque > 0.0 else -1.0)
 
     def run(x: tuple[float, float, float], u: float, span: float) -> tuple[float, float, float]:
+        nonlocal sense
         n = max(ceil(parts * span / Ts), 1)
         h = span / n
         for _ in range(n):
+            sense = sense_of(x)
             k1 = rate(x, u)
             k2 = rate(tuple(a + 0.5 * h * k for a, k in zip(x, k1, strict=True)), u)  # type: ignore[arg-type]
             k3 = rate(tuple(a + 0.5 * h * k for a, k in zip(x, k2, strict=True)), u)  # type: ignore[arg-type]
@@ -62,6 +79,8 @@ def output_of_step(design: Design, size_rad: float, ticks: int, parts: int = 4) 
             x = tuple(  # type: ignore[assignment]
                 a + h / 6.0 * (p + 2.0 * q + 2.0 * r + s) for a, (p, q, r, s) in zip(x, slopes, strict=True)
             )
+            if switching and x[1] * sense < 0.0:
+                x = (x[0], 0.0, x[2])
         return x
 
     Ts, delay = design.controller.period_s, design.controller.computing_delay_s
