@@ -32,9 +32,13 @@ def breakaway_entry(design: Design, model: Design) -> Entry | None:
     friction, name = design.friction, design.controller.outermost
     if friction.dry_Nm(0.0) == 0.0 and not friction.points:
         return None
+    condition = CONDITION
+    if design.load.gravity is not None:  # which pulls at rest: friction is what is asked for
+        condition = f"{CONDITION}, without the load's weight"
+        design, model = (replace(one, load=replace(one.load, gravity=None)) for one in (design, model))
     reason = _not_comparable(design)
     if reason:
-        return not_judged(name, "breakaway_torque", "N*m", None, None, reason, CONDITION)
+        return not_judged(name, "breakaway_torque", "N*m", None, None, reason, condition)
     scale = float(breakaway_torque_Nm(_relaxed(design), 0.0, 1))
     low, high = _started(design, WIDE[0] * scale, WIDE[1] * scale)
     if high is not None:
@@ -42,15 +46,13 @@ def breakaway_entry(design: Design, model: Design) -> Entry | None:
         low, high = _started(design, NEAR[0] * middle, NEAR[1] * middle)
     predicted = float(breakaway_torque_Nm(_relaxed(model), 0.0, 1))
     found = Reading(None) if high is None else Reading(0.5 * (low + high), 0.5 * (high - low))
-    return entry(name, "breakaway_torque", "N*m", predicted, found, CONDITION)
+    return entry(name, "breakaway_torque", "N*m", predicted, found, condition)
 
 
 def _not_comparable(design: Design) -> str:
     """Why a ramp of torque does not show the static friction; empty where it does."""
     if design.friction.law == "tanh":
         return "the tanh law has no friction at rest"
-    if design.load.gravity is not None:
-        return "the load's weight pulls at rest"
     behind = design.load.friction if design.coupling is not None else None
     free = behind is not None and abs(behind.offset_torque_Nm) > behind.dry_torque_Nm
     motor = _relaxed(design)
