@@ -33,9 +33,9 @@ def _reference() -> ModuleType:
 def output_of_step(design: Design, size_rad: float, ticks: int, parts: int = 4) -> np.ndarray:
     """The output angle (rad) at every tick after a step of the command from rest.
 
-    For a rigid drive: J dw/dt = kM i - F(w) - b w + c th, L di/dt = u - R i - kE w, u the controller's voltage,
-    one computing delay late.  F is Tc tanh(w/w_s), or Tc sign(w): then a part of a tick that would reverse the
-    speed ends at rest, where the drive stays until the torque exceeds that of breakaway.
+    For a rigid drive: J dw/dt = kM i - F(w) - b w + c th, L di/dt = u - R i - kE w, u the controller's
+    voltage, one computing delay late.  F is Tc tanh(w/w_s), or Tc sign(w): then a part of a tick that would
+    reverse the speed ends at rest, where the drive stays until the torque exceeds that of breakaway.
     """
     motor, friction, N = design.effective_motor, design.friction, design.total_ratio
     R, L = motor.resistance_ohm or 0.0, motor.inductance_H or 1.0
@@ -51,10 +51,9 @@ def output_of_step(design: Design, size_rad: float, ticks: int, parts: int = 4) 
 
     def rate(x: tuple[float, float, float], u: float) -> tuple[float, float, float]:
         i, w, th = x
+        dry = Tc * tanh(w / ws) if Tc and not switching else 0.0
         if switching:
             dry = Tc if sense > 0.0 else -back
-        else:
-            dry = Tc * tanh(w / ws) if Tc else 0.0
         bent = 0.0 if switching and sense == 0.0 else (kM * i - dry - b * w - off + slope * th) / J
         return (u - R * i - kE * w) / L, bent, w
 
