@@ -14,7 +14,9 @@ from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.conditional import step_rows
 from analyses.validation.ledger import Entry, entry, not_judged
+from analyses.validation.own_error import carried_on
 from analyses.validation.reading import Reading, first_fall
+from analyses.validation.step import UNSETTLED
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -27,7 +29,8 @@ class RestSteps:
     """Steps of the command from rest, one entry an amplitude; NaN where a level is not reached.
 
     ``final_ratio`` is where each ends, over its command: a P controller against a load that changes with the
-    angle does not end at 1.
+    angle does not end at 1.  ``error`` is what it is off by, relative: what its last window moves, carried on
+    to the end of the slowest mode; the other two what that does to the times.
     """
 
     amplitude_rad: Floats
@@ -35,28 +38,53 @@ class RestSteps:
     overshoot_percent: Floats
     settling_time_s: Floats
     final_ratio: Floats
+    error: Floats
+    rise_error_s: Floats
+    settling_error_s: Floats
     reasons: tuple[str, ...]
 
 
-def steps_from_rest(design: Design, settle_ticks: int) -> RestSteps:
-    """Step the command to each amplitude that the design names, with friction and limits."""
+def steps_from_rest(design: Design, settle_ticks: int, slowest_ticks: float) -> RestSteps:
+    """Step the command to each amplitude that the design names, with friction and limits.
+
+    ``settle_ticks`` are waited for; ``slowest_ticks`` is the slowest time constant, which they need not hold.
+    """
     full = design.validation.full_deflection_rad
     amplitude = full * np.array(design.validation.amplitude_fractions)
     rows = step_rows(design, amplitude, settle_ticks)
     rows.step_figures(amplitude)
     result = rows.run()
     final = result.step.final_ratio
+    low, high = result.span("output_angle_rad")
+    moved = np.abs((high - low) / (amplitude * np.where(final == 0.0, 1.0, final)))
+    error = carried_on(moved, rows["window"], max(slowest_ticks, 1.0))
     if (np.isfinite(final) & (np.abs(final - 1.0) > AT_TARGET)).any():  # figures are those of the final value
         rows.step_figures(amplitude * np.where(np.isfinite(final) & (final > 0.0), final, 1.0))
         result = rows.run()
     step = result.step
+    reasons = [_reason(design, result, k) for k in range(amplitude.size)]
+    spread = np.zeros((2, amplitude.size))
+    if not all(reasons):  # what is judged is read about a final value that is off by its error, too
+        targets = rows["step_target"].copy()
+        for side in (-1.0, 1.0):
+            rows.step_figures(targets * (1.0 + side * np.minimum(error, UNSETTLED)))
+            other = rows.run().step
+            moves = [other.rise_time_s - step.rise_time_s, other.settling_time_s - step.settling_time_s]
+            spread = np.maximum(spread, np.nan_to_num(np.abs(moves)))
+        reasons = [
+            reason or (f"not settled at the end of its run ({left:.1g} of it is to come)" if late else "")
+            for reason, left, late in zip(reasons, error, error > UNSETTLED, strict=True)
+        ]
     return RestSteps(
         amplitude,
         step.rise_time_s,
         step.overshoot_percent,
         step.settling_time_s,
         final,
-        tuple(_reason(design, result, k) for k in range(amplitude.size)),
+        error,
+        spread[0],
+        spread[1],
+        tuple(reasons),
     )
 
 
@@ -98,19 +126,35 @@ def rest_entries(
     """Ledger entries from rest: judged only where neither a limit nor friction takes part."""
     dc = float(steps.final_ratio[0])
     dc = dc if not steps.reasons[0] and np.isfinite(dc) and dc > 0.0 else 1.0
-    rows = [] if sweep is None else _sweep_entries(design, figures, sweep, dc)
+    off = float(steps.error[0]) if dc != 1.0 else 0.0
+    rows = [] if sweep is None else _sweep_entries(design, figures, sweep, dc, off)
     if figures.step is None:
         return rows
     sample = figures.step.period_s or 0.0  # both are read at samples
     scale, unit = (1e3, "mm") if design.axis == "linear" else (degrees(1.0), "deg")
     for k, amplitude in enumerate(steps.amplitude_rad):
         condition = f"from rest, step of {amplitude * scale:.3g} {unit} of the command (with feed-forward)"
-        for quantity, of, wanted, seen, least in (
-            ("rise_time", "s", figures.step.rise_time_s, steps.rise_time_s[k], sample),
-            ("overshoot", "%", figures.step.overshoot_percent, steps.overshoot_percent[k], STEP_PERCENT),
-            ("settling_time", "s", figures.step.settling_time_s, steps.settling_time_s[k], sample),
+        over = 100.0 * steps.error[k]
+        for quantity, of, wanted, seen, error, least in (
+            ("rise_time", "s", figures.step.rise_time_s, steps.rise_time_s[k], steps.rise_error_s[k], sample),
+            (
+                "overshoot",
+                "%",
+                figures.step.overshoot_percent,
+                steps.overshoot_percent[k],
+                over,
+                STEP_PERCENT,
+            ),
+            (
+                "settling_time",
+                "s",
+                figures.step.settling_time_s,
+                steps.settling_time_s[k],
+                steps.settling_error_s[k],
+                sample,
+            ),
         ):
-            reading = Reading(float(seen) if np.isfinite(seen) else None)
+            reading = Reading(float(seen), float(error)) if np.isfinite(seen) else Reading(None)
             rows.append(_judge(quantity, of, condition, wanted, reading, steps.reasons[k], least))
     return rows
 
@@ -130,7 +174,9 @@ def _judge(
     return entry("position", quantity, unit, predicted, reading, condition, least)
 
 
-def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep, dc: float) -> list[Entry]:
+def _sweep_entries(
+    design: Design, figures: LoopFigures, sweep: RestSweep, dc: float, dc_error: float
+) -> list[Entry]:
     """Bandwidths without bias motion, of the response over its value at zero frequency."""
     band = figures.bandwidth
     if band is None:
@@ -147,7 +193,7 @@ def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep, dc: f
     spread = float(sweep.unsteadiness.max())
     rows = []
     for quantity, predicted, values, level, error in (
-        ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5), spread),
+        ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5), spread + dc_error),
         ("bandwidth_90deg", band.minus90deg_hz, phase, -90.0, float(np.degrees(spread))),
     ):
         result = first_fall(sweep.frequency_hz, values, level, error)

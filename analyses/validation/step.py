@@ -144,7 +144,7 @@ def step_figures_of(
     if not np.isfinite(response).all() or final == 0.0:
         return StepMeasured(nothing, nothing, nothing, nothing, time_s, response, reason or "run stopped")
     y, last = response / final, max(response.size // 10, 2)
-    left = float(carried_on(np.ptp(y[-last:]), time_s[-1] - time_s[-last], slowest_s))
+    left = float(carried_on(np.asarray(np.ptp(y[-last:])), time_s[-1] - time_s[-last], slowest_s))
     if not reason and left > UNSETTLED:
         reason = (
             f"not settled at the end of the longest run of {time_s[-1]:.3g} s ({left:.1g} of it is to come)"

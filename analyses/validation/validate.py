@@ -506,7 +506,11 @@ class _Work:
             dry = design.friction.dry_Nm(0.0) > 0.0
             amplitude = free_amplitude(design, self.loops, asked, part)
             sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)
-        return sweep, steps_from_rest(design, settle)
+        loop = self.loops.present["position"]
+        ever = settling_ticks_of(
+            loop.plain_closed, rig(self.linear, "position").hold_ticks, design.name, EVER_TICKS
+        )
+        return sweep, steps_from_rest(design, settle, ever / SETTLE_TIME_CONSTANTS)
 
     def _conditional(self) -> Conditional:
         slow = settling_ticks_of(

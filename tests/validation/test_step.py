@@ -5,8 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from actuator_lti import assemble_loops
+from analyses.loop_figures import loop_figures
+from analyses.validation.from_rest import rest_entries, steps_from_rest
 from analyses.validation.result import LoopValidation
 from analyses.validation.step import UNSETTLED, step_figures_of
+from analyses.validation.sweep import (
+    EVER_TICKS,
+    LONGEST_SETTLE_TICKS,
+    SETTLE_TIME_CONSTANTS,
+    settling_ticks_of,
+)
 from analyses.validation.validate import _Work
 from tests.validation.random_drives import TRIAL, full_drive
 
@@ -48,3 +57,21 @@ def test_a_mode_that_no_run_holds_leaves_the_final_value_unknown() -> None:
     step = loop.measured.step
     assert step.error == pytest.approx(step.final_value - 1.0, rel=0.05)
     assert "not settled" in step.reason
+
+
+def test_a_step_from_rest_that_creeps_on_says_by_how_much() -> None:
+    """Seed 43012: 6.4701 s to settle for 6.4729, by a mode that no run holds; 1.2 ms were allowed."""
+    design = full_drive(43012)
+    loops = assemble_loops(design)
+    loop = loops.present["position"]
+    figures = loop_figures(loop, loops.reference_to_output)
+    settle, ever = (
+        settling_ticks_of(loop.closed_loop, design.controller.position_loop.every, "", most)
+        for most in (LONGEST_SETTLE_TICKS, EVER_TICKS)
+    )
+    steps = steps_from_rest(design, settle, ever / SETTLE_TIME_CONSTANTS)
+    off = np.abs(steps.settling_time_s - figures.step.settling_time_s)
+    assert (off > 1.2e-3).any()  # more than a sample
+    assert (off <= 3.0 * steps.settling_error_s).all()
+    assert (np.abs(steps.final_ratio - 1.0) <= 1.05 * steps.error).all()
+    assert {row.passed for row in rest_entries(design, figures, steps, None)} == {True}

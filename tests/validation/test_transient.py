@@ -23,7 +23,7 @@ from analyses.validation.figures import measure_figures
 from analyses.validation.from_rest import rest_entries, steps_from_rest
 from analyses.validation.response import linear_response
 from analyses.validation.rig import rig
-from analyses.validation.sweep import settling_ticks_of, stepped_sine
+from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, settling_ticks_of, stepped_sine
 from analyses.validation.tolerance import allowed
 from analyses.validation.transient import fourier_sum, is_slow, long_enough, transient_of
 from analyses.validation.validate import _Work
@@ -152,7 +152,7 @@ def test_a_step_from_rest_is_measured_by_its_final_value(stiffness: float) -> No
     loops = assemble_loops(design)
     figures = loop_figures(loops.present["position"], loops.reference_to_output)
     settle = settling_ticks_of(loops.present["position"].closed_loop, 1, "turntable")
-    steps = steps_from_rest(design, settle)
+    steps = steps_from_rest(design, settle, settle / SETTLE_TIME_CONSTANTS)
     np.testing.assert_allclose(steps.final_ratio, gain / (gain + stiffness), rtol=1e-4)
     rows = rest_entries(design, figures, steps, None)
     assert {row.passed for row in rows} == {True}
