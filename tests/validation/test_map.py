@@ -11,7 +11,7 @@ import pytest
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
-from analyses.large_signal.border import check_border
+from analyses.large_signal.border import BorderCheck, check_border
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
@@ -251,3 +251,19 @@ def test_a_start_up_that_reaches_a_limit_moves_no_border(seed: int, frequency: i
     assert border is not None
     assert border.passed
     assert border.ratio[frequency] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("apart", "passed"), [(1e-4, True), (3e-4, False)])
+def test_two_limiters_reached_together_are_both_foreseen(apart: float, passed: bool) -> None:
+    """Seed 3086: the bisection ends in an interval of 2.3e-4, and cannot tell which of two was first in it."""
+    border = BorderCheck(
+        friction_on=False,
+        frequency_hz=np.array([1.0]),
+        predicted_rad=np.array([0.2]),
+        simulated_rad=np.array([0.2]),
+        predicted_limiter=("current",),
+        simulated_limiter=("voltage",),
+        resolution=2.3e-4,
+        each_rad={"current": np.array([0.2]), "voltage": np.array([0.2 * (1.0 + apart)])},
+    )
+    assert border.passed is passed
