@@ -255,7 +255,7 @@ def test_a_start_up_that_reaches_a_limit_moves_no_border(seed: int, frequency: i
 
 @pytest.mark.parametrize(("apart", "passed"), [(1e-4, True), (3e-4, False)])
 def test_two_limiters_reached_together_are_both_foreseen(apart: float, passed: bool) -> None:
-    """Seed 3086: the bisection ends in an interval of 2.3e-4, and cannot tell which of two was first in it."""
+    """Seed 3086: the bisection ends in an interval of 2.3e-4, and cannot tell which was first in it."""
     border = BorderCheck(
         friction_on=False,
         frequency_hz=np.array([1.0]),
