@@ -33,3 +33,7 @@ class UnstableError(InputError):
 
 class NumericalError(ArithmeticError):
     """A calculation that could not be finished to its stated accuracy; the message says what to try."""
+
+
+class TooManyTicks(NumericalError):
+    """Runs that would take longer than anybody waits for; nothing has been computed."""

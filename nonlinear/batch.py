@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, TooManyTicks
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
@@ -161,13 +161,13 @@ def run_rows(
 
     Raises
     ------
-    NumericalError
+    TooManyTicks
         If the runs have more ticks than can be computed in a reasonable time.
     """
     rows = np.ascontiguousarray(rows, dtype=float)
     ticks = float(rows[:, at.TICKS].sum())
     if not ticks <= BATCH_TICKS.most:
-        raise NumericalError(f"{ticks:.3g} ticks to simulate; allowed: {BATCH_TICKS.allowed} in all runs")
+        raise TooManyTicks(f"{ticks:.3g} ticks to simulate; allowed: {BATCH_TICKS.allowed} in all runs")
     series = np.zeros(1) if tables is None else np.ascontiguousarray(tables, dtype=float)
     n = rows.shape[0]
     outs, statuses = np.empty((n, at.OUT_SIZE)), np.empty(n, np.int64)

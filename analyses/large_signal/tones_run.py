@@ -15,7 +15,7 @@ from nonlinear.reduced import BatchResult
 
 Progress = Callable[[int, int], None]
 HARMONICS = 3
-SWELLING = 3
+SWELLING, LONGEST_RISE = 3, 2_000_000  # times; ticks
 BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
 LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
 
@@ -48,8 +48,8 @@ def run_tones(
     insist : bool
         Repeat what has not settled, with a start-up four times as long and several periods more.
     swelling : bool
-        Whether the sine grows from nothing, over `SWELLING` times the settling time: slowly enough for the
-        drive to follow in its steady state.
+        Whether the sine grows from nothing, over `SWELLING` times the settling time and window: slowly enough
+        for the drive to follow in its steady state.
     """
     rows = Rows.of(design, len(which), friction_on=friction_on)
     windows = np.array([t.ticks for t in tones])[which]
@@ -72,10 +72,11 @@ def _swelling(
     rows: Rows, tones: tuple[Tone, ...], which: np.ndarray, amplitude_rad: np.ndarray, settling: int
 ) -> Rows:
     """The same runs, later by the time in which their sines swell."""
-    rise, groups, order = SWELLING * settling, [], []
+    groups, order = [], []
     for k in np.unique(which):
         mine = np.flatnonzero(which == k)
         group = rows.take(mine)
+        rise = min(SWELLING * max(settling, tones[k].ticks), LONGEST_RISE)
         group["ticks"] += rise
         t = np.arange(int(group["ticks"].max()) + 1)
         size = np.sin(0.5 * np.pi * np.minimum(t / rise, 1.0)) ** 2

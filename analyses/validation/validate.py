@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, TooManyTicks
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
@@ -243,7 +243,7 @@ class _Work:
         def refused() -> T | U:
             try:
                 return work()
-            except (InputError, NotMeasured) as error:
+            except (InputError, NotMeasured, TooManyTicks) as error:
                 self.notes.append(f"{name}: not judged: {error}")
                 return otherwise
 
@@ -293,7 +293,7 @@ class _Work:
             except OutOfTime:
                 reason = f"cut: its share of {self.budget.seconds:g} s of processor time was used up"
                 self.budget.cut.append(f"{name} loop: {reason}")
-            except (NotMeasured, InputError) as error:
+            except (NotMeasured, InputError, TooManyTicks) as error:
                 reason = str(error)
         return LoopValidation(name, figures, None, nothing, nothing, None, None, None, None, (), reason)
 

@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from actuator_lti import InputError, load_design
+from actuator_lti.errors import TooManyTicks
 from analyses.validation import QUICK, Settings, Validation, validate
 from analyses.validation.bias_motion import bias_motion, bias_motion_at
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
+from analyses.validation.validate import _Work
 from reports.cli.main import main
 from reports.sections.validation import section
 
@@ -172,3 +174,15 @@ def test_command_fails_on_the_conditional_design(capsys: pytest.CaptureFixture[s
 def test_command_refuses_an_unknown_design(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "no-such-drive"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_runs_that_would_take_too_long_are_not_judged_and_say_so() -> None:
+    """Seed 43112 asked for 3e11 ticks from rest, and that ended as an unforeseen failure."""
+    design = load_design("ilr33-amber")
+    work = _Work(design, QUICK, None, design)
+
+    def endless() -> str:
+        raise TooManyTicks("3e+11 ticks to simulate")
+
+    assert work._within(0.5, "motion from rest", endless, "nothing") == "nothing"
+    assert work.notes == ["motion from rest: not judged: 3e+11 ticks to simulate"]
