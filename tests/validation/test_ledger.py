@@ -185,4 +185,4 @@ def test_runs_that_would_take_too_long_are_not_judged_and_say_so() -> None:
         raise TooManyTicks("3e+11 ticks to simulate")
 
     assert work._within(0.5, "motion from rest", endless, "nothing") == "nothing"
-    assert work.notes == ["motion from rest: not judged: 3e+11 ticks to simulate"]
+    assert "motion from rest: not judged: 3e+11 ticks to simulate" in work.notes
