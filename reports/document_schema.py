@@ -79,6 +79,7 @@ class Column(TypedDict):
     unit: str
     align: Align
     format: Format
+    better: NotRequired[int]
 
 
 @_strict
@@ -119,6 +120,7 @@ class FactItem(TypedDict):
     label: str
     value: Scalar
     unit: str
+    better: NotRequired[int]
 
 
 @_strict

@@ -93,13 +93,15 @@ def _json(result: Corners) -> dict[str, Any]:
 
 
 def _lines(corner: Corner) -> list[str]:
-    from reports.sections.corners import least, unmet
+    from actuator_lti.quantities import CORNERED, QUANTITIES
+    from reports.sections.corners import superlative, unmet, worst
 
     parts = []
-    for attribute, words, unit in (("gain_margin_db", "gain", "dB"), ("phase_margin_deg", "phase", "deg")):
-        result = least(corner, attribute)
-        if result is not None:
-            parts.append(f"least {words} margin {result[0]:.1f} {unit} ({result[1]} loop)")
+    for quantity in (QUANTITIES[name] for name in CORNERED):
+        found = worst(corner, quantity)
+        if found is not None:
+            value, unit = found[0] * quantity.shown[1], quantity.shown[0]
+            parts.append(f"{superlative(quantity)} {quantity.words} {value:.1f} {unit} ({found[1]} loop)")
     missed = unmet(corner)
     parts.append(f"not met: {missed}" if missed else "all met")
     return [f"  {corner.name}: {corner.words}", f"    {', '.join(parts)}"]

@@ -8,7 +8,14 @@ from typing import Any
 
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from actuator_lti.quantities import (
+    DRIVE_QUANTITIES,
+    LOOP_QUANTITIES,
+    LOOPS,
+    QUANTITIES,
+    Quantity,
+    judged_loops,
+)
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, page
@@ -55,6 +62,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "multiples": [list(pair) for pair in _multiples(design)],
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
+        "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
         "requirements": [*_on_loops(design), *_on_drive(design, result.figures)],
         "apart": _apart(design, result.figures),
         "step": _step(design),
@@ -63,6 +71,19 @@ def live_model(design: Design) -> dict[str, Any]:
         "map": _map(design),
         "text": text,
         "patches": places,
+    }
+
+
+def _followed(quantity: Quantity) -> dict[str, Any]:
+    """Give a column of the page's table."""
+    unit, factor = quantity.shown
+    return {
+        "name": quantity.name,
+        "label": quantity.label,
+        "unit": unit,
+        "factor": factor,
+        "timed": quantity.timed,
+        "response": quantity.of_response,
     }
 
 
@@ -89,6 +110,7 @@ def _limit(item: Requirement) -> dict[str, Any]:
         "quantity": item.quantity,
         "words": quantity.words,
         "absolute": quantity.absolute,
+        "timed": quantity.timed,
         "unit": "" if item.unit == "1" else item.unit,
         "minimum": item.minimum,
         "maximum": item.maximum,

@@ -40,7 +40,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     ]
     columns = [
         column("loop", "loop"),
-        column("phase_margin", "phase margin", "deg", format="fix:1"),
+        column("phase_margin", "phase margin", "deg", format="fix:1", better=1),
         column("crossover", "crossover", "rad/s", format="sig:4"),
     ]
     return document(
