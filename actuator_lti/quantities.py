@@ -140,7 +140,7 @@ _LIST = (
     Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
              "margins.modulus_margin", 1, closed=False, size=0.5, heading="Modulus margin"),
     Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
-             "margins.sensitivity_peak_db", -1, closed=False, size=6.0, heading="Peak of S",
+             "margins.sensitivity_peak_db", -1, size=6.0, heading="Peak of S",
              at_a_glance="fix:2", followed=True, tolerance=0.01),
     Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB", "bandwidth (\N{MINUS SIGN}3 dB)",
              "bandwidth.minus3db_hz", 1, heading="\N{MINUS SIGN}3 dB",

@@ -32,7 +32,7 @@ def loop_json(figures: LoopFigures) -> dict[str, Any]:
         "bandwidth_hz": band.minus3db_hz if band else None,
         "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
         "resonance_peak_db": band.resonance_peak_db if band else None,
-        "sensitivity_peak_db": m.sensitivity_peak_db if peaks else None,
+        "sensitivity_peak_db": m.sensitivity_peak_db,
         "complementary_peak_db": peaks.complementary_db if peaks else None,
         "rise_time_s": step.rise_time_s if step else None,
         "overshoot_percent": step.overshoot_percent if step else None,

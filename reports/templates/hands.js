@@ -171,7 +171,6 @@
     if (n <= 0) return { n };
     if (x.doubtful(stage)) return { n: DOUBT };
     const found = Array.from(view(x.figures_at(stage), STABLE + 1));
-    if (found[STABLE] !== 1) found[PLACE.sensitivity_peak] = found[PLACE.modulus_margin] = NaN; // S has no peak there
     return { n, figures: found, period: x.period_of(stage) };
   };
   const respond = (name, hertz) => {
