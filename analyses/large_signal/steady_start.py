@@ -10,6 +10,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
+from actuator_lti.resolvent import states_at
 from analyses.large_signal.formulas import FULL_TRIANGLE
 from analyses.linear_states import without_value
 from nonlinear import Rows
@@ -74,7 +75,7 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
         before.append((A, B))
         A, B = A_j @ A, A_j @ B + B_j[:, 0]
     z = np.exp(1j * omega_rad_s * M * Ts)
-    x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, None], (len(z), n, 1)))[..., 0]
+    x = states_at(A, B[:, None], z)[..., 0]
     th, speed = system.outputs.index("th"), "w_ref" in system.outputs
     output = np.zeros(len(z), dtype=complex)
     for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
