@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
+HALVED = 7  # times that an interval too long on paper is halved
 LARGE = 60  # states: a triangular form pays from here on
 
 
@@ -157,17 +158,13 @@ def sampled_step(system: Any, samples: int) -> np.ndarray:
     return response
 
 
-def nyquist_curve(
-    system: Any, omega_rad_s: np.ndarray, frame: float, passes: int = 7
-) -> tuple[np.ndarray, np.ndarray]:
+def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:
     """Sample L(jw) closely enough for a figure of that half width around -1; NaN where it leaves the frame.
 
     Parameters
     ----------
     frame : float
         Half width of the frame around -1.
-    passes : int
-        How often intervals that are too long on paper are halved.
 
     Returns
     -------
@@ -175,7 +172,7 @@ def nyquist_curve(
     values : ndarray of complex, shape (K,)
     """
     omega, values = omega_rad_s, response_at(system, omega_rad_s)
-    for _ in range(passes):
+    for _ in range(HALVED):
         near = np.abs(values + 1.0) < 2.5 * frame
         long = (np.abs(np.diff(values)) > 0.04 * frame) & (near[1:] | near[:-1])
         if not long.any() or len(omega) > 3000:

@@ -140,9 +140,9 @@ class Panel:
         """Shade a stretch of x."""
         self.items.append(Band(low=low, high=high, across="x", look=Look(**_shade(look)), label=label))
 
-    def band_y(self, low: float, high: float, label: str = "", **look: Any) -> None:
+    def band_y(self, low: float, high: float, **look: Any) -> None:
         """Shade a stretch of y."""
-        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look)), label=label))
+        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look))))
 
     def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
         """Fill outlines."""

@@ -22,10 +22,9 @@ COLOURS = {
     "c7": "#7a5c1e",
 }
 BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
-INK, MUTED, PAPER = "ink", "muted", "paper"
+INK, MUTED = "ink", "muted"
 # lengths of dash and gap; the first is a full line
 DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")
-DOTTED, DASHED = 2, 1
 MARKERS = "osD^v+x"
 HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
 
