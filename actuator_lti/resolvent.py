@@ -10,7 +10,13 @@ _ENTRIES = 1 << 15  # of the matrices solved in one call: what the cache holds
 
 
 def states_at(A: np.ndarray, B: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """(p - A)^-1 B, shape (K, n, m), for A (n, n), B (n, m) and points (K,); NaN at a pole."""
+    """(p - A)^-1 B, shape (K, n, m), for A (n, n), B (n, m) and points (K,); NaN at a pole.
+
+    The states are scaled by powers of two first: of ones of very different size a small response, behind a
+    soft spring say, would keep few digits.
+    """
+    A, scale = _balanced(A)
+    B = B / scale[:, None]
     result = np.empty((len(points), *B.shape), dtype=complex)
     own = np.arange(len(A))
     some = max(_ENTRIES // max(A.size, 1), 1)  # points at once
@@ -19,7 +25,17 @@ def states_at(A: np.ndarray, B: np.ndarray, points: np.ndarray) -> np.ndarray:
         matrix = np.repeat(-A.astype(complex)[None], len(points[part]), axis=0)
         matrix[:, own, own] += points[part, None]
         result[part] = solved_at(matrix, np.broadcast_to(B, (len(matrix), *B.shape)))
-    return result
+    return result * scale[:, None]
+
+
+def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """D^-1 A D with rows and columns of like size, and the diagonal of D."""
+    from scipy.linalg import matrix_balance
+
+    if not A.size or not np.isfinite(A).all():
+        return A, np.ones(len(A))
+    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    return balanced, scale
 
 
 def responses(system: Any, points: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
+from actuator_lti.tree import Tree
 from reports.certain import certain
 from reports.document_schema import (
     SCHEMA,
@@ -313,7 +314,7 @@ def dumps(made: Mapping[str, Any]) -> str:
     return f'{_compact(head)[:-1]},"sections":[\n{lines}\n]}}\n'
 
 
-def loads(content: str, origin: str = "report.json") -> dict[str, Any]:
+def loads(content: str, origin: str = "report.json") -> Tree:
     """Read a document.
 
     Raises
@@ -326,7 +327,7 @@ def loads(content: str, origin: str = "report.json") -> dict[str, Any]:
     return dict(made)
 
 
-def load(path: str | Path) -> dict[str, Any]:
+def load(path: str | Path) -> Tree:
     """Read a document from a file of somebody; see `loads`.
 
     Raises

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from actuator_lti.tree import Tree
 from analyses.loop_figures import LoopFigures
 
 
-def loop_json(figures: LoopFigures) -> dict[str, Any]:
+def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
     m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
     return {

@@ -6,7 +6,7 @@ paper the light colour itself.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 COLOURS = {
     "ink": "#1f2933",
@@ -51,7 +51,24 @@ HATCH_PATHS = {
 }
 
 
-def series(k: int) -> dict[str, Any]:
+class Style(TypedDict, total=False):
+    """How an item of a chart is drawn: fields of `reports.charts.chart.Look` and of a curve, by name."""
+
+    colour: str
+    dash: int
+    width: float
+    opacity: float
+    marker: str
+    size: float
+    hollow: bool
+    fill: str
+    hatch: str
+    every: int
+    line: bool
+    read: bool
+
+
+def series(k: int) -> Style:
     """Give colour and dash of the k-th series."""
     return {"colour": SERIES[k % 7], "dash": k % 7}
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 
@@ -62,7 +63,7 @@ def corners(
     leave_with(result.passed)
 
 
-def _json(result: Corners) -> dict[str, Any]:
+def _json(result: Corners) -> Tree:
     from dataclasses import asdict
 
     return {

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from actuator_lti.tree import Tree
 from reports.nightly.text import one_line
 from reports.verdict_summary import verdict_words
 
@@ -45,7 +46,7 @@ class Verdict:
     what: str = REQUIREMENTS
 
 
-def digest(document: Mapping[str, Any]) -> dict[str, Any]:
+def digest(document: Mapping[str, Any]) -> Tree:
     """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
     verdicts = list(verdicts_of(document))
     figures = list(figures_of(document))

@@ -80,7 +80,7 @@ def test_a_figure_of_the_corners_has_its_corner(monkeypatch) -> None:
     of = QUANTITIES["sensitivity_peak"]
     new = replace(of, name="corner_sensitivity_peak", reader="", source="analysis", cornered=of.name)
     monkeypatch.setitem(CORNERED, of.name, new)
-    tolerant = load_design("fin")
+    tolerant = load_design("ilr33-amber")
     result = {one.name: one for one in corners(tolerant).corners}
 
     def peak(name: str) -> float:
