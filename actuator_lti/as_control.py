@@ -5,7 +5,7 @@ Importing python-control takes a second, and margins, bandwidths and steps do no
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypedDict
 
 from actuator_lti.plain_delays import PlainDelaySystem
 from actuator_lti.plain_system import PlainSystem
@@ -23,13 +23,19 @@ def as_control(system: Any) -> Any:
     if isinstance(system, PlainSystem):
         import control
 
-        names: dict[str, Any] = _names(system)
-        if system.states:
-            names["states"] = [state.replace(".", "_") for state in system.states]
+        more = {"states": [state.replace(".", "_") for state in system.states]} if system.states else {}
         parts = (system.A, system.B, system.C, system.D, system.dt)
-        return control.ss(*parts, remove_useless_states=False, **names)
+        return control.ss(*parts, remove_useless_states=False, **_names(system), **more)
     return system
 
 
-def _names(system: PlainSystem | PlainDelaySystem) -> dict[str, Any]:
+class Names(TypedDict):
+    """Names of a system for python-control."""
+
+    inputs: list[str]
+    outputs: list[str]
+    name: str
+
+
+def _names(system: PlainSystem | PlainDelaySystem) -> Names:
     return {"inputs": [system.source], "outputs": [system.signal], "name": system.name}

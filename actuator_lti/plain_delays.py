@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import InputError
-from actuator_lti.plain_system import PlainSystem, solved_at
+from actuator_lti.plain_system import PlainSystem
+from actuator_lti.resolvent import solved_at
 
 _ALGEBRAIC = 1e12  # condition of an algebraic loop beyond which it has no solution
 

@@ -8,13 +8,12 @@ importing python-control takes longer than the margins of a drive.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    pass
+from actuator_lti.resolvent import responses
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,25 +48,8 @@ class PlainSystem:
     def __call__(self, points: npt.ArrayLike) -> Any:
         """The response at complex points (z; s where ``dt`` is 0), of their shape; inf + nan j at a pole."""
         asked = np.asarray(points, dtype=complex)
-        flat = asked.reshape(-1)
-        matrix = flat[:, None, None] * np.eye(len(self.A)) - self.A
-        inside = solved_at(matrix, np.broadcast_to(self.B, (len(flat), *self.B.shape)))
-        values = np.asarray((self.C @ inside)[:, 0, 0] + self.D[0, 0])
-        values[~np.isfinite(inside).all(axis=(1, 2))] = complex(np.inf, np.nan)
-        return values.reshape(asked.shape)[()]
+        return responses(self, asked.reshape(-1)).reshape(asked.shape)[()]
 
     def poles(self) -> np.ndarray:
         """The eigenvalues of A."""
         return np.asarray(np.linalg.eigvals(self.A).astype(complex) if self.A.size else np.empty(0, complex))
-
-
-def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve stacked equations; NaN where a matrix is singular."""
-    try:
-        return np.linalg.solve(matrices, right)
-    except np.linalg.LinAlgError:
-        singular = np.array([np.linalg.det(each) == 0 for each in matrices])
-        regular = np.where(singular[:, None, None], np.eye(matrices.shape[1]), matrices)
-        solved = np.linalg.solve(regular, right)
-        solved[singular] = np.nan
-        return solved

@@ -33,7 +33,8 @@ class Quantity:
     words : str
         What reports call it.
     reader : str
-        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names.
+        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names; empty where
+        `cornered`.
     source : {"loop", "capability", "stiffness", "analysis"}
         What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
         `actuator_lti.loops.stiffness.StiffnessFigures`, or `analyses.asked_figures.AskedFigures`.
@@ -49,6 +50,15 @@ class Quantity:
         Its usual size: what a distance to a limit of 0 is measured by.
     heading : str
         What the tables of a report call its column; empty where they have none.
+    title : str
+        What stands beside its number elsewhere; `words` with a capital where left out.
+    at_a_glance : str
+        How the first screen of a report writes it, such as ``fix:1``; empty where it does not show it.
+    followed : bool
+        Whether the table of the live page shows it.
+    cornered : str
+        The figure of a loop whose least over loops and corners it is: `analyses.corners` then has a corner
+        with the worst ends of the tolerances for that figure.
     tolerance : float
         In its unit: a smaller difference between two nights is rounding. A part in a thousand of the figure,
         where that is more, counts as none in any case.
@@ -68,19 +78,49 @@ class Quantity:
     size: float = 1.0
     source: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
     heading: str = ""
+    title: str = ""
+    at_a_glance: str = ""
+    followed: bool = False
+    cornered: str = ""
     tolerance: float = 1e-9
+
+    @property
+    def label(self) -> str:
+        """What stands beside its number."""
+        return self.title or self.words[0].upper() + self.words[1:]
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit in which reports write it, and the factor from its own: times of loops are ms."""
+        return ("ms", 1e3) if self.unit == "s" else ("" if self.unit == "1" else self.unit, 1.0)
+
+    @property
+    def direction(self) -> int:
+        """+1 or -1 where more or less of it is better, twice that where its magnitude counts."""
+        return self.better * (2 if self.absolute else 1)
+
+    @property
+    def of_response(self) -> bool:
+        """Whether it is taken of a response to a command, which a loop cut at a break point has not."""
+        return self.reader.startswith(("bandwidth.", "step."))
 
     def unit_for(self, axis: Axis) -> str:
         """The unit in which this figure is reported."""
         return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
 
+    def raw(self, result: Any) -> Any:
+        """What its reader finds; ``None`` where there is none."""
+        for part in self.reader.split("."):
+            result = getattr(result, part, None)
+            if result is None:
+                return None
+        return result
+
     def read(self, result: Any, axis: Axis = "rotary") -> Any:
         """The figure in its unit, from figures of a loop or a `Capability`; ``None`` where there is none."""
-        value = result
-        for part in self.reader.split("."):
-            value = getattr(value, part, None)
-            if value is None:
-                return None
+        value = self.raw(result)
+        if value is None:
+            return None
         if self.absolute:
             return abs(value)
         angular = self.scope != "loop" and self.unit_for(axis).startswith("deg") and "_rad" in self.reader
@@ -90,28 +130,33 @@ class Quantity:
 _LIST = (
     Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down", "gain margin",
              "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0,
-             heading="Gain margin", tolerance=0.01),
+             heading="Gain margin", at_a_glance="fix:1", followed=True, tolerance=0.01),
     Quantity("phase_margin", "deg", "loop", "smallest phase margin", "phase margin",
              "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0,
-             heading="Phase margin", tolerance=0.05),
+             heading="Phase margin", at_a_glance="fix:1", followed=True, tolerance=0.05),
     Quantity("delay_margin", "s", "loop", "smallest delay margin", "delay margin",
-             "margins.delay_margin_s", 1, heading="Delay margin", tolerance=1e-07),
+             "margins.delay_margin_s", 1, heading="Delay margin", at_a_glance="sig:3", followed=True,
+             tolerance=1e-07),
     Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
              "margins.modulus_margin", 1, closed=False, size=0.5, heading="Modulus margin"),
     Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
-             "margins.sensitivity_peak_db", -1, closed=False, size=6.0, heading="Peak of S", tolerance=0.01),
+             "margins.sensitivity_peak_db", -1, size=6.0, heading="Peak of S",
+             at_a_glance="fix:2", followed=True, tolerance=0.01),
     Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB", "bandwidth (\N{MINUS SIGN}3 dB)",
-             "bandwidth.minus3db_hz", 1, heading="\N{MINUS SIGN}3 dB"),
+             "bandwidth.minus3db_hz", 1, heading="\N{MINUS SIGN}3 dB",
+             title="\N{MINUS SIGN}3\N{NO-BREAK SPACE}dB bandwidth", at_a_glance="sig:3", followed=True),
     Quantity("bandwidth_90deg", "Hz", "loop", "closed loop -90 deg", "bandwidth (\N{MINUS SIGN}90°)",
              "bandwidth.minus90deg_hz", 1, heading="\N{MINUS SIGN}90°"),
     Quantity("resonance_peak", "dB", "loop", "peak of |T| over its value at DC", "resonance peak",
              "bandwidth.resonance_peak_db", -1, size=6.0, heading="Resonance", tolerance=0.01),
     Quantity("overshoot", "%", "loop", "of the step of the closed loop", "overshoot",
-             "step.overshoot_percent", -1, timed=True, size=10.0, heading="Overshoot", tolerance=0.05),
+             "step.overshoot_percent", -1, timed=True, size=10.0, heading="Overshoot",
+             followed=True, tolerance=0.05),
     Quantity("rise_time", "s", "loop", "10 % to 90 %", "rise time", "step.rise_time_s", -1, timed=True,
              heading="Rise 10–90 %", tolerance=1e-07),
     Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
-             "step.settling_time_s", -1, timed=True, heading="Settling 2 %", tolerance=1e-07),
+             "step.settling_time_s", -1, timed=True, heading="Settling 2 %", followed=True,
+             tolerance=1e-07),
     Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
              "output_rate_rad_s", 1, "m/s", source="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
@@ -140,9 +185,9 @@ _LIST = (
     Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; 0 at rest",
              "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, source="analysis"),
     Quantity("corner_gain_margin", "dB", "analysis", "smallest hot, cold, at the worst tolerances",
-             "gain margin at the corners", "corner_gain_margin_db", 1, size=6.0, source="analysis"),
+             "gain margin at the corners", "", 1, size=6.0, source="analysis", cornered="gain_margin"),
     Quantity("corner_phase_margin", "deg", "analysis", "smallest hot, cold, at the worst tolerances",
-             "phase margin at the corners", "corner_phase_margin_deg", 1, size=45.0, source="analysis"),
+             "phase margin at the corners", "", 1, size=45.0, source="analysis", cornered="phase_margin"),
 )  # fmt: skip
 
 QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST}
@@ -150,6 +195,10 @@ QUANTITIES: dict[str, Quantity] = {quantity.name: quantity for quantity in _LIST
 LOOP_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "loop"}
 DRIVE_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "drive"}
 ANALYSIS_QUANTITIES = {name: each for name, each in QUANTITIES.items() if each.scope == "analysis"}
+AT_A_GLANCE = tuple(each for each in LOOP_QUANTITIES.values() if each.at_a_glance)
+"""Figures of loops on the first screen of a report."""
+CORNERED = {each.cornered: each for each in ANALYSIS_QUANTITIES.values() if each.cornered}
+"""Figures of loops whose worst over all corners is a figure of its own, with that figure."""
 LOOPS = ("current", "velocity", "position")
 """The loops that a requirement may name, innermost first."""
 

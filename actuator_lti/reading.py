@@ -29,6 +29,7 @@ from actuator_lti.bounds import (
     Bound,
 )
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 
 INTEGERS = range(-(1 << 63), 1 << 63)
 """What TOML promises to hold; longer ones would become infinite as floats, or take long to print."""
@@ -121,7 +122,7 @@ def decode(data: bytes, where: str) -> str:
         raise InputError(f"byte {error.start} is not UTF-8; allowed: UTF-8 text", where=where) from None
 
 
-def read_toml(path: str | PathLike[str], what: str = "design file") -> dict[str, Any]:
+def read_toml(path: str | PathLike[str], what: str = "design file") -> Tree:
     """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
 
     Raises
@@ -132,7 +133,7 @@ def read_toml(path: str | PathLike[str], what: str = "design file") -> dict[str,
     return parse_toml(decode(read_bytes(path, what), shown_path(path)), shown_path(path))
 
 
-def read_campaign_toml(path: str | PathLike[str], what: str = "campaign file") -> dict[str, Any]:
+def read_campaign_toml(path: str | PathLike[str], what: str = "campaign file") -> Tree:
     """As `read_toml`, for files that list thousands of runs."""
     where = shown_path(path)
     text = decode(read_bytes(path, what, CAMPAIGN_BYTES), where)
@@ -145,9 +146,7 @@ def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
     return parse_json(decode(read_bytes(path, what, REPORT_BYTES), where), where)
 
 
-def parse_toml(
-    text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound = TOML_VALUES
-) -> dict[str, Any]:
+def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound = TOML_VALUES) -> Tree:
     """The tree of a TOML text, refused with line and column where the syntax is wrong."""
     if len(text) > size.most:
         raise InputError(f"is larger than allowed: {size.allowed}", where=where)
@@ -219,7 +218,7 @@ def _finite(digits: str) -> float:
     return value
 
 
-def _no_key_twice(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
     made = dict(pairs)
     if len(made) != len(pairs):
         keys = [key for key, _ in pairs]

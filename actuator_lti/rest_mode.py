@@ -9,7 +9,11 @@ and taken out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+
+System = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 LEAST = (1e-9, 1e-12, 1e-15)  # of the largest: a state of less is zero, if the equations then hold as well
 ROUNDED = 1e-11  # over its terms, what is left of a sum that is zero: matrix exponentials lose some digits
@@ -36,28 +40,59 @@ def without_rest_mode(
     kept : ndarray of bool, shape (n,)
         Which states remain.
     """
-    n = A.shape[0]
-    finite = all(np.isfinite(part).all() for part in (A, B, C))
-    integrators = np.flatnonzero(A.diagonal() == at) if n > 1 and finite else np.empty(0, dtype=int)
-    for j in sorted(integrators, key=lambda j: np.count_nonzero(A[j])):
-        v = _at_rest(A, C, at, int(j))
+    ((A, B, C),), kept = without_common_rest_mode([(A, B, C)], at)
+    return A, B, C, kept
+
+
+def without_common_rest_mode(
+    systems: Sequence[System], at: float, *, alone: bool = False
+) -> tuple[list[System], np.ndarray]:
+    """Take out a mode that several systems on the same states, one tick after the other, all hide.
+
+    Parameters
+    ----------
+    systems : sequence of (A, B, C)
+    at : float
+    alone : bool
+        Also an integrator that moves nothing else and is not seen, or is not driven.
+
+    Returns
+    -------
+    systems : list of (A, B, C)
+    kept : ndarray of bool, shape (n,)
+    """
+    n = systems[0][0].shape[0]
+    As, Bs, Cs = (np.stack(part) for part in zip(*systems, strict=True))
+    finite = all(np.isfinite(part).all() for part in (As, Bs, Cs))
+    own = (np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0) if finite else np.zeros(n, dtype=bool)
+    integrators = np.flatnonzero(own) if n > 1 else np.empty(0, dtype=int)
+    entries = (As != 0.0).any(axis=0)
+    for j in sorted(integrators, key=lambda j: np.count_nonzero(entries[j])):
+        v = _at_rest(As, Cs, at, int(j), alone)
         if v is not None:
             o = np.arange(n) != j
-            return A[np.ix_(o, o)] - v[o, None] * A[j, o], B[o] - v[o, None] * B[j], C[:, o], o
-    for j in sorted(integrators, key=lambda j: np.count_nonzero(A[:, j])):
-        w = _at_rest(A.T, B.T, at, int(j))
+            return [
+                (A[np.ix_(o, o)] - v[o, None] * A[j, o], B[o] - v[o, None] * B[j], C[:, o])
+                for A, B, C in systems
+            ], o
+    for j in sorted(integrators, key=lambda j: np.count_nonzero(entries[:, j])):
+        w = _at_rest(As.transpose(0, 2, 1), Bs.transpose(0, 2, 1), at, int(j), alone)
         if w is not None:
             o = np.arange(n) != j
-            return A[np.ix_(o, o)] - A[o, j][:, None] * w[o], B[o], C[:, o] - C[:, [j]] * w[o], o
-    return A, B, C, np.ones(n, dtype=bool)
+            return [
+                (A[np.ix_(o, o)] - A[o, j][:, None] * w[o], B[o], C[:, o] - C[:, [j]] * w[o])
+                for A, B, C in systems
+            ], o
+    return list(systems), np.ones(n, dtype=bool)
 
 
-def _at_rest(A: np.ndarray, C: np.ndarray, at: float, j: int) -> np.ndarray | None:
+def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:
     """The vector v with v_j = 1, A v = ``at`` v and C v = 0 within rounding; ``None`` where there is none."""
-    n = len(A)
+    n = As.shape[-1]
     o = np.arange(n) != j
-    rows, c = A - at * np.eye(n), C[0]
-    allowed = np.abs(A) + abs(at) * np.eye(n)
+    rows = (As - at * np.eye(n)).reshape(-1, n)
+    allowed = (np.abs(As) + abs(at) * np.eye(n)).reshape(-1, n)
+    c = Cs.reshape(-1, n)
     v = np.zeros(n)
     v[j] = 1.0
     largest = np.abs(rows).max(axis=1)
@@ -66,13 +101,14 @@ def _at_rest(A: np.ndarray, C: np.ndarray, at: float, j: int) -> np.ndarray | No
         scaled = rows / weight[:, None]
         size = np.abs(scaled[:, o]).max(axis=0)
         size = 1.0 / np.where(size > 0.0, size, 1.0)  # of a state: what makes such a term
-        unseen = c / ((np.abs(c[o]) @ size) or 1.0)
-        both = np.vstack([scaled, unseen])
+        seen = np.abs(c[:, o]) @ size
+        both = np.vstack([scaled, c / np.where(seen > 0.0, seen, 1.0)[:, None]])
         v[o] = np.linalg.lstsq(both[:, o] * size, -both[:, j], rcond=None)[0] * size
         weight = np.maximum(allowed @ np.abs(v), 1e-30 * largest)
     for least in LEAST:
         u = np.where(np.abs(v) > least * np.abs(v).max(), v, 0.0)
         at_rest = (np.abs(rows @ u) <= ROUNDED * (allowed @ np.abs(u))).all()
-        if at_rest and abs(c @ u) <= ROUNDED * (np.abs(c) @ np.abs(u)) and u[o].any():
+        unseen = (np.abs(c @ u) <= ROUNDED * (np.abs(c) @ np.abs(u))).all()
+        if at_rest and unseen and (alone or u[o].any()):
             return u
     return None

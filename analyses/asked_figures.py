@@ -8,7 +8,7 @@ from math import inf
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import ANALYSIS_QUANTITIES
+from actuator_lti.quantities import ANALYSIS_QUANTITIES, QUANTITIES, Quantity
 from analyses.corners import Corners, corners
 from analyses.duty import Duty, duty
 from analyses.failures import Failures, failures
@@ -73,28 +73,22 @@ class AskedFigures:
         swing = self._cycles.hunting
         return 0.0 if swing is None else swing.settling.hunting_rad or 0.0
 
-    @property
-    def corner_gain_margin_db(self) -> float:
-        """Smallest gain margin over loops and corners; -inf where one is not stable."""
-        return self._least("gain_margin_db")
-
-    @property
-    def corner_phase_margin_deg(self) -> float:
-        """Smallest phase margin over loops and corners; -inf where one is not stable."""
-        return self._least("phase_margin_deg")
-
-    def _least(self, attribute: str) -> float:
+    def at_corners(self, quantity: Quantity) -> float:
+        """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
         loops = [one for corner in self._corners.corners for one in corner.figures.values()]
         if not all(one.stable for one in loops):
-            return -inf
-        result = (getattr(one.margins, attribute) for one in loops)
-        return min((abs(value) for value in result if value is not None), default=inf)
+            return -quantity.better * inf
+        found = (quantity.read(one) for one in loops)
+        worst = min((quantity.better * value for value in found if value is not None), default=inf)
+        return quantity.better * worst
 
 
 def asked_figure(figures: AskedFigures, name: str) -> tuple[float | None, str]:
     """A figure in its unit and, where there is none, why."""
     quantity = ANALYSIS_QUANTITIES[name]
     try:
+        if quantity.cornered:
+            return figures.at_corners(QUANTITIES[quantity.cornered]), ""
         value = quantity.read(figures, figures.design.axis)
     except InputError as error:
         return None, error.message

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,7 @@ from numpy.typing import NDArray
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.identification.points import SteadyPoint
 from analyses.identification.surface_fit import PATHS, SurfaceFit
-from analyses.identification.systematic import effects_of, shared_errors
 from analyses.records.campaign_file import Instruments
 
 FloatArray = NDArray[np.float64]
@@ -70,8 +68,6 @@ def suggest_runs(
     instruments: Instruments,
     *,
     count: int = 6,
-    speeds_rad_s: Sequence[float] | None = None,
-    loads_Nm: Sequence[float] | None = None,
     criterion: str = "margins",
     progress: Callable[[int, int], None] | None = None,
 ) -> CampaignSuggestion:
@@ -87,9 +83,7 @@ def suggest_runs(
     instruments : Instruments
         Of the campaign.
     count : int
-        How many runs to suggest.
-    speeds_rad_s, loads_Nm : sequence of float, optional
-        What can be set; the range of the runs so far, in steps of an eighth, by default.
+        How many runs to suggest, in the range of the runs so far, in steps of an eighth.
     criterion : {"margins", "D"}
         ``margins``: mean relative variance of the margins (c-optimal, over all of them); ``D``: determinant
         of the covariance of the coefficients.
@@ -97,11 +91,11 @@ def suggest_runs(
     Raises
     ------
     InputError
-        For an unknown criterion or an empty range.
+        For an unknown criterion.
     """
     if criterion not in ("margins", "D"):
         raise InputError(f'criterion = "{criterion}": "margins" or "D"')
-    speeds, loads = _ranges(fit, speeds_rad_s, loads_Nm)
+    speeds, loads = _ranges(fit)
     fitted = with_values(design, dict(zip(PATHS, (float(v) for v in fit.values), strict=True)))
     margins = margin_spreads(fitted, fit, progress=progress)
     slopes = np.array([m.slopes / m.std for m in margins if m.std > 0.0])
@@ -179,18 +173,11 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
     return result
 
 
-def _ranges(
-    fit: SurfaceFit, speeds: Sequence[float] | None, loads: Sequence[float] | None
-) -> tuple[FloatArray, FloatArray]:
+def _ranges(fit: SurfaceFit) -> tuple[FloatArray, FloatArray]:
     had = np.array([[p.speed_rad_s, p.load_Nm] for p in fit.points])
     loaded = had[had[:, 1] > 0.0, 1]
-    wide = np.linspace(had[:, 0].min(), had[:, 0].max(), 9)
     levels = np.linspace(loaded.min(), loaded.max(), 8) if len(loaded) else np.zeros(0)
-    chosen = np.asarray(wide if speeds is None else speeds, dtype=np.float64)
-    moments = np.asarray(np.concatenate([[0.0], levels]) if loads is None else loads, dtype=np.float64)
-    if not len(chosen) or not len(moments) or np.any(chosen <= 0.0) or np.any(moments < 0.0):
-        raise InputError("speeds must be positive, loads zero or more, and at least one of each is needed")
-    return chosen, moments
+    return np.linspace(had[:, 0].min(), had[:, 0].max(), 9), np.concatenate([[0.0], levels])
 
 
 def _greedy(
@@ -219,34 +206,3 @@ def _greedy(
             )
         )
     return tuple(runs)
-
-
-def predicted_covariance(
-    fit: SurfaceFit, runs: Sequence[SuggestedRun], instruments: Instruments, torque_constant_Nm_A: float
-) -> FloatArray:
-    """Covariance of the coefficients, shared errors included, once the suggested runs are made."""
-    from analyses.identification.surface import gain_matrix, torque_covariance
-
-    added = tuple(_as_point(fit.points[0], run, fit) for run in runs)
-    points = (*fit.points, *added)
-    variance = np.concatenate(
-        [fit.residual_stds_Nm**2, np.full(len(added), np.median(fit.residual_stds_Nm**2))]
-    )
-    errors = shared_errors(points, instruments, float(fit.values[2]), torque_constant_Nm_A)
-    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
-    gain = gain_matrix(x, torque_covariance(variance, errors))
-    moved = gain @ effects_of(errors, len(points))
-    return np.asarray((gain * variance) @ gain.T + moved @ moved.T / 3.0)
-
-
-def _as_point(like: SteadyPoint, run: SuggestedRun, fit: SurfaceFit) -> SteadyPoint:
-    torque = float(fit.values @ np.array([1.0, run.speed_rad_s, run.load_Nm]))
-    return replace(
-        like,
-        run=f"suggested {run.order}",
-        direction=1,
-        torque_Nm=torque,
-        speed_rad_s=run.speed_rad_s,
-        load_Nm=run.load_Nm,
-        load_is_zero=run.load_Nm == 0.0,
-    )

@@ -27,8 +27,6 @@ class DriveFigures:
         no bound.
     acceleration_rad_s2 : float
         Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
-    acceleration_limit : str
-        ``"acceleration limit"`` or ``"torque"``.
     """
 
     load_Nm: float
@@ -36,7 +34,6 @@ class DriveFigures:
     rate_limit: str
     motor_current_A: float | None
     acceleration_rad_s2: float
-    acceleration_limit: str
 
 
 def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
@@ -62,12 +59,10 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     """
     capacity = capability(design, load_Nm)
     current = float(capacity.motor_current_A)
-    limited = bool(capacity.accelerates_to_limit)
     return DriveFigures(
         load_Nm=load_Nm,
         output_rate_rad_s=float(capacity.output_rate_rad_s),
         rate_limit=RATE_LIMITS[int(capacity.rate_limit)],
         motor_current_A=None if math.isnan(current) else current,
         acceleration_rad_s2=float(capacity.acceleration_rad_s2),
-        acceleration_limit="acceleration limit" if limited else "torque",
     )

@@ -245,18 +245,17 @@ def _threads(
 ) -> None:
     """Compute in threads of this process (the compiled parts run without the interpreter's lock)."""
     waiting = iter(todo)
-    with ThreadPoolExecutor(threads) as pool:
+    pool = ThreadPoolExecutor(threads)
+    try:
         running = {pool.submit(call, part): part for part in islice(waiting, threads * _IN_FLIGHT)}
-        try:
-            while running:
-                finished, _ = wait(running, return_when=FIRST_COMPLETED)
-                for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
-                    sink(running.pop(future), future.result())
-                    for part in islice(waiting, 1):
-                        running[pool.submit(call, part)] = part
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        while running:
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
+                sink(running.pop(future), future.result())
+                for part in islice(waiting, 1):
+                    running[pool.submit(call, part)] = part
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)  # who holds a part that never ends can end it now
 
 
 def _submit(

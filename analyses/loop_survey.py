@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import numpy as np
 
@@ -132,7 +132,19 @@ class LoopSurvey:
         return frame
 
 
-def _row(figures: LoopFigures) -> dict[str, Any]:
+class SurveyRow(TypedDict):
+    """A row of `LoopSurvey.to_pandas`."""
+
+    stable: bool | None
+    gain_margin_db: float | None
+    phase_margin_deg: float | None
+    delay_margin_s: float | None
+    modulus_margin: float | None
+    bandwidth_rad_s: float | None
+    evidence: str
+
+
+def _row(figures: LoopFigures) -> SurveyRow:
     """The figures of one loop, by name with unit."""
     margins, bandwidth = figures.margins, figures.bandwidth
     return {

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.resolvent import responses
 
 if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
-_ENTRIES = 1 << 15  # of the matrices solved in one call: what the cache holds
+HALVED = 7  # times that an interval too long on paper is halved
 LARGE = 60  # states: a triangular form pays from here on
 
 
@@ -87,48 +88,25 @@ def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
     """Evaluate a system on the border of stability: at s = jw, or z = exp(jwT) where it is sampled."""
     omega = np.asarray(omega_rad_s, dtype=float)
     points = np.exp(1j * omega * system.dt) if system.dt else 1j * omega
-    result = _all_at_once(system, points) if all(hasattr(system, part) for part in "ABCD") else None
-    return np.atleast_1d(np.asarray(system(points), dtype=complex)) if result is None else result
+    if not all(hasattr(system, part) for part in "ABCD") or (system.ninputs, system.noutputs) != (1, 1):
+        return np.atleast_1d(np.asarray(system(points), dtype=complex))
+    if len(system.A) > LARGE and points.size > len(system.A) // 10:
+        return _triangular(system, points)
+    return responses(system, points)
 
 
-def _all_at_once(system: Any, points: np.ndarray) -> np.ndarray | None:
-    """Evaluate a state space at all points in one call: C (z - A)^-1 B + D; None at a pole or without states.
+def _triangular(system: Any, points: np.ndarray) -> np.ndarray:
+    """The same by Schur's form, from the last state up, all points at once: for a table or a curve.
 
-    python-control solves point by point, which takes most of the time of a report's figures.  A large system
-    (a break point over a whole position period) is made triangular first.
+    A break point over a whole position period has hundreds of states.
     """
-    a, b, c, d = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
-    if not a.size or b.shape[1] != 1 or c.shape[0] != 1:
-        return None
-    if len(a) > LARGE and points.size > len(a) // 10:
-        return _triangular(a, b, c, d, points)
-    result = np.empty(len(points), dtype=complex)
-    some = max(_ENTRIES // a.size, 1)  # points at once
-    matrix = np.empty((min(some, len(points)), *a.shape), dtype=complex)
-    own = np.arange(len(a))
-    for start in range(0, len(points), some):
-        part = points[start : start + some]
-        here = matrix[: len(part)]
-        here[...] = -a
-        here[:, own, own] += part[:, None]
-        try:
-            states = np.linalg.solve(here, b[None, :, :].astype(complex))
-        except np.linalg.LinAlgError:
-            return None
-        result[start : start + some] = (c @ states)[:, 0, 0] + d[0, 0]
-    return result
-
-
-def _triangular(
-    a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, points: np.ndarray
-) -> np.ndarray | None:
-    """C (z - A)^-1 B + D by Schur's form, from the last state up, all points at once; None at a pole."""
     from scipy.linalg import schur
 
+    a, b, c, d = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
     upper, turned = schur(a, output="complex")
     right, left = (turned.conj().T @ b)[:, 0], (c @ turned)[0]
     if (points[:, None] == np.diagonal(upper)).any():
-        return None
+        return responses(system, points)
     states = np.empty((len(a), points.size), dtype=complex)
     for k in reversed(range(len(a))):
         states[k] = (right[k] + upper[k, k + 1 :] @ states[k + 1 :]) / (points - upper[k, k])
@@ -180,17 +158,13 @@ def sampled_step(system: Any, samples: int) -> np.ndarray:
     return response
 
 
-def nyquist_curve(
-    system: Any, omega_rad_s: np.ndarray, frame: float, passes: int = 7
-) -> tuple[np.ndarray, np.ndarray]:
+def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:
     """Sample L(jw) closely enough for a figure of that half width around -1; NaN where it leaves the frame.
 
     Parameters
     ----------
     frame : float
         Half width of the frame around -1.
-    passes : int
-        How often intervals that are too long on paper are halved.
 
     Returns
     -------
@@ -198,7 +172,7 @@ def nyquist_curve(
     values : ndarray of complex, shape (K,)
     """
     omega, values = omega_rad_s, response_at(system, omega_rad_s)
-    for _ in range(passes):
+    for _ in range(HALVED):
         near = np.abs(values + 1.0) < 2.5 * frame
         long = (np.abs(np.diff(values)) > 0.04 * frame) & (near[1:] | near[:-1])
         if not long.any() or len(omega) > 3000:

@@ -38,8 +38,6 @@ class Sensitivity:
         Ends of the parameter, SI.
     low, high : float
         The figure there; NaN where it does not exist.
-    by_tolerance : bool
-        Whether the ends are those of its tolerance, or 10 % off.
     """
 
     path: str
@@ -49,7 +47,6 @@ class Sensitivity:
     high_value: float
     low: float
     high: float
-    by_tolerance: bool
 
     @property
     def swing(self) -> float:
@@ -106,14 +103,14 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     count = 1 + 4 * len(chosen)
     values = {path: np.full(count, nominal[path]) for path in chosen}
     for k, path in enumerate(chosen):
-        low, high, _ = ends[path]
+        low, high = ends[path]
         row = 1 + 4 * k
         values[path][row : row + 4] = (nominal[path] * (1 - STEP), nominal[path] * (1 + STEP), low, high)
     figures = population_figures(Population(design, values, count), design)
     entries = [
         Sensitivity(
-            path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path][:2],
-            float(column[3 + 4 * k]), float(column[4 + 4 * k]), ends[path][2],
+            path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path],
+            float(column[3 + 4 * k]), float(column[4 + 4 * k]),
         )
         for k, path in enumerate(chosen)
         for name, column in figures.items()
@@ -133,12 +130,12 @@ def _moves(design: Design, path: str) -> bool:
     return value != 0.0 and bool(np.isfinite(value)) and not path.startswith("friction.breakaway")
 
 
-def _ends(design: Design, path: str, nominal: float) -> tuple[float, float, bool]:
+def _ends(design: Design, path: str, nominal: float) -> tuple[float, float]:
     parameter = design.parameters.get(path)
     if parameter is not None and parameter.tolerance is not None:
         low, high = Factor(path, nominal, parameter.tolerance).box
-        return low, high, True
-    return nominal * (1 - SWING), nominal * (1 + SWING), False
+        return low, high
+    return nominal * (1 - SWING), nominal * (1 + SWING)
 
 
 def population_figures(

@@ -50,6 +50,7 @@ from typing import TYPE_CHECKING, Any
 from actuator_lti.bounds import GRID_AXES, SAMPLES, STUDY_VARIANTS
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_toml, shown_path
+from actuator_lti.tree import Tree
 from analyses.slugs import slug
 from analyses.study_axes import Axis, read_axis
 from analyses.study_reading import Reader
@@ -158,7 +159,7 @@ def study_of(design: Design) -> Study:
     return Study(design.name, design.title, design.description, design.origin, base, ())
 
 
-def study_from_tree(tree: dict[str, Any], where: str, folder: Path, *, keep_going: bool = False) -> Study:
+def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = False) -> Study:
     """Build a study from its parsed tree; designs are looked for beside the file."""
     reader = Reader(where, folder)
     reader.only(tree, "", {"study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"})
@@ -184,7 +185,7 @@ def study_from_tree(tree: dict[str, Any], where: str, folder: Path, *, keep_goin
     )
 
 
-def _required(design: Design, extra: list[dict[str, Any]], reader: Reader) -> Design:
+def _required(design: Design, extra: list[Tree], reader: Reader) -> Design:
     """Add the study's requirements, in place of those with the same id."""
     from actuator_lti.design import design_tree, with_overrides
 
@@ -195,7 +196,7 @@ def _required(design: Design, extra: list[dict[str, Any]], reader: Reader) -> De
     return reader.located("requirement", lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
 
 
-def _plan(tree: dict[str, Any], reader: Reader) -> MonteCarloPlan | None:
+def _plan(tree: Tree, reader: Reader) -> MonteCarloPlan | None:
     if "monte_carlo" not in tree:
         return None
     table = reader.table(tree, "monte_carlo")
@@ -231,10 +232,10 @@ class _Maker:
 
     base: Design
     reader: Reader
-    requirements: list[dict[str, Any]]
+    requirements: list[Tree]
     keep_going: bool
 
-    def variants(self, tree: dict[str, Any]) -> Iterator[Variant]:
+    def variants(self, tree: Tree) -> Iterator[Variant]:
         reader = self.reader
         for place, table in enumerate(reader.tables(tree, "variant")):
             where = f"variant[{place + 1}]"
@@ -248,12 +249,12 @@ class _Maker:
                 origin = reader.text(table, where, "base")
             yield self._made(name, overrides, origin)
 
-    def sweeps(self, tree: dict[str, Any]) -> Iterator[Variant]:
+    def sweeps(self, tree: Tree) -> Iterator[Variant]:
         for place, table in enumerate(self.reader.tables(tree, "sweep")):
             axis = read_axis(table, f"sweep[{place + 1}]", self.base, self.reader)
             yield from (self._point((axis,), (value,)) for value in axis.values)
 
-    def grids(self, tree: dict[str, Any]) -> Iterator[Variant]:
+    def grids(self, tree: Tree) -> Iterator[Variant]:
         reader = self.reader
         for place, table in enumerate(reader.tables(tree, "grid")):
             where = f"grid[{place + 1}]"
@@ -274,7 +275,7 @@ class _Maker:
         overrides = {axis.parameter: value for axis, value in zip(axes, point, strict=True)}
         return self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides, None)
 
-    def _made(self, name: str, overrides: dict[str, Any], origin: str | None) -> Variant:
+    def _made(self, name: str, overrides: Tree, origin: str | None) -> Variant:
         from actuator_lti.design import with_overrides
 
         def make() -> Design:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.bounds import AXIS_POINTS
+from actuator_lti.tree import Tree
 from analyses.study_reading import Reader
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class Axis:
     values: tuple[Any, ...]
 
 
-def read_axis(table: dict[str, Any], place: str, base: Design, reader: Reader) -> Axis:
+def read_axis(table: Tree, place: str, base: Design, reader: Reader) -> Axis:
     """Read ``values``, or ``from``, ``to``, ``points`` and ``spacing`` ("linear" or "log")."""
     reader.only(table, place, {"parameter", "values", "from", "to", "points", "spacing"})
     parameter = reader.text(table, place, "parameter")
@@ -40,9 +41,7 @@ def _listed(values: Any, place: str, reader: Reader) -> tuple[Any, ...]:
     return tuple(values)
 
 
-def _ranged(
-    table: dict[str, Any], place: str, parameter: str, base: Design, reader: Reader
-) -> tuple[Any, ...]:
+def _ranged(table: Tree, place: str, parameter: str, base: Design, reader: Reader) -> tuple[Any, ...]:
     from actuator_lti.design.fields import Structure, field_of
     from actuator_lti.design.units import parse_quantity
 

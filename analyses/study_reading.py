@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_toml, shown
+from actuator_lti.tree import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -40,7 +41,7 @@ class Reader:
         """A value as it may be printed."""
         return shown(value)
 
-    def only(self, table: dict[str, Any], place: str, allowed: set[str]) -> None:
+    def only(self, table: Tree, place: str, allowed: set[str]) -> None:
         """Refuse unknown keys, naming the nearest known one."""
         from difflib import get_close_matches
 
@@ -51,9 +52,7 @@ class Reader:
                 path = self.shown(f"{place}.{key}" if place else key)[1:-1]
                 raise self.error(f"{path}: unknown key{hint}; allowed: {', '.join(sorted(allowed))}")
 
-    def table(
-        self, tree: dict[str, Any], key: str, place: str = "", *, optional: bool = False
-    ) -> dict[str, Any]:
+    def table(self, tree: Tree, key: str, place: str = "", *, optional: bool = False) -> Tree:
         """A table."""
         path = f"{place}.{key}" if place else key
         if key not in tree:
@@ -64,7 +63,7 @@ class Reader:
             raise self.error(f"{path} = {self.shown(tree[key])}: allowed: a table")
         return tree[key]
 
-    def tables(self, tree: dict[str, Any], key: str, place: str = "") -> list[dict[str, Any]]:
+    def tables(self, tree: Tree, key: str, place: str = "") -> list[Tree]:
         """A list of tables, empty where there is none."""
         result = tree.get(key, [])
         if not isinstance(result, list) or not all(isinstance(item, dict) for item in result):
@@ -73,7 +72,7 @@ class Reader:
         return result
 
     def text(
-        self, table: dict[str, Any], place: str, key: str, otherwise: str | None = None, longest: int = 2000
+        self, table: Tree, place: str, key: str, otherwise: str | None = None, longest: int = 2000
     ) -> str:
         """A text; missing is an error unless there is a default."""
         if key not in table:
@@ -87,16 +86,14 @@ class Reader:
             )
         return value
 
-    def flag(self, table: dict[str, Any], place: str, key: str, otherwise: bool) -> bool:
+    def flag(self, table: Tree, place: str, key: str, otherwise: bool) -> bool:
         """True or false."""
         value = table.get(key, otherwise)
         if not isinstance(value, bool):
             raise self.error(f"{place}.{key} = {self.shown(value)}: allowed: true or false")
         return value
 
-    def integer(
-        self, table: dict[str, Any], place: str, key: str, otherwise: int, low: int, high: int
-    ) -> int:
+    def integer(self, table: Tree, place: str, key: str, otherwise: int, low: int, high: int) -> int:
         """A whole number in a range."""
         value = table.get(key, otherwise)
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
@@ -111,7 +108,7 @@ class Reader:
             return load_design(name)
         return load_design(self.folder / name)
 
-    def motor(self, name: str) -> dict[str, Any]:
+    def motor(self, name: str) -> Tree:
         """The [motor] table of a file beside the study file."""
         where = self.shown(name)[1:-1]
         tree = read_toml(self.folder / name, "file with a [motor] table")

@@ -20,6 +20,7 @@ from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, read_bytes
+from actuator_lti.tree import Tree
 from analyses.engine import code_version
 
 LIBRARIES = ("numpy", "scipy", "numba")
@@ -31,7 +32,7 @@ class Store:
 
     folder: Path
 
-    def read(self, key: str) -> dict[str, Any] | None:
+    def read(self, key: str) -> Tree | None:
         """What was found; ``None`` where there is nothing, or nothing whole."""
         path = self._path(key)
         if not path.exists():

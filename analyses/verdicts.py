@@ -116,7 +116,7 @@ def which_response(quantity: str, loop: str) -> str:
     >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
     ('of the response to the command, feed-forward and filters included', '')
     """
-    if not QUANTITIES[quantity].reader.startswith(("bandwidth.", "step.")):
+    if not QUANTITIES[quantity].of_response:
         return ""
     if loop == "position":
         return "of the response to the command, feed-forward and filters included"

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from actuator_lti.atomic import write_bytes
-from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.virtual_bench_instruments import BenchInstruments, RunLogs
@@ -67,43 +66,12 @@ load = "{load:g} N*m"
 """
 
 
-def bench_campaign(
-    logs: tuple[RunLogs, ...], design: str, bounds: Instruments, folder: Path | None = None
-) -> Campaign:
-    """The campaign that the files describe, without the files: for runs that are in memory."""
-    folder = Path() if folder is None else folder
-    runs = [
-        RunEntry(
-            id=log.id,
-            drive=folder / f"run{log.id}_drive.csv",
-            sensor=folder / f"run{log.id}_torque.csv",
-            speed_rad_s=log.speed_setting_rad_s,
-            load_Nm=log.load_setting_Nm,
-            offset_s=None,
-        )
-        for log in logs
-    ]
-    return Campaign(
-        name="virtual bench",
-        design=design,
-        drive=DRIVE_SPEC,
-        sensor=SENSOR_SPEC,
-        join_method="correlation",
-        join_drive_signal="speed",
-        join_sensor_signal="torque",
-        instruments=bounds,
-        runs=tuple(runs),
-        origin=str(folder),
-    )
-
-
 def write_bench(
     folder: str | Path,
     logs: tuple[RunLogs, ...],
     *,
     design: str,
     seed: int,
-    instruments: BenchInstruments | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write the logs and ``campaign.toml``; the campaign file comes last, so that it names only whole files.
@@ -115,7 +83,7 @@ def write_bench(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    bounds = (BenchInstruments() if instruments is None else instruments).bounds
+    bounds = BenchInstruments().bounds
     for k, log in enumerate(logs, 1):
         write_bytes(folder / f"run{log.id}_drive.csv", _drive_text(log.drive))
         write_bytes(folder / f"run{log.id}_torque.csv", _sensor_text(log.sensor))

@@ -8,6 +8,7 @@ from math import isfinite, pi
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
 from analyses.virtual_bench_two_mass import TwoMassPlan
@@ -41,12 +42,9 @@ def plan_for(design: Design) -> TwoMassPlan:
         raise InputError("this bench needs a rotary drive with a current loop and a coupling", design.name)
     if design.load.path != "back-drivable":
         raise InputError('load.path = "self-locking": no moment keeps the coupling on its flank', design.name)
-    ratio = design.ratio_to_coupling
-    J_m, J_l = design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
-    k = design.coupling.stiffness_Nm_rad
-    if not J_l > 0.0:
+    if not design.load_side_inertia_kgm2 > 0.0:
         raise InputError("no inertia behind the coupling: there is no resonance", design.name)
-    resonance_hz = float(np.sqrt(k * (1.0 / J_l + 1.0 / (J_m * ratio**2)))) / (2.0 * pi)
+    resonance_hz = float(resonance_rad_s(design)) / (2.0 * pi)
     tick = design.controller.period_s
     log = tick * max(int(1.0 / (LOG_RATE * resonance_hz * tick)), 1)
     period = log * round(SPACING / resonance_hz / log)

@@ -12,6 +12,7 @@ from actuator_lti.atomic import write_together
 from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 from reports import document as doc
 from reports.document_schema import Document
 
@@ -214,7 +215,7 @@ def closing_sections(
     return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
 
 
-def design_head(design: Design) -> dict[str, Any]:
+def design_head(design: Design) -> Tree:
     """Give what a document says of its design."""
     return {
         "name": design.name,

@@ -16,6 +16,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
+from actuator_lti.tree import Tree
 from reports.certain import certain
 from reports.document_schema import (
     SCHEMA,
@@ -85,7 +86,7 @@ def abscissa(values: Any, digits: int = 5) -> list[float]:
 
 
 def column(
-    key: str, label: str, unit: str = "", *, align: Align | None = None, format: str = "text"
+    key: str, label: str, unit: str = "", *, align: Align | None = None, format: str = "text", better: int = 0
 ) -> Column:
     """Describe a table's column.
 
@@ -94,9 +95,12 @@ def column(
     format : str
         ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
         ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
+    better : int
+        Which way is better from night to night: +1 more, -1 less, +2 or -2 that of the magnitude; 0: neither.
     """
     side: Align = align or ("left" if format in ("text", "yesno") else "right")
-    return {"key": key, "label": label, "unit": unit, "align": side, "format": format}
+    made: Column = {"key": key, "label": label, "unit": unit, "align": side, "format": format}
+    return {**made, "better": better} if better else made
 
 
 def table(
@@ -159,9 +163,10 @@ def remark(words: str) -> Block:
     return text(start + words[1:] + ("." if words[-1:].isalnum() else ""))
 
 
-def fact(label: str, value: Any, unit: str = "") -> FactItem:
-    """Make one item of `facts`."""
-    return {"label": label, "value": plain(value), "unit": unit}
+def fact(label: str, value: Any, unit: str = "", *, better: int = 0) -> FactItem:
+    """Make one item of `facts`; ``better`` as in `column`."""
+    made: FactItem = {"label": label, "value": plain(value), "unit": unit}
+    return {**made, "better": better} if better else made
 
 
 def facts(items: Iterable[FactItem]) -> Block:
@@ -309,7 +314,7 @@ def dumps(made: Mapping[str, Any]) -> str:
     return f'{_compact(head)[:-1]},"sections":[\n{lines}\n]}}\n'
 
 
-def loads(content: str, origin: str = "report.json") -> dict[str, Any]:
+def loads(content: str, origin: str = "report.json") -> Tree:
     """Read a document.
 
     Raises
@@ -322,7 +327,7 @@ def loads(content: str, origin: str = "report.json") -> dict[str, Any]:
     return dict(made)
 
 
-def load(path: str | Path) -> dict[str, Any]:
+def load(path: str | Path) -> Tree:
     """Read a document from a file of somebody; see `loads`.
 
     Raises

@@ -12,6 +12,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    SkipValidation,
     Tag,
     TypeAdapter,
     ValidationError,
@@ -21,6 +22,8 @@ from typing_extensions import TypedDict
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
+from actuator_lti.tree import Tree
+from reports.live_schema import LiveData, Refused
 
 SCHEMA: Final = "actuator-lti/report"
 VERSION: Final = 1
@@ -60,7 +63,7 @@ Cell = Annotated[
 ]
 
 
-def _row_state(row: dict[str, Any]) -> dict[str, Any]:
+def _row_state(row: Tree) -> Tree:
     if row.get("_status") not in (*STATUSES, "", None):
         raise ValueError(f"_status = {shown(row['_status'])}: allowed: {', '.join(STATUSES)}")
     return row
@@ -79,6 +82,7 @@ class Column(TypedDict):
     unit: str
     align: Align
     format: Format
+    better: NotRequired[int]
 
 
 @_strict
@@ -98,7 +102,7 @@ class FigureBlock(TypedDict):
 
     kind: Literal["figure"]
     figure: str
-    data: dict[str, Any]
+    data: Tree
     caption: str
     alt: str
     layout: NotRequired[Layout]
@@ -119,6 +123,7 @@ class FactItem(TypedDict):
     label: str
     value: Scalar
     unit: str
+    better: NotRequired[int]
 
 
 @_strict
@@ -280,7 +285,7 @@ class Document(TypedDict):
     provenance: Provenance
     verdict: Verdict
     sections: list[Section]
-    live: NotRequired[dict[str, Any]]
+    live: NotRequired[SkipValidation[LiveData | Refused]]  # its scripts read it, no part of the document
 
 
 _DOCUMENT: TypeAdapter[Document] = TypeAdapter(Document)

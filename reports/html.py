@@ -17,6 +17,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
+from actuator_lti.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
@@ -54,7 +55,7 @@ def page(
     return render(template, doc=made, drawn=drawn, kicker=kicker, **_live(made))
 
 
-def _live(made: Mapping[str, Any]) -> dict[str, Any]:
+def _live(made: Mapping[str, Any]) -> Tree:
     """Give what the sliders of a page need: data, module, empty figures; nothing where it has none."""
     known = made.get("live")
     if not known or known.get("refused"):

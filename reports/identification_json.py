@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from actuator_lti.tree import Tree
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -23,7 +25,7 @@ def campaign_json(
     at: dict[str, float],
     items: Sequence[Item] = (),
     written: Path | None = None,
-) -> dict[str, Any]:
+) -> Tree:
     """Give everything that `identify` found, in SI.
 
     Parameters
@@ -78,19 +80,19 @@ def campaign_json(
     }
 
 
-def items_json(items: Sequence[Item]) -> list[dict[str, Any]]:
+def items_json(items: Sequence[Item]) -> list[Tree]:
     """The verdict, item by item; values and limits as shares."""
     return [asdict(item) for item in items]
 
 
-def campaign_inputs(result: CampaignResult) -> list[dict[str, Any]]:
+def campaign_inputs(result: CampaignResult) -> list[Tree]:
     """The account of the columns of a campaign's files."""
     from reports.sections.identification_inputs import campaign_rows
 
     return [{k: v for k, v in row.items() if k != "_status"} for row in campaign_rows(result)]
 
 
-def inputs_json(record: Record, used: Mapping[str, str]) -> list[dict[str, Any]]:
+def inputs_json(record: Record, used: Mapping[str, str]) -> list[Tree]:
     """The account of a record's columns."""
     from reports.sections.identification_inputs import input_rows
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from actuator_lti.tree import Tree
 from analyses.loop_figures import LoopFigures
 
 
-def loop_json(figures: LoopFigures) -> dict[str, Any]:
+def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
     m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
     return {
@@ -32,7 +31,7 @@ def loop_json(figures: LoopFigures) -> dict[str, Any]:
         "bandwidth_hz": band.minus3db_hz if band else None,
         "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
         "resonance_peak_db": band.resonance_peak_db if band else None,
-        "sensitivity_peak_db": m.sensitivity_peak_db if peaks else None,
+        "sensitivity_peak_db": m.sensitivity_peak_db,
         "complementary_peak_db": peaks.complementary_db if peaks else None,
         "rise_time_s": step.rise_time_s if step else None,
         "overshoot_percent": step.overshoot_percent if step else None,

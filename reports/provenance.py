@@ -9,9 +9,9 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 from nonlinear.native import kernel_name
 
 LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2")
@@ -25,7 +25,7 @@ def package_version() -> str:
         return "not installed"
 
 
-def provenance(design_hash: str | None = None) -> dict[str, Any]:
+def provenance(design_hash: str | None = None) -> Tree:
     """Collect what is needed to build the same report again.
 
     The time is that of ``SOURCE_DATE_EPOCH`` where it is set (seconds since 1970, UTC), so that the same

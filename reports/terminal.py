@@ -47,13 +47,13 @@ def print_verdict(passed: bool, words: str, *, failed: str = "FAIL") -> None:
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
-def print_section(section: Mapping[str, Any], passed: bool | None, notes: Sequence[str] = ()) -> None:
+def print_section(section: Mapping[str, Any], passed: bool | None) -> None:
     """Print a section: verdict or result first, then how it was found, then its tables."""
     if passed is None:
         console().print(Text(section["result"]), soft_wrap=True)
     else:
         print_verdict(passed, section["result"])
-    print_blocks([{"kind": "text", "text": section["intro"]}, *section["blocks"]], notes)
+    print_blocks([{"kind": "text", "text": section["intro"]}, *section["blocks"]])
 
 
 def _print(block: Mapping[str, Any], out: Console) -> None:

@@ -69,5 +69,5 @@ def quoted(row, period, out):
     out[SETTLING_TIME] = row[SETTLING] * period
     out[IS_STABLE] = row[STABLE]
     if row[STABLE] != 1.0:
-        for k in range(BANDWIDTH_HZ, IS_STABLE):
+        for k in range(SENSITIVITY_PEAK, IS_STABLE):
             out[k] = math.nan

@@ -144,7 +144,7 @@ class LinearFigures:
         return self._column(loop, 3).copy()
 
     def _sensitivity_peak(self, loop: str) -> np.ndarray:
-        return -20.0 * np.log10(self._modulus_margin(loop))
+        return self._where_stable(loop, -20.0 * np.log10(self._modulus_margin(loop)))
 
     def _resonance_peak(self, loop: str) -> np.ndarray:
         ratio = self._column(loop, 5) / np.abs(self._column(loop, 9))

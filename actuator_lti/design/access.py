@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from math import inf
@@ -152,11 +152,11 @@ def _replaced(
     return replace(design, parameters=FrozenMap({**design.parameters, **parameters}))
 
 
-def pedigrees(design: Design, paths: Iterable[str] | None = None) -> tuple[Parameter, ...]:
+def pedigrees(design: Design) -> tuple[Parameter, ...]:
     """A :class:`Parameter` for every numeric key of a design, also those that its file left to defaults."""
     structure = Structure.of(design)
     result = []
-    for path in paths_of(design) if paths is None else paths:
+    for path in paths_of(design):
         known = design.parameters.get(path)
         if known is None:
             field, _ = located(design, path)

@@ -21,6 +21,7 @@ from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
+from actuator_lti.tree import Tree
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 
@@ -112,7 +113,7 @@ class Builder:
 
     def part(self, section: Section, raw: Any, path: str) -> Any:
         """An object of the section's kind from the values written in one table, with the tables inside it."""
-        values: dict[str, Any] = {"name": path.rpartition(".")[2]} if section.many == "named" else {}
+        values: Tree = {"name": path.rpartition(".")[2]} if section.many == "named" else {}
         for field in fields_in(section.template):
             given = getattr(raw, field.key)
             if given is None:
@@ -127,9 +128,9 @@ class Builder:
                 values[field.attribute] = given
         return section.kind(**values, **self.tables(section.path, raw))
 
-    def tables(self, path: str, raw: Any) -> dict[str, Any]:
+    def tables(self, path: str, raw: Any) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
-        result: dict[str, Any] = {}
+        result: Tree = {}
         for section in children(path):
             given = getattr(raw, section.key)
             if section.many:

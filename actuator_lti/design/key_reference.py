@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import MISSING, asdict, dataclass, fields
 from math import inf
-from typing import Any
 
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS
 from actuator_lti.design.model import Axis
 from actuator_lti.design.sections import SECTIONS
+from actuator_lti.tree import Tree
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class KeyEntry:
     description: str
     example: str
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> Tree:
         """Plain values, for JSON."""
         return asdict(self)
 

@@ -6,13 +6,13 @@ from difflib import get_close_matches
 from functools import lru_cache
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
 
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design
 from actuator_lti.design.shipped import shipped_designs, shipped_path
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, parse_toml, read_bytes, shown
+from actuator_lti.tree import Tree
 
 
 def load_design(name_or_path: str | PathLike[str]) -> Design:
@@ -107,7 +107,7 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     return design_from_tree(tree, origin)
 
 
-def design_from_tree(tree: dict[str, Any], origin: str) -> Design:
+def design_from_tree(tree: Tree, origin: str) -> Design:
     """Build and check a design from a parsed TOML tree."""
     from actuator_lti.design.build import Builder
     from actuator_lti.design.refusals import validated

@@ -12,6 +12,7 @@ from actuator_lti.design.schema import MAX_GEARS, MAX_LIST, document_model
 from actuator_lti.design.sections import BY_PATH, children
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
+from actuator_lti.tree import Tree
 
 _KEYS = {
     "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),
@@ -24,7 +25,7 @@ _KEYS_OF_TABLES = ("requirement", "correlation", "fact", "objects")
 _VALUE = ("value", "source", "grade", "tolerance")
 
 
-def validated(tree: dict[str, Any], where: str) -> Any:
+def validated(tree: Tree, where: str) -> Any:
     """The tree as the pydantic model of a design file, or the first finding as an InputError."""
     try:
         return document_model().model_validate(tree)
@@ -36,7 +37,7 @@ def validated(tree: dict[str, Any], where: str) -> Any:
         raise InputError("nested too deeply", where=where) from None
 
 
-def _line(finding: Any, tree: dict[str, Any]) -> str:
+def _line(finding: Any, tree: Tree) -> str:
     steps, last = finding["loc"], len(finding["loc"]) - 1
     unknown = (
         finding["type"] == "extra_forbidden"
@@ -92,7 +93,7 @@ def _example(path: str) -> str:
     )
 
 
-def _dotted(location: list[Any], tree: dict[str, Any]) -> str:
+def _dotted(location: list[Any], tree: Tree) -> str:
     """``gear.planetary.ratio`` rather than ``gear.0.ratio``."""
     parts: list[str] = []
     here: Any = tree

@@ -29,6 +29,7 @@ from actuator_lti.design.quantities import write_limit
 from actuator_lti.design.sections import SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 
 # what a design has that its file does not mention: a section absent here must be written even when empty
 _BARE = Design(
@@ -51,12 +52,12 @@ def write_design(design: Design) -> str:
     return tomli_w.dumps(design_tree(design))
 
 
-def design_tree(design: Design) -> dict[str, Any]:
+def design_tree(design: Design) -> Tree:
     """The tree of plain values behind :func:`write_design`."""
     structure = Structure.of(design)
     head = {"name": design.name, "title": design.title, "axis": design.axis}
     head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
-    tree: dict[str, Any] = {"design": head}
+    tree: Tree = {"design": head}
     for section, path, part in parts_of(design):
         table = _section(design, part, path, section.template, structure)
         here = tree
@@ -79,9 +80,9 @@ def design_tree(design: Design) -> dict[str, Any]:
     return {key: value for key, value in tree.items() if value not in ({}, [])}
 
 
-def _section(design: Design, part: Any, name: str, template: str, structure: Structure) -> dict[str, Any]:
+def _section(design: Design, part: Any, name: str, template: str, structure: Structure) -> Tree:
     defaults = {item.name: item.default for item in dataclass_fields(part)}
-    section: dict[str, Any] = {}
+    section: Tree = {}
     for field in fields_in(template):
         value = getattr(part, field.attribute)
         known = design.parameters.get(f"{name}.{field.key}")
@@ -115,7 +116,7 @@ def _written(text: str) -> str | int | float:
 
 def _entry(known: Parameter) -> Any:
     value = _written(known.text)
-    more: dict[str, Any] = {key: getattr(known, key) for key in ("source", "grade") if getattr(known, key)}
+    more: Tree = {key: getattr(known, key) for key in ("source", "grade") if getattr(known, key)}
     if known.tolerance is not None:
         more["tolerance"] = _tolerance(known.tolerance, known.unit)
     return {"value": value, **more} if more else value
@@ -134,8 +135,8 @@ def _si(value: float | None, unit: str) -> Any:
     return value if unit == "1" else f"{value!r} {unit}"
 
 
-def _requirement(item: Requirement, structure: Structure) -> dict[str, Any]:
-    tree: dict[str, Any] = {"id": item.id, "quantity": item.quantity}
+def _requirement(item: Requirement, structure: Structure) -> Tree:
+    tree: Tree = {"id": item.id, "quantity": item.quantity}
     tree |= {"loop": item.loop} if item.loop is not None else {}
     for key in ("minimum", "maximum"):
         value = getattr(item, key)
@@ -177,10 +178,10 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
     return tomli_w.dumps(tree)
 
 
-def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
+def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
     structure = Structure.of(design)
-    result: dict[str, Any] = {}
+    result: Tree = {}
     for path, value in values.items():
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
@@ -189,7 +190,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> None:
+def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
     lists = ("requirement", *(section.path for section in SECTIONS if section.many))
@@ -211,14 +212,14 @@ def _override(tree: dict[str, Any], path: str, value: Any, design: Design) -> No
     here[parts[-1]] = value
 
 
-def _width_gone(old: dict[str, Any], value: Any) -> bool:
+def _width_gone(old: Tree, value: Any) -> bool:
     """Whether a relative tolerance would be that of a value of zero, which has none."""
     relative = isinstance(old["tolerance"], str) and old["tolerance"].strip().endswith("%")
     number = re.match(r"\s*[-+]?[\d.]+(e[-+]?\d+)?", str(value), re.IGNORECASE)
     return relative and number is not None and float(number[0]) == 0.0
 
 
-def _label(item: dict[str, Any], number: int) -> str:
+def _label(item: Tree, number: int) -> str:
     """What a repeated table is known by: its id, its name, else its number from 1."""
     return str(item.get("id", item.get("name", number)))
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.resolvent import states_at
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Encoder, Filter
@@ -32,12 +33,10 @@ class Face(NamedTuple):
     def response(self, points: np.ndarray) -> np.ndarray:
         """C (p I - A)^-1 B + D at complex points p (s, or z)."""
         p = np.atleast_1d(np.asarray(points, dtype=complex))
-        n = len(self.B)
-        if n == 0:
+        if not self.B:
             return np.full(p.shape, complex(self.D))
         A, B, C = (np.array(part, dtype=float) for part in (self.A, self.B, self.C))
-        x = np.linalg.solve(p[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, None], (len(p), n, 1)))
-        return np.asarray(x[:, :, 0] @ C + self.D)
+        return np.asarray(states_at(A, B[:, None], p)[:, :, 0] @ C + self.D)
 
 
 @dataclass(frozen=True)

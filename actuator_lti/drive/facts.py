@@ -39,8 +39,6 @@ class Capability:
         Current needed at that speed; NaN for an ideal source or where the speed has no bound.
     acceleration_rad_s2 : float or ndarray
         Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
-    accelerates_to_limit : bool or ndarray
-        Whether it is the acceleration limit that sets it, and not the torque.
     torque_margin : float or ndarray
         Motor torque at rest over what friction and the load ask of it to start, the smaller of both
         directions; ``inf`` where nothing holds it. (ECSS-E-ST-33-01C calls it the motorization factor.)
@@ -50,7 +48,6 @@ class Capability:
     rate_limit: Any
     motor_current_A: Any
     acceleration_rad_s2: Any
-    accelerates_to_limit: Any
     torque_margin: Any
 
 
@@ -97,6 +94,14 @@ def torque_gain_Nm_rad(design: Design) -> Any:
         kp, fed = control.current.gain_V_A, control.current.resistance_feedforward * motor.resistance_ohm
         gain = gain * (kp + fed) / (kp + motor.resistance_ohm)
     return gain
+
+
+def resonance_rad_s(design: Design) -> Any:
+    """Resonance of motor and load on the coupling, undamped: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``."""
+    coupling, ratio = design.coupling, design.ratio_to_coupling
+    assert coupling is not None
+    inverse = 1.0 / design.load_side_inertia_kgm2 + 1.0 / (design.motor_side_inertia_kgm2 * ratio**2)
+    return (coupling.stiffness_Nm_rad * inverse) ** 0.5
 
 
 def steady_gain(item: Any) -> Any:
@@ -184,6 +189,11 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     return speed, cause, against + _speed_torque(slopes, speed)
 
 
+def speed_torque_Nm(design: Design, speed_rad_s: Any, direction: int) -> Any:
+    """Torque at the motor of what grows with its speed: viscous friction or its map, behind too, damping."""
+    return _speed_torque(_speed_slopes(design, direction), speed_rad_s)
+
+
 def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
     """Torque of the speed-dependent part at a speed (0 at an unbounded one, where it has no meaning)."""
     bounded = where(finite(speed), speed, 0.0)
@@ -229,7 +239,6 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
         rate_limit=cause,
         motor_current_A=current,
         acceleration_rad_s2=smaller(gain, limit) / design.total_ratio,
-        accelerates_to_limit=limit < gain,
         torque_margin=margin,
     )
 

@@ -140,13 +140,18 @@ def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> float:
 def _described(design: Design, at: Operating, way: int) -> Any:
     W, points = at.speed_amplitude_rad_s, design.friction.map(way)
     assert W is not None
-    dry = 4 * dry_torque(design, at.load_Nm, way) / (pi * W)
+    dry = described_dry(dry_torque(design, at.load_Nm, way), W)
     if not points:
         return design.friction.viscous(way) + dry
     total, last = dry, 0.0
     for start, slope in segments(points):
         total, last = total + (slope - last) * _dead_zone(start / W), slope
     return total
+
+
+def described_dry(dry_Nm: Any, speed_amplitude_rad_s: Any) -> Any:
+    """Slope that dry friction has for a sinusoidal speed, 4 Tc/(pi W)."""
+    return 4 * dry_Nm / (pi * speed_amplitude_rad_s)
 
 
 def _dead_zone(x: float) -> float:

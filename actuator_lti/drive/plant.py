@@ -20,6 +20,12 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Motor
 
 
+Entries = dict[str, Any]
+"""Numbers by the name of a state: floats, arrays of shape (K,) of stacked designs, or traced values."""
+MatrixEntries = dict[tuple[str, str], Any]
+"""The same by the names of row and column."""
+
+
 @dataclass(frozen=True)
 class Plant:
     """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive.
@@ -49,11 +55,11 @@ class Plant:
     B_u: np.ndarray
     B_T: np.ndarray
     B_M: np.ndarray
-    moment: dict[str, Any]
-    rows: dict[str, dict[str, Any]]
+    moment: Entries
+    rows: dict[str, Entries]
 
 
-def matrix(names: tuple[str, ...], entries: dict[tuple[str, str], Any]) -> np.ndarray:
+def matrix(names: tuple[str, ...], entries: MatrixEntries) -> np.ndarray:
     """A square matrix over named states, stacked where an entry is an array of shape (K,)."""
     out = np.zeros((*_stack(entries.values()), len(names), len(names)))
     for (row, column), value in entries.items():
@@ -61,7 +67,7 @@ def matrix(names: tuple[str, ...], entries: dict[tuple[str, str], Any]) -> np.nd
     return out
 
 
-def vector(names: tuple[str, ...], entries: dict[str, Any]) -> np.ndarray:
+def vector(names: tuple[str, ...], entries: Entries) -> np.ndarray:
     """A vector over named states, stacked as `matrix`."""
     out = np.zeros((*_stack(entries.values()), len(names)))
     for name, value in entries.items():
@@ -106,7 +112,7 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
     return _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
 
 
-def _electrical(motor: Motor) -> tuple[dict[tuple[str, str], Any], dict[str, Any]]:
+def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:
     """Equation (1): entries of the current's row, and of B_u."""
     R, L, kE = motor.resistance_ohm, motor.inductance_H, motor.back_emf_constant_Vs_rad
     if R is None or L is None or kE is None or motor.torque_constant_Nm_A is None:
@@ -116,7 +122,7 @@ def _electrical(motor: Motor) -> tuple[dict[tuple[str, str], Any], dict[str, Any
     return {("i", "i"): -R / L, ("i", "w"): -kE / L}, {"i": 1 / L}
 
 
-def _motor_side(motor: Motor, J: Any, slope: Any) -> tuple[dict[tuple[str, str], Any], dict[str, Any]]:
+def _motor_side(motor: Motor, J: Any, slope: Any) -> tuple[MatrixEntries, Entries]:
     """Entries of the motor's own equations (1), (2), (14)."""
     own = {("w", "w"): -slope / J, ("th", "w"): 1.0}
     if motor.source_gain_Nm_V is not None:
@@ -141,7 +147,7 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
     )
 
 
-def _own_moment(design: Design, at: Operating) -> dict[str, Any]:
+def _own_moment(design: Design, at: Operating) -> Entries:
     """The moments of `Load.moment_Nm`, made linear; those that are there."""
     damping = design.load.moment_damping_Nms_rad / design.total_ratio
     gains = {"output_angle": moment_slope(design, at), "load_speed": -damping}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, TypedDict, get_args
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.drive.operating import Operating
@@ -14,8 +14,12 @@ from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import OperatingPoint, RotorState
+    from actuator_lti.limiters import LimiterPath
+    from actuator_lti.loops.simulation import TickSystem
 
 
 def assemble_loops(
@@ -97,8 +101,16 @@ def assemble_loops(
         raise InputError("rotor = 'locked': the design has no current loop")
     opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
     delays = ALL if form == "continuous" else frozenset[str]()
-    parts = _sampled(wired, opened) if form == "sampled" else _continuous(wired, opened, delays)
-    stages: dict[str, Loop] = parts.pop("stages")
+    if form == "sampled":
+        from actuator_lti.loops import sampled
+
+        parts = _sampled(wired)
+        stages = {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages}
+    else:
+        from actuator_lti.loops import continuous
+
+        parts = _continuous(wired, delays)
+        stages = {stage: continuous.stage_loop(wired, stage, delays, opened[stage]) for stage in wired.stages}
     return Loops(
         design=design,
         form=form,
@@ -112,13 +124,22 @@ def assemble_loops(
     )
 
 
-def _sampled(wired: Drive, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]:
+class Parts(TypedDict):
+    """What of `Loops` differs by the algebra of time."""
+
+    break_points: dict[str, Loop]
+    limiters: dict[str, LimiterPath]
+    plain_response: Any
+    moment_system: Callable[[], Any] | None
+    tick_system: TickSystem | None
+
+
+def _sampled(wired: Drive) -> Parts:
     from actuator_lti.loops import sampled
     from actuator_lti.loops.limiter_responses import sampled_limiters
 
     whole = wired.operating.rotor == "free"
     return {
-        "stages": {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages},
         "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
         "limiters": sampled_limiters(wired) if whole else {},
         "plain_response": sampled.reference_to_output(wired) if whole else None,
@@ -127,15 +148,12 @@ def _sampled(wired: Drive, opened: dict[str, tuple[str, ...]]) -> dict[str, Any]
     }
 
 
-def _continuous(wired: Drive, opened: dict[str, tuple[str, ...]], delays: frozenset[str]) -> dict[str, Any]:
+def _continuous(wired: Drive, delays: frozenset[str]) -> Parts:
     from actuator_lti.loops import continuous
     from actuator_lti.loops.limiter_responses import continuous_limiters
 
     whole = wired.operating.rotor == "free"
     return {
-        "stages": {
-            stage: continuous.stage_loop(wired, stage, delays, opened[stage]) for stage in wired.stages
-        },
         "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
         "limiters": continuous_limiters(wired, delays) if whole else {},
         "plain_response": continuous.reference_to_output(wired, delays) if whole else None,

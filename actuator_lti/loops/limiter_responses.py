@@ -11,6 +11,7 @@ from actuator_lti.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.blocks import compose
 from actuator_lti.loops.flow import FlowProgram
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.resolvent import states_at
 
 Response = Callable[[np.ndarray], np.ndarray]
 
@@ -35,8 +36,7 @@ def sampled_limiters(wired: Drive) -> dict[str, LimiterPath]:
 
         def response(omega: np.ndarray) -> np.ndarray:
             z = np.exp(1j * omega * period)
-            x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, [0]], (len(z), n, 1)))
-            values = table[:, :n] @ x[:, :, 0].T + table[:, [n]]
+            values = table[:, :n] @ states_at(A, B[:, [0]], z)[:, :, 0].T + table[:, [n]]
             return _changes(values, omega * period) / (every * wired.tick_s) if rate else values
 
         return response

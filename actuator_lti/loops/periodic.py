@@ -21,14 +21,13 @@ from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block, siso
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.rest_mode import System, without_common_rest_mode
 
 if TYPE_CHECKING:
     from actuator_lti.loops.result import Loops
 
 _GAINS = np.geomspace(1.0, 1e4, 401)
 _DELAY_STEPS_A_TICK = 4
-AT_REST = 1e-12  # from 1: an eigenvalue that no gain of those tried moves away is a mode at rest
-TRIED_GAINS = (0.37, 1.0, 2.9)
 
 
 def phase_blocks(program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0) -> list[Block]:
@@ -99,27 +98,24 @@ class ExactMargins:
     spectral_radius: float
 
 
-def _modes(blocks: Sequence[Block], gain: float) -> np.ndarray:
-    """Eigenvalues over one period with the loop closed through a gain."""
-    A = np.eye(blocks[0].A.shape[0])
-    for block in blocks:
-        A = (block.A - gain * block.B @ block.C) @ A
-    return np.asarray(np.linalg.eigvals(A))
-
-
-def _hidden_at_rest(blocks: Sequence[Block]) -> int:
-    """How many eigenvalues stand at 1 whatever the gain: modes at rest that the loop does not show.
+def _without_rest(blocks: Sequence[Block]) -> list[System]:
+    """Without the modes at rest that no tick shows, or moves: no gain moves them either (`rest_mode`).
 
     A velocity controller's integral under a load that is a spring is one.
     """
-    return min(int(np.sum(np.abs(_modes(blocks, gain) - 1.0) < AT_REST)) for gain in TRIED_GAINS)
+    systems = [(block.A, block.B, block.C) for block in blocks]
+    while True:
+        systems, kept = without_common_rest_mode(systems, 1.0, alone=True)
+        if kept.all():
+            return systems
 
 
-def _radius(blocks: Sequence[Block], gain: float, hidden: int) -> float:
-    """Spectral radius over one period, but for so many modes at rest that no gain moves."""
-    modes = _modes(blocks, gain)
-    shown = modes[np.argsort(np.abs(modes - 1.0))[hidden:]]
-    return float(np.max(np.abs(shown), initial=0.0))
+def _radius(systems: Sequence[System], gain: float) -> float:
+    """Spectral radius over one period with the loop closed through a gain."""
+    over = np.eye(systems[0][0].shape[0])
+    for A, B, C in systems:
+        over = (A - gain * B @ C) @ over
+    return float(np.max(np.abs(np.linalg.eigvals(over)), initial=0.0))
 
 
 def _first_border(excess: Callable[[float], float], grid: Sequence[float], none: float) -> float:
@@ -150,22 +146,22 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
         raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
     wired = wire(loops.design, loops.operating)
     blocks = point_blocks(wired, point)
-    hidden = _hidden_at_rest(blocks)
-    radius = _radius(blocks, 1.0, hidden)
+    systems = _without_rest(blocks)
+    radius = _radius(systems, 1.0)
     nan = float("nan")
     if radius >= 1:
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
-    upper = _first_border(lambda g: _radius(blocks, g, hidden) - 1, list(_GAINS), float("inf"))
-    lower = _first_border(lambda g: _radius(blocks, g, hidden) - 1, list(1 / _GAINS), 0.0)
-    delay = _delay_border(wired, longest_delay_ticks, hidden) if point == "u" else None
+    upper = _first_border(lambda g: _radius(systems, g) - 1, list(_GAINS), float("inf"))
+    lower = _first_border(lambda g: _radius(systems, g) - 1, list(1 / _GAINS), 0.0)
+    delay = _delay_border(wired, longest_delay_ticks) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
 
-def _delay_border(wired: Drive, longest_ticks: float, hidden: int) -> float:
+def _delay_border(wired: Drive, longest_ticks: float) -> float:
     Ts = wired.tick_s
 
     def excess(ticks: float) -> float:
-        return _radius(point_blocks(wired.later(ticks * Ts), "u"), 1.0, hidden) - 1
+        return _radius(_without_rest(point_blocks(wired.later(ticks * Ts), "u")), 1.0) - 1
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = [0.0, *np.arange(step, longest_ticks, step)]

@@ -43,7 +43,8 @@ class StabilityMargins:
       gain never crosses one.
     - ``delay_margin_s``: the smallest of all delay margins; ``inf`` where the gain never crosses one, and
       0 for a loop that is not stable, which can take no delay.
-    - ``modulus_margin``: the smallest distance of L to -1, 1 over the peak of the sensitivity.
+    - ``modulus_margin``: the smallest distance of L to -1, for a stable loop 1 over the peak of the
+      sensitivity.
     - ``disk_margin``: balanced (S + T).
 
     For an unstable loop the crossings are still listed: they say how far it is from the border, and their
@@ -151,8 +152,8 @@ class StabilityMargins:
 
     @property
     def sensitivity_peak_db(self) -> float | None:
-        """Peak of the sensitivity S = 1/(1 + L), dB."""
-        if self.modulus_margin is None:
+        """Peak of the sensitivity S = 1/(1 + L), dB; ``None`` for a loop that is not stable: S has none."""
+        if self.modulus_margin is None or self.stable is False:
             return None
         return -20.0 * math.log10(self.modulus_margin) if self.modulus_margin > 0.0 else math.inf
 

@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from actuator_lti.quantities import ANALYSIS_QUANTITIES, QUANTITIES
+from actuator_lti.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from analyses.corners.result import Asked, Corner, Corners
 from analyses.loop_figures import all_loop_figures
 from analyses.sampling import Factor
@@ -21,7 +21,6 @@ from analyses.sensitivity import population_figures
 from analyses.verdicts import judged
 
 _TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
-MARGINS = {name: f"worst {QUANTITIES[name].words}" for name in ("gain_margin", "phase_margin")}
 
 
 def corners(design: Design, asked: Asked | None = None) -> Corners:
@@ -67,11 +66,15 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
     if design.motor.has_electrical_dynamics:
         both = replace(hot, limits=low.limits)
         yield "hot, low supply", f"{asked.hot_degC:g} °C and {supply}", both
-    for quantity, name in MARGINS.items():
-        values = worst_ends(design, quantity)
+    for quantity in CORNERED:
+        name, values = f"worst {QUANTITIES[quantity].words}", worst_ends(design, quantity)
         if values:
-            words = "each tolerance at the end that lowers it: " + _ends_in_words(design, values)
+            words = f"each tolerance at the end that {_worse(quantity)} it: " + _ends_in_words(design, values)
             yield name, words, with_values(design, values)
+
+
+def _worse(quantity: str) -> str:
+    return "lowers" if QUANTITIES[quantity].better > 0 else "raises"
 
 
 def at_temperature(design: Design, degC: float) -> Design:
@@ -96,9 +99,9 @@ def _thickened(design: Design, factor: float) -> Design:
 
 
 def worst_ends(design: Design, quantity: str) -> dict[str, float]:
-    """For each toleranced number the end of its range that alone lowers a margin most, over all loops.
+    """For each toleranced number the end of its range that alone worsens a figure most, over all loops.
 
-    One at a time, the smallest over the loops counts; a number that lowers it at neither end stays. Torque
+    One at a time, the worst over the loops counts; a number that worsens it at neither end stays. Torque
     and back-EMF constant are one constant and go together.
     """
     ends = [end for each in tolerances(design) for end in _ends(design, *each)]
@@ -110,7 +113,8 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
         figures = population_figures(Population(design, values, 1 + len(ends)), design)
     except InputError:
         return {}
-    columns = [column for name, column in figures.items() if name.endswith(f".{quantity}")]
+    better = QUANTITIES[quantity].better
+    columns = [better * column for name, column in figures.items() if name.endswith(f".{quantity}")]
     margin = np.min(np.nan_to_num(columns, nan=-np.inf), axis=0)
     chosen: dict[str, float] = {}
     for k in range(0, len(ends), 2):

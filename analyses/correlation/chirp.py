@@ -15,6 +15,8 @@ from analyses.correlation.voltage_motor import GRID_S, VoltageMotor
 from analyses.records.record import Record
 
 FloatArray = NDArray[np.float64]
+TOLERANCE = 0.01  # of the amplitude: the law holds
+EDGES_HZ = (4, 8, 16, 32)  # of the bands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +52,7 @@ class ChirpPrediction:
     bands: tuple[tuple[float, float, SignalComparison], ...]
 
 
-def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.01) -> ChirpLaw:
+def find_chirp(time_s: FloatArray, signal: FloatArray) -> ChirpLaw:
     """Fit the law to the well-sampled beginning and follow it on as long as the samples agree.
 
     Raises
@@ -84,7 +86,7 @@ def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.0
         fit = least_squares(lambda p, t=t, y=y, e=end: law(p, e)(t) - y, p, x_scale=[0.01, 0.01, 1e-3, 0.01])
         size = float(np.linalg.norm(fit.fun) / np.linalg.norm(y))
         newest = t > end - 0.1
-        if size > tolerance or np.max(np.abs(fit.fun[newest]), initial=0.0) > 5.0 * tolerance * amplitude:
+        if size > TOLERANCE or np.max(np.abs(fit.fun[newest]), initial=0.0) > 5.0 * TOLERANCE * amplitude:
             break
         p, result = fit.x, law(fit.x, end, size)
         end += 0.05
@@ -93,9 +95,7 @@ def find_chirp(time_s: FloatArray, signal: FloatArray, *, tolerance: float = 0.0
     return result
 
 
-def predict_chirp(
-    motor: VoltageMotor, record: Record, edges_hz: tuple[float, ...] = (4, 8, 16, 32)
-) -> ChirpPrediction:
+def predict_chirp(motor: VoltageMotor, record: Record) -> ChirpPrediction:
     """Predict the logged speed of a chirp record, as far as its voltage is known, and compare it in bands.
 
     The voltage between the rows comes from the law of the chirp, since the rows are too far apart for its
@@ -108,7 +108,7 @@ def predict_chirp(
     time, measured = record.time_s[part], record["speed"][part]
     modelled = np.interp(time, grid, speed)
     frequency = np.array([law.frequency_hz(float(t)) for t in time])
-    limits = [law.start_hz, *(e for e in edges_hz if e < frequency[-1]), float(frequency[-1])]
+    limits = [law.start_hz, *(e for e in EDGES_HZ if e < frequency[-1]), float(frequency[-1])]
     bands = []
     for low, high in pairwise(limits):
         here = (frequency >= low) & (frequency <= high)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.driving import (
@@ -259,8 +260,6 @@ def _difference(
 
 def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:
     """The signals of a run under the names of a record, and its time."""
-    motor = design.effective_motor
-    gain = motor.source_gain_Nm_V
     rate = run.output_speed_rad_s
     return {
         "time": run.time_s,
@@ -271,7 +270,5 @@ def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:
         "velocity": run.motor_speed_rad_s / design.total_ratio if rate is None else rate,
         "current": run.current_A,
         "voltage": run.voltage_V,
-        "force": (motor.torque_constant_Nm_A or 0.0) * run.current_A
-        if gain is None
-        else gain * run.voltage_V,
+        "force": motor_torque_Nm(design, run.current_A, run.voltage_V),
     }

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Controller, Design
+from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from analyses.records.record import Record
 
@@ -234,7 +235,7 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArr
         current = 0.0
     if speed == 0.0 and current == 0.0:
         return rest, rest
-    volts = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * speed
+    volts = 0.0 if motor.source_gain_Nm_V is not None else steady_voltage_V(design, current, speed)
     cascaded = design.controller.current is not None
     first = float(driven.values[0])
     return rest, State(

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from actuator_lti.design.model import Command, Design, Instruments
+from actuator_lti.drive.steady import motor_torque_Nm
 from nonlinear import Drive, State
 
 
@@ -94,8 +95,4 @@ class Rig:
         """In the coupling, at the output; rigid: the motor's torque times the reduction."""
         if self.design.coupling is not None:
             return self.plant.noted("coupling_torque") * self.design.ratio_behind_coupling
-        motor = self.design.effective_motor
-        if motor.source_gain_Nm_V is not None:
-            return motor.source_gain_Nm_V * voltage_V * self.design.total_ratio
-        assert motor.torque_constant_Nm_A is not None
-        return motor.torque_constant_Nm_A * current_A * self.design.total_ratio
+        return float(motor_torque_Nm(self.design, current_A, voltage_V)) * self.design.total_ratio

@@ -64,8 +64,6 @@ class Settling:
         Whether the output still swings in the last quarter, by at least 0.9 of the quarter before.
     hunting_rad, hunting_hz : float or None
         Half the span of the output, and its frequency.
-    time_s, angle_error_rad : ndarray
-        The last quarter, thinned, for drawing.
     """
 
     amplitude_rad: float
@@ -76,8 +74,6 @@ class Settling:
     hunting: bool
     hunting_rad: float | None
     hunting_hz: float | None
-    time_s: np.ndarray
-    angle_error_rad: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -209,7 +205,6 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     frequency = _frequency(run.time_s[-2 * quarter :], error[-2 * quarter :] - error[-2 * quarter :].mean())
     moves = not math.isfinite(span) or (span > QUIET * step_rad and span >= STEADY_SHARE * earlier)
     hunting = moves and frequency is not None
-    thin = slice(None, None, max(1, quarter // 600))
     return Settling(
         amplitude_rad=step_rad,
         wait_s=WAIT_TICKS * Ts,
@@ -219,8 +214,6 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
         hunting=hunting,
         hunting_rad=0.5 * span if hunting else None,
         hunting_hz=frequency if hunting else None,
-        time_s=run.time_s[-quarter:][thin] - run.time_s[-quarter],
-        angle_error_rad=last[thin],
     )
 
 

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.facts import breakaway_torque_Nm
+from actuator_lti.drive.steady import standing_gain, steady_input
 from analyses.linear_states import AT_REST, without_value
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ class StickSlipCycle:
     output_amplitude_rad : float
         Error at rest on either side, output side.
     frequency_hz : float
-    slip_s, rest_s : float
+    rest_s : float
         Of half a period.
     slope : float
         Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts.
@@ -40,7 +42,6 @@ class StickSlipCycle:
 
     output_amplitude_rad: float
     frequency_hz: float
-    slip_s: float
     rest_s: float
     slope: float
 
@@ -126,7 +127,7 @@ def stick_slip_cycle(
     slope = (surplus(error + step) - surplus(error - step)) / (2.0 * step) + 1.0
     _, slipping, resting = result
     hz = 0.5 / (slipping + resting)
-    return StickSlipCycle(error / design.total_ratio, hz, slipping, resting, slope)
+    return StickSlipCycle(error / design.total_ratio, hz, resting, slope)
 
 
 def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | None:
@@ -137,14 +138,14 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
         return None
     if friction.law != "coulomb" or design.load.path == "back-drivable" or friction.dry_Nm(load_Nm) == 0.0:
         return None
-    torque_gain, resistance = _torque_gain(design)
-    start = friction.dry_Nm(load_Nm) * friction.breakaway_ratio / torque_gain
+    torque = breakaway_torque_Nm(design, load_Nm, 1)
+    current, volts = steady_input(design, torque, 0.0)
+    start = torque / standing_gain(design)
     gain = velocity.gain * design.controller.position_loop.gain
     held = {"i": start, "velocity.I": start, "hold_i_ref": start}
-    voltage = start * resistance if design.controller.current is not None else start
-    if design.motor.has_electrical_dynamics and design.controller.current is None:
-        held["i"] = start / resistance
-    held |= {"current.I": voltage} | {name: voltage for name in system.states if name[0] == "u"}
+    if design.motor.has_electrical_dynamics:
+        held["i"] = current
+    held |= {"current.I": volts} | {name: volts for name in system.states if name[0] == "u"}
     error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": design.controller.position_loop.gain}
     if without_value(system.states, held.keys() | error.keys(), AT_REST):
         return None  # what a filter, say, holds before breakaway is not known here
@@ -164,15 +165,3 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
         th=np.array([run["th"] for run in runs]),
         command=np.array([run[key] for run in runs]),
     )
-
-
-def _torque_gain(design: Design) -> tuple[float, float]:
-    """Motor torque per unit of what the speed controller sets, rotor at rest, and the resistance."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V, 1.0
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    if design.controller.current is None:
-        return motor.torque_constant_Nm_A / motor.resistance_ohm, motor.resistance_ohm
-    return motor.torque_constant_Nm_A, motor.resistance_ohm

@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 MIN_PERIODS = 4
+TOP = 0.4  # of the sampling frequency: lines above are not looked at
 BESIDE = 6
 """Places on either side of a line that its noise is taken from; a sharp resonance allows no more."""
 EXCITED = 25.0
@@ -46,14 +47,7 @@ class Lines:
     freedom: int
 
 
-def excited_lines(
-    record: Record,
-    names: tuple[str, ...],
-    period_s: float,
-    *,
-    skip_periods: int = 1,
-    top_hz: float | None = None,
-) -> Lines:
+def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Lines:
     """The lines of a periodic excitation.
 
     A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first. The
@@ -66,11 +60,7 @@ def excited_lines(
     names : tuple of str
         Signals; the first is the one that shows which lines are excited.
     period_s : float
-        Period of the excitation; a whole number of samples.
-    skip_periods : int
-        Periods left out at the start, for the transient.
-    top_hz : float, optional
-        Highest frequency looked at; 0.4 of the sampling frequency otherwise.
+        Period of the excitation; a whole number of samples. The first is left out, for the transient.
 
     Raises
     ------
@@ -83,17 +73,17 @@ def excited_lines(
             f"period {period_s:g} s: must be a whole number (8 or more) of samples of {record.period_s:g} s",
             where=record.name,
         )
-    periods = len(record) // samples - skip_periods
+    periods = len(record) // samples - 1
     if periods < MIN_PERIODS:
         raise InputError(
-            f"{periods} periods of {period_s:g} s after the first {skip_periods}: at least {MIN_PERIODS}",
+            f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}",
             where=record.name,
         )
     start = len(record) - periods * samples
     spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
     means, noise, freedom = _lines(spectra, periods)
     hertz = np.arange(means.shape[1]) / period_s
-    limit = 0.4 / record.period_s if top_hz is None else top_hz
+    limit = TOP / record.period_s
     power = np.abs(means[0]) ** 2
     floor = np.maximum(np.real(noise[:, 0, 0]), 1e-24 * float(np.max(power[1:], initial=0.0)))
     strong = power > 1e-6 * float(np.max(power[1:], initial=0.0))

@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 STEP = 1e-3
 TOLERANCE = 1e-6
+ITERATIONS = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +45,6 @@ def refine_by_output_error(
     measured: FloatArray,
     *,
     ends: Sequence[int] = (),
-    max_iterations: int = 12,
     progress: Callable[[int, int], None] | None = None,
 ) -> OutputErrorResult:
     """Refine parameters so that the simulated output fits the measured one in the least-squares sense.
@@ -84,7 +84,7 @@ def refine_by_output_error(
             raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
         return np.asarray(measured - output)
 
-    p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, max_iterations, progress)
+    p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, progress)
     covariance = _covariance(jac, rest, ends) * np.outer(scale, scale)
     values = values_at(p)
     norm = float(np.linalg.norm(measured))
@@ -103,14 +103,13 @@ def _gauss_newton(
     residual: Callable[[FloatArray], FloatArray],
     count: int,
     paths: tuple[str, ...],
-    max_iterations: int,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, int, FloatArray]:
     p = np.ones(count)
     rest = first = residual(p)
     jac = np.zeros((len(rest), count))
     iteration = 0
-    for iteration in range(1, max_iterations + 1):
+    for iteration in range(1, ITERATIONS + 1):
         for k in range(count):
             h = np.zeros(count)
             h[k] = STEP
@@ -121,7 +120,7 @@ def _gauss_newton(
         change = np.asarray(-np.linalg.lstsq(jac, rest, rcond=None)[0])
         p, rest, moved = _halved_step(residual, p, rest, change)
         if progress is not None:
-            progress(iteration, max_iterations)
+            progress(iteration, ITERATIONS)
         if not moved or np.max(np.abs(change)) < TOLERANCE:
             break
     return p, rest, jac, iteration, first

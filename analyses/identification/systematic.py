@@ -78,9 +78,7 @@ def _base(normals: int, uniforms: int, freedom: int, draws: int) -> tuple[FloatA
     return student, rng.uniform(-1.0, 1.0, (draws, uniforms))
 
 
-def draw_errors(
-    random_covariance: FloatArray, shared: FloatArray, freedom: int, draws: int = DRAWS
-) -> ErrorDraws:
+def draw_errors(random_covariance: FloatArray, shared: FloatArray, freedom: int) -> ErrorDraws:
     """Propagate distributions (GUM Supplement 1): Student errors of the runs, uniform errors of the
     instruments.
 
@@ -93,7 +91,7 @@ def draw_errors(
     freedom : int
         Degrees of freedom of the scatter.
     """
-    student, uniform = _base(len(random_covariance), len(shared), max(freedom, 1), draws)
+    student, uniform = _base(len(random_covariance), len(shared), max(freedom, 1), DRAWS)
     values, vectors = np.linalg.eigh(random_covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     total = student @ root.T

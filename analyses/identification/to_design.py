@@ -161,7 +161,7 @@ def with_fixed(design: Design, asked: Mapping[str, float]) -> Design:
     return with_values(design, dict(asked)) if asked else design
 
 
-def design_with_estimate(design: Design, estimate: Estimate, *, name: str | None = None) -> Design:
+def design_with_estimate(design: Design, estimate: Estimate) -> Design:
     """A design with identified values, normal tolerances of their standard errors, and correlations.
 
     Margins and Monte Carlo then inherit them. Correlations below 0.005 are left out; old ones between the
@@ -173,8 +173,6 @@ def design_with_estimate(design: Design, estimate: Estimate, *, name: str | None
         Everything else comes from it.
     estimate : Estimate
         In SI, as `surface_estimate`, `joint_estimate` and `refined_estimate` give it.
-    name : str, optional
-        Of the new design; the old one's otherwise.
 
     Returns
     -------
@@ -210,7 +208,6 @@ def design_with_estimate(design: Design, estimate: Estimate, *, name: str | None
     kept = [c for c in design.correlations if not {c.first, c.second} <= set(estimate.paths)]
     return replace(
         changed,
-        name=design.name if name is None else name,
         parameters=FrozenMap(parameters),
         correlations=(*kept, *_correlations(estimate.paths, estimate.covariance)),
     )

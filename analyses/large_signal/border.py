@@ -92,13 +92,7 @@ class BorderCheck:
 
 
 def check_border(
-    design: Design,
-    loops: Loops,
-    *,
-    friction_on: bool = False,
-    load_Nm: float = 0.0,
-    count: int = FREQUENCIES,
-    rounds: int = ROUNDS,
+    design: Design, loops: Loops, *, friction_on: bool = False, count: int = FREQUENCIES
 ) -> BorderCheck | None:
     """Bisect the amplitude at which a limit first acts in steady state, at each of several frequencies.
 
@@ -141,11 +135,11 @@ def check_border(
             begin = 0.0 * amplitude if swelling else np.minimum(amplitude, 0.99 * foreseen)
             result = run_tones(
                 design, chosen, which, amplitude, start, begin,
-                load_Nm=load_Nm, friction_on=friction_on, harmonics=1, swelling=swelling,
+                friction_on=friction_on, harmonics=1, swelling=swelling,
             )  # fmt: skip
             return limiter_fractions(result)
 
-        simulated[which], names[which] = _bisect(acting, foreseen, tries, rounds)
+        simulated[which], names[which] = _bisect(acting, foreseen, tries)
 
     if len(limited):
         search(limited, tries)
@@ -163,7 +157,7 @@ def check_border(
         simulated,
         border.active,
         tuple(names),
-        (tries[1] / tries[0]) ** (0.5**rounds) - 1.0,
+        (tries[1] / tries[0]) ** (0.5**ROUNDS) - 1.0,
         _not_linear(design, friction_on),
         left_out,
         border.each_rad,
@@ -210,14 +204,14 @@ def _straight(design: Design) -> Design:
 
 
 def _bisect(
-    acting: Callable[[np.ndarray], np.ndarray], foreseen: np.ndarray, tries: tuple[float, float], rounds: int
+    acting: Callable[[np.ndarray], np.ndarray], foreseen: np.ndarray, tries: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Close in on the border from both sides, all frequencies at once, on a logarithmic scale."""
     low, high = np.log(tries[0] * foreseen), np.log(tries[1] * foreseen)
     at_low, at_high = acting(np.exp(low)), acting(np.exp(high))
     valid = (at_low.max(axis=1) == 0.0) & (at_high.max(axis=1) > 0.0)
     last = at_high
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         middle = 0.5 * (low + high)
         seen = acting(np.exp(middle))
         hit = seen.max(axis=1) > 0.0

@@ -1,4 +1,4 @@
-"""Closed forms for the far side of the border: rate limit, acceleration limit (model.md section 5)."""
+"""Closed forms for the far side of the border (model.md section 5)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 FULL_TRIANGLE = math.sqrt(1.0 + math.pi**2 / 4.0)  # x from which on the output is a whole triangle, 1.8621
-TRIANGLE_DISTORTION, PARABOLA_DISTORTION = 0.1212, 0.0380
 TRIANGLE_THIRD, PARABOLA_THIRD = -1.0 / 9.0, 1.0 / 27.0
-TRIANGLE_CREST = math.sqrt(3.0)
 
 
 @dataclass(frozen=True)
@@ -62,37 +60,3 @@ def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> Rat
     gain = ((0.2908 * x - 1.4396) * x + 1.9232) * x + 0.2230
     angle = ((0.5280 * x - 2.6213) * x + 3.5056) * x - 1.4171
     return RateLimited(x, "between", gain, -math.degrees(angle), None)
-
-
-def onset_frequency_rad_s(amplitude: float, rate_limit: float) -> float:
-    """Angular frequency at which a sine first reaches a pure rate limit."""
-    return rate_limit / amplitude
-
-
-def clamped_onset_amplitude(omega_rad_s: float, rate_limit: float, position_gain: float) -> float:
-    """Onset of a speed clamp behind a P position controller with ideal inner loops.
-
-    ``A = R sqrt(1 + (w/Kv)^2)/w`` (model.md section 5).
-    """
-    return rate_limit * math.hypot(1.0, omega_rad_s / position_gain) / omega_rad_s
-
-
-@dataclass(frozen=True)
-class ParabolaTrain:
-    """Output under a pure acceleration limit, both amplitudes in the unit of the limit times s^2."""
-
-    peak: float
-    fundamental: float
-
-
-def acceleration_limited(acceleration: float, frequency_hz: float) -> ParabolaTrain:
-    """Peak ``a T^2/32`` and fundamental ``a T^2/pi^3`` of a parabola train (model.md section 5).
-
-    Examples
-    --------
-    >>> result = acceleration_limited(20_000.0, 20.0)
-    >>> round(result.peak, 4), round(result.fundamental, 4)
-    (1.5625, 1.6126)
-    """
-    square = acceleration / frequency_hz**2
-    return ParabolaTrain(square / 32.0, square / math.pi**3)

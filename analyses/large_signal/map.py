@@ -83,17 +83,6 @@ class AmplitudeMap:
             phase[ok] = np.degrees(np.unwrap(np.angle(row[ok])))
         return phases
 
-    @property
-    def gain_change_db(self) -> np.ndarray:
-        """Gain against the linear gain, dB."""
-        with np.errstate(divide="ignore"):
-            return np.asarray(20.0 * np.log10(np.abs(self.response / self.linear)))
-
-    @property
-    def phase_change_deg(self) -> np.ndarray:
-        """Phase against the linear phase, -180 to 180 degrees."""
-        return np.asarray(np.degrees(np.angle(self.response / self.linear)))
-
     def plot_map(self, axes: Any = None, *, linear_axis: bool = False) -> Axes:
         """Draw what acts at each point, and the linear onset lines; gives matplotlib's axes."""
         from actuator_lti.plotting import plot_map

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.facts import speed_torque_Nm
+from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
+from actuator_lti.resolvent import states_at
 from analyses.large_signal.formulas import FULL_TRIANGLE
 from analyses.linear_states import without_value
 from nonlinear import Rows
@@ -74,7 +77,7 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
         before.append((A, B))
         A, B = A_j @ A, A_j @ B + B_j[:, 0]
     z = np.exp(1j * omega_rad_s * M * Ts)
-    x = np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B[:, None], (len(z), n, 1)))[..., 0]
+    x = states_at(A, B[:, None], z)[..., 0]
     th, speed = system.outputs.index("th"), "w_ref" in system.outputs
     output = np.zeros(len(z), dtype=complex)
     for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
@@ -114,13 +117,7 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     lag = np.arccos(np.pi / (2.0 * x[which]))
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit
-    drag = design.friction.viscous(1) * limit
-    motor = design.effective_motor
-    if motor.has_electrical_dynamics and motor.torque_constant_Nm_A:
-        current = drag / motor.torque_constant_Nm_A
-        voltage = (motor.resistance_ohm or 0.0) * current + (motor.back_emf_constant_Vs_rad or 0.0) * limit
-    else:
-        current, voltage = 0.0, drag / (motor.source_gain_Nm_V or 1.0)
+    current, voltage = steady_input(design, speed_torque_Nm(design, limit, 1), limit)
     cascaded = design.controller.current is not None
     rows["current_start"][which] = current
     rows["voltage_start"][which] = voltage

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
-from actuator_lti.drive.operating import Operating, slope_at
+from actuator_lti.drive.operating import Operating, described_dry, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
@@ -131,7 +131,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     if friction:
         at = Operating(point="describing-function", speed_amplitude_rad_s=W)
         slope = slope_at(replace(design, friction=own), at)
-    load_slope = behind.viscous_Nms_rad + (4.0 * behind.dry_torque_Nm / (pi * W_l) if friction else 0.0)
+    load_slope = behind.viscous_Nms_rad + (described_dry(behind.dry_torque_Nm, W_l) if friction else 0.0)
     return replace(
         design,
         coupling=Coupling(

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import betaincinv, ndtri
+from scipy.special import betaincinv
 
 from actuator_lti.errors import InputError
 
 SHARES = (0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999)
 BINS = 4096
+CONFIDENCE = 0.95
 SHOWN_BINS = 60
 
 Blocks = Callable[[], Iterable[Mapping[str, np.ndarray]]]
@@ -182,8 +183,8 @@ def _finished(name: str, unit: str, state: _Running, ranks: list[int]) -> Column
     )  # fmt: skip
 
 
-def clopper_pearson(passed: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Confidence interval of a probability from passes in independent trials; covers at least as it claims.
+def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
+    """Interval (95 %) of a probability from passes in independent trials; covers at least as it claims.
 
     For points of a scrambled Sobol sequence the share of passes scatters less than that of independent
     trials, so the interval is on the safe side. Clopper and Pearson 1934.
@@ -196,19 +197,7 @@ def clopper_pearson(passed: int, count: int, confidence: float = 0.95) -> tuple[
     """
     if not 0 <= passed <= count or count == 0:
         raise InputError(f"{passed} of {count}: passes must lie between 0 and the number of samples")
-    tail = 0.5 * (1.0 - confidence)
+    tail = 0.5 * (1.0 - CONFIDENCE)
     low = 0.0 if passed == 0 else float(betaincinv(passed, count - passed + 1, tail))
     high = 1.0 if passed == count else float(betaincinv(passed + 1, count - passed, 1.0 - tail))
     return low, high
-
-
-def wilson(passed: int, count: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Wilson's score interval (1927): about the claimed coverage on average, narrower than the exact one."""
-    if not 0 <= passed <= count or count == 0:
-        raise InputError(f"{passed} of {count}: passes must lie between 0 and the number of samples")
-    z = float(ndtri(0.5 * (1.0 + confidence)))
-    share = passed / count
-    middle = share + z * z / (2 * count)
-    spread = z * np.sqrt(share * (1 - share) / count + z * z / (4 * count * count))
-    scale = 1 + z * z / count
-    return max(0.0, (middle - spread) / scale), min(1.0, (middle + spread) / scale)

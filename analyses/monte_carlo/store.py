@@ -16,6 +16,7 @@ import numpy as np
 
 from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 from analyses.engine import Arrays, Chunk
 
 SCHEMA = "actuator-lti/samples"
@@ -104,7 +105,7 @@ class Store:
             yield held
 
 
-def _read_manifest(path: Path) -> dict[str, Any]:
+def _read_manifest(path: Path) -> Tree:
     try:
         result = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.tree import Tree
 from analyses.engine import Arrays, code_version
 from analyses.monte_carlo.judging import drive_column, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
@@ -107,7 +108,7 @@ class SampleTask:
             units |= step_units()
         return units
 
-    def identity(self) -> dict[str, Any]:
+    def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""
 
         table = self.sampler.table

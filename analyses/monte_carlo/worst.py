@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Requirement
 
 MOST_CORNERS = 1024
+GENERATIONS = 40  # of the evolution
 _UNSTABLE = -1e6  # stands for a distance of - infinity, so that the optimiser can compare
 
 
@@ -41,17 +42,13 @@ def distances(task: SampleTask, requirement: Requirement, points: np.ndarray) ->
     return np.where(np.isneginf(judged), _UNSTABLE, judged)
 
 
-def worst_case(
-    task: SampleTask, requirement: Requirement, worst_samples: np.ndarray, *, effort: int = 40
-) -> WorstCase:
+def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.ndarray) -> WorstCase:
     """Make the worst samples worse.
 
     Parameters
     ----------
     worst_samples : ndarray of int
         Numbers of the worst samples, worst first.
-    effort : int
-        Generations of the evolution.
     """
     from scipy.optimize import differential_evolution, minimize
 
@@ -72,7 +69,7 @@ def worst_case(
     many = max(12, min(40, 4 * size))
     population = _padded(pool[np.argsort(distance, kind="stable")[:many]], many, task.sampler.seed)
     result = differential_evolution(
-        cost, [(0.0, 1.0)] * size, init=population, maxiter=effort, tol=1e-10, polish=False,
+        cost, [(0.0, 1.0)] * size, init=population, maxiter=GENERATIONS, tol=1e-10, polish=False,
         vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
     )  # fmt: skip
     fine = minimize(

@@ -40,11 +40,11 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown_path
+from actuator_lti.tree import Tree
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.records.toml_tables import Table, read_toml
@@ -174,7 +174,7 @@ def _instruments(table: Table) -> Instruments:
 def _spec(table: Table) -> RecordSpec:
     """A recorder's description, ``[drive]`` or ``[sensor]``."""
     try:
-        parts: dict[str, Any] = {
+        parts: Tree = {
             "format": _format(table),
             "time": _time(table.table("time")),
             "signals": _signals(table.table("signals")),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO
@@ -32,9 +32,7 @@ def read_csv_record(
     path: str | Path,
     spec: RecordSpec,
     *,
-    name: str | None = None,
     max_rows: int = MAX_ROWS,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Record:
     """Read a CSV file into a record.
 
@@ -44,13 +42,9 @@ def read_csv_record(
         The file.
     spec : RecordSpec
         Its layout, its columns and units, what to do with bad rows.
-    name : str, optional
-        Name of the record; the file name otherwise.
     max_rows : int
         A file with more rows than this is averaged over 2, 4, 8 ... neighbours while it is read, so that
         memory stays bounded whatever its length; ``Record.averaged`` and a note tell.
-    progress : callable, optional
-        Called with (bytes done, bytes in all).
 
     Returns
     -------
@@ -65,7 +59,7 @@ def read_csv_record(
     path = Path(path)
     account, digest = Account(), hashlib.sha256()
     rows = BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
-    for chunk in stream_csv(path, spec, account=account, digest=digest, progress=progress):
+    for chunk in stream_csv(path, spec, account=account, digest=digest):
         rows.add(chunk)
     table = rows.array()
     counts = account.frozen()
@@ -75,7 +69,7 @@ def read_csv_record(
     signals = {signal.name: np.ascontiguousarray(table[:, k]) for k, signal in enumerate(spec.signals, 1)}
     signals, made = filled(table[:, 0], signals, spec.resample_tolerance, str(path))
     return Record(
-        name=name or shown_path(path.name),
+        name=shown_path(path.name),
         time_s=np.ascontiguousarray(table[:, 0]),
         signals=MappingProxyType(signals),
         units=MappingProxyType({s.name: converter(s).si_unit for s in spec.signals}),
@@ -94,7 +88,6 @@ def stream_csv(
     *,
     account: Account | None = None,
     digest: hashlib._Hash | None = None,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[FloatArray]:
     """Yield blocks of rows, shape (n, 1 + signals): time in s, then each signal in SI.
 
@@ -104,7 +97,7 @@ def stream_csv(
     account = Account() if account is None else account
     converters = [converter(signal) for signal in spec.signals]
     axis = TimeAxis(spec, account, str(path))
-    for block in _blocks(path, spec, account, digest, progress):
+    for block in _blocks(path, spec, account, digest):
         time, values = axis.apply(block)
         for k, convert in enumerate(converters):
             values[:, k] = convert(values[:, k])
@@ -113,21 +106,13 @@ def stream_csv(
             yield np.column_stack([time, values])
 
 
-def _blocks(
-    path: Path,
-    spec: RecordSpec,
-    account: Account,
-    digest: hashlib._Hash | None,
-    progress: Callable[[int, int], None] | None,
-) -> Iterator[Block]:
+def _blocks(path: Path, spec: RecordSpec, account: Account, digest: hashlib._Hash | None) -> Iterator[Block]:
     layout = spec.format
     with open_regular(path, "CSV file") as stream:
-        size, done = path.stat().st_size, 0
         columns: Columns | None = None
         for data in _line_blocks(stream, str(path)):
             if digest is not None:
                 digest.update(data)
-            done += len(data)
             line = account.lines + 1
             account.lines += data.count(b"\n") + (not data.endswith(b"\n"))
             text = clean(data, layout)
@@ -139,8 +124,6 @@ def _blocks(
                 account.columns = header or tuple(str(k + 1) for k in range(columns.count))
             if text:
                 yield _rows(text, line, columns, spec, account, str(path))
-            if progress is not None:
-                progress(done, size)
 
 
 def _rows(text: bytes, line: int, columns: Columns, spec: RecordSpec, account: Account, origin: str) -> Block:

@@ -18,7 +18,7 @@ from analyses.records.spec import RecordSpec
 from analyses.records.table_record import record_of_columns
 
 
-def read_parquet_record(path: str | Path, spec: RecordSpec, *, name: str | None = None) -> Record:
+def read_parquet_record(path: str | Path, spec: RecordSpec) -> Record:
     """Read columns of a Parquet file into a record; columns that hold no numbers are left out.
 
     Raises
@@ -27,7 +27,7 @@ def read_parquet_record(path: str | Path, spec: RecordSpec, *, name: str | None 
         Names the file, the column and the reason.
     """
     path = Path(path)
-    return record_of_columns(parquet_columns(path), spec, path, _digest(path), name=name)
+    return record_of_columns(parquet_columns(path), spec, path, _digest(path))
 
 
 def parquet_columns(path: Path) -> Mapping[str, FloatArray]:

@@ -104,7 +104,7 @@ class Record:
         cut = {name: values[start:stop] for name, values in self.signals.items()}
         return replace(self, time_s=self.time_s[start:stop], signals=MappingProxyType(cut))
 
-    def resampled(self, period_s: float | None = None) -> Record:
+    def resampled(self) -> Record:
         """The record on a regular grid by linear interpolation, with the fact and its error noted.
 
         The error is estimated from the record itself: how far a straight line over as many samples as the
@@ -116,7 +116,7 @@ class Record:
         InputError
             If the error exceeds ``resample_tolerance`` of the range of a signal.
         """
-        period = self.period_s if period_s is None else period_s
+        period = self.period_s
         grid = np.arange(self.time_s[0], self.time_s[-1] + 1e-6 * period, period)
         cut = {name: np.interp(grid, self.time_s, values) for name, values in self.signals.items()}
         steps = np.diff(self.time_s)

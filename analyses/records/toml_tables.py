@@ -10,9 +10,10 @@ from typing import Any
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_campaign_toml
+from actuator_lti.tree import Tree
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> Tree:
     """The file as a dictionary, or one line that says where it is broken."""
     return read_campaign_toml(path, "campaign or record file")
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.steady import motor_torque_Nm
 from analyses.large_signal.grid import tone
-from nonlinear import Trajectory, commands, simulate
+from nonlinear import commands, simulate
 from nonlinear.commands import Command
 
 POINTS = 400
@@ -126,7 +127,7 @@ def _manoeuvre(
     """Simulate, and read speeds, torques and currents."""
     run = simulate(design, command, time, load_Nm, raise_on_failure=False)
     count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
-    torque = motor_torque_Nm(design, run)[-count:]
+    torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-count:]
     current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
     speed = run.motor_speed_rad_s[-count:]
     thin = _thinned(speed, torque)
@@ -153,12 +154,3 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     way = np.concatenate([[0.0], way])
     places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
     return np.unique(np.minimum(places, len(way) - 1))
-
-
-def motor_torque_Nm(design: Design, run: Trajectory) -> np.ndarray:
-    """Motor torque at the ticks: ``kM i``, or the gain times the drive signal of an ideal source."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * run.voltage_V
-    assert motor.torque_constant_Nm_A is not None
-    return motor.torque_constant_Nm_A * run.current_A

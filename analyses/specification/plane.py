@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import circuit_resistance_ohm, stall_torque_Nm
+from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.steady import (
+    motor_torque_Nm,
+    no_load_speed_rad_s,
+    steady_torque_Nm,
+    voltage_limit_torque_Nm,
+)
 
 POINTS = 41
 
@@ -55,18 +61,12 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     if motor.source_gain_Nm_V is not None:
         level("drive signal at its limit", stall_torque_Nm(design))
     else:
-        assert motor.resistance_ohm is not None
-        assert motor.torque_constant_Nm_A is not None
-        assert motor.back_emf_constant_Vs_rad is not None
-        k_M, k_E = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
-        R = circuit_resistance_ohm(design)
         if math.isfinite(limits.voltage_V):
-            no_load = limits.voltage_V / k_E
-            line = np.linspace(0.0, no_load, POINTS)
-            bounds.append(Curve("voltage limit", line, k_M * (limits.voltage_V - k_E * line) / R))
+            line = np.linspace(0.0, no_load_speed_rad_s(design), POINTS)
+            bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
         if design.controller.current is not None:
-            level("peak current", k_M * limits.peak_current_A)
-        level("continuous current", k_M * limits.continuous_current_A)
+            level("peak current", motor_torque_Nm(design, limits.peak_current_A, math.nan))
+        level("continuous current", motor_torque_Nm(design, limits.continuous_current_A, math.nan))
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
         high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
         bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
@@ -76,9 +76,5 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
 
 def _demand(design: Design, load_Nm: float, speed: np.ndarray) -> Curve:
     """Torque for steady motion forward."""
-    friction = design.friction
-    torque = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm + friction.viscous(1) * speed
-    if design.load.path == "back-drivable":
-        torque = torque + abs(load_Nm) / design.total_ratio
     unit = "N" if design.axis == "linear" else "N m"
-    return Curve(f"steady motion at {load_Nm:g} {unit}", speed, torque)
+    return Curve(f"steady motion at {load_Nm:g} {unit}", speed, steady_torque_Nm(design, load_Nm, speed))

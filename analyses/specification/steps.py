@@ -17,7 +17,7 @@ LONGEST_TICKS = 60_000
 
 @dataclass(frozen=True)
 class StepTime:
-    """A step of the command, output side; ``None`` where a level was not reached in ``waited_s``.
+    """A step of the command, output side; ``None`` where a level was not reached in time.
 
     Attributes
     ----------
@@ -30,7 +30,6 @@ class StepTime:
     peak_current_A : float or None
     limits : mapping of str to float
         Fraction of the time in which each limit acts, where it does.
-    waited_s : float
     """
 
     load_Nm: float
@@ -42,7 +41,6 @@ class StepTime:
     peak_rate_rad_s: float
     peak_current_A: float | None
     limits: dict[str, float]
-    waited_s: float
 
 
 def step_times(
@@ -80,7 +78,6 @@ def step_times(
                 for name in LIMITERS
                 if result.limit_fraction(name)[k] > 0.0
             },
-            waited_s=float(wait[k]) * Ts,
         )
         for k in range(len(sizes))
     )

@@ -18,6 +18,8 @@ from nonlinear.loads import series
 
 _SETTLED = 1e-7
 _MOST_TICKS = 400_000
+SKIPPED = 6  # periods at rest, before one is looked at
+LOST_MOTION_S = 2.0
 _DEFLECTION = 1e-4  # of the full deflection: far inside every limit, so that a pendulum is linear too
 
 
@@ -59,18 +61,16 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
         frequency = 1.0 / (ticks * period)
         K = complex(stiffness_at(response, frequency)[0])
         moment = _DEFLECTION * twin.validation.full_deflection_rad * abs(K)
-        made.append(Check(frequency, K, _injected(twin, moment, ticks, ceil(settle / ticks) + 1, True)))
+        made.append(Check(frequency, K, _injected(twin, moment, ticks, True, ceil(settle / ticks) + 1)))
     return tuple(made)
 
 
-def stiffness_at_rest(
-    design: Design, asked: Sequence[tuple[float, float]], skipped: int = 6
-) -> tuple[AtRest, ...]:
+def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
     made = []
     for frequency, moment in asked:
         ticks = _ticks(design, frequency)
-        K = _injected(design, moment, ticks, skipped, False)
+        K = _injected(design, moment, ticks, False)
         made.append(AtRest(moment, 1.0 / (ticks * design.controller.period_s), K))
     return tuple(made)
 
@@ -81,7 +81,7 @@ def _ticks(design: Design, frequency_hz: float) -> int:
     return max(4, round(1.0 / (frequency_hz * design.controller.period_s * every))) * every
 
 
-def _injected(design: Design, amplitude: float, ticks: int, skipped: int, linear: bool) -> complex:
+def _injected(design: Design, amplitude: float, ticks: int, linear: bool, skipped: int = SKIPPED) -> complex:
     """Stiffness seen at a moment of a period of so many ticks, after so many periods."""
     period, count = design.controller.period_s, (skipped + 2) * ticks
     turn = np.exp(-2j * np.pi * np.arange(ticks) / ticks)
@@ -103,30 +103,26 @@ def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
     return LostMotion(play, lost_motion_rad(design), lost_motion_seen(design) if seen else None)
 
 
-def lost_motion_seen(design: Design, moment_Nm: float | None = None, duration_s: float = 2.0) -> float:
+def lost_motion_seen(design: Design) -> float:
     """Lost motion in the simulator: a slow moment to either side and back, the motor's sensor holding.
 
-    Parameters
-    ----------
-    moment_Nm : float, optional
-        Peak; three times the load's dry friction (twice is enough), or a hundredth of the largest moment.
+    Its peak is three times the load's dry friction (twice is enough), or a hundredth of the largest moment.
     """
     coupling, friction = design.coupling, design.load.friction
     if coupling is None or design.controller.position is None:
         raise InputError("stiffness: lost motion needs a coupling and a position loop")
     dry = (friction.dry_torque_Nm if friction else 0.0) * design.ratio_behind_coupling
-    if moment_Nm is None:
-        moment_Nm = max(3.0 * dry, 0.01 * design.load.moment_max_Nm)
+    moment_Nm = max(3.0 * dry, 0.01 * design.load.moment_max_Nm)
     position = replace(design.controller.position, sensor="motor")
     held = replace(
         design,
         controller=replace(design.controller, position=position),
         load=design.load.bare(),
     )
-    quarter = duration_s / 5.0
+    quarter = LOST_MOTION_S / 5.0
     times = quarter * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
     moments = moment_Nm * np.array([0.0, 1.0, 0.0, -1.0, 0.0, 0.0])
-    run = simulate(held, commands.hold(), duration_s, series(times, moments))
+    run = simulate(held, commands.hold(), LOST_MOTION_S, series(times, moments))
     at = [int(k * quarter / design.controller.period_s) for k in (2, 4)]
     twist_out = run.output_angle_rad - run.motor_angle_rad / design.total_ratio
     return float(twist_out[at[0]] - twist_out[at[1]])

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from actuator_lti.design.model import Filter
+from actuator_lti.drive.facts import resonance_rad_s as free_resonance_rad_s
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
@@ -123,9 +124,7 @@ def resonance_rad_s(design: Design) -> float:
     low, high = band_rad_s(design)
     if design.coupling is None:
         return sqrt(low * high)
-    inverse = 1.0 / design.load_side_inertia_kgm2
-    inverse += 1.0 / (design.motor_side_inertia_kgm2 * design.ratio_to_coupling**2)
-    return float(np.clip(sqrt(design.coupling.stiffness_Nm_rad * inverse), low, high))
+    return float(np.clip(free_resonance_rad_s(design), low, high))
 
 
 def _notch(design: Design) -> tuple[Filter, list[Variable]]:

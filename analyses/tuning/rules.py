@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING
 
+from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
@@ -116,40 +117,28 @@ class RuleGains:
     steps: tuple[str, ...]
 
 
-def rule_gains(design: Design, separation: float = SEPARATION) -> RuleGains:
+def rule_gains(design: Design) -> RuleGains:
     """Start gains of every loop that a design has.
 
     Current: magnitude optimum with T_sigma = d + T/2. Velocity: symmetric optimum for 60 deg, with the
     current loop as a lag 2 T_sigma, its own hold, and what the speed measurement costs. Position: the
-    velocity loop's crossover over ``separation``. Where a stage is missing, the next one takes its place.
+    velocity loop's crossover over `SEPARATION`. Where a stage is missing, the next one takes its place.
     """
     values: dict[str, float] = {}
     steps: list[str] = []
     small = design.controller.computing_delay_s + 0.5 * design.controller.period_s
-    torque = _torque_gain(design)
+    torque = standing_gain(design)
     if design.controller.current is not None:
         small = _current(design, small, values, steps)
-        assert design.effective_motor.torque_constant_Nm_A is not None
-        torque = design.effective_motor.torque_constant_Nm_A
     if design.controller.velocity is not None:
         crossover = _velocity(design, small, torque, values, steps)
         if design.controller.position is not None:
-            values["control.position.gain"] = crossover / separation
-            steps.append(f"position: velocity crossover {crossover:.4g} rad/s over {separation:g}")
+            values["control.position.gain"] = crossover / SEPARATION
+            steps.append(f"position: velocity crossover {crossover:.4g} rad/s over {SEPARATION:g}")
     elif design.controller.position is not None:
         values["control.position.gain"] = _direct(design, small, torque)
         steps.append("position: no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below")
     return RuleGains(values, tuple(steps))
-
-
-def _torque_gain(design: Design) -> float:
-    """Torque per volt (standing) where there is no current loop."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    return motor.torque_constant_Nm_A / motor.resistance_ohm
 
 
 def _current(design: Design, small: float, values: dict[str, float], steps: list[str]) -> float:
@@ -187,12 +176,7 @@ def _velocity(design: Design, lag: float, torque: float, values: dict[str, float
 
 def _direct(design: Design, small: float, torque: float) -> float:
     """Position gain where nothing lies between: |drive| = 1 at a tenth of 1/T_sigma or at its corner."""
-    motor = design.effective_motor
-    drag = design.friction.viscous_Nms_rad
-    if motor.has_electrical_dynamics and design.controller.current is None:
-        assert motor.back_emf_constant_Vs_rad is not None
-        drag += torque * motor.back_emf_constant_Vs_rad
-    corner = drag / design.inertia_kgm2
+    corner = own_drag_Nms_rad(design) / design.inertia_kgm2
     omega = min(0.1 / small, corner) if corner > 0.0 else 0.1 / small
     response = torque / (design.inertia_kgm2 * abs(complex(corner, omega)) * omega)
     return 1.0 / response

@@ -57,7 +57,6 @@ def compile_files(
     target: str,
     extra: Sequence[str] = (),
     *,
-    libraries: Sequence[str] = ("-lm",),
     command: Sequence[str] | None = None,
 ) -> bytes:
     """Compile C files given as text; returns the bytes of ``output``.
@@ -74,7 +73,7 @@ def compile_files(
             (folder / file).write_text(text, encoding="utf-8")
         sources = sorted(file for file in texts if file.endswith(".c"))
         # relative names: the bytes do not depend on where the folder lies
-        call = [*chosen, *FLAGS, *extra, *sources, "-o", output, *libraries]
+        call = [*chosen, *FLAGS, *extra, *sources, "-o", output, "-lm"]
         try:
             done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False, timeout=600)
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.batch import _figures, _quoted, _response, _run
+from actuator_lti.tree import Tree
 from nonlinear.emit import Program, emit_c
 from nonlinear.emit.kinds import Kind
 from nonlinear.export import (
@@ -134,10 +135,10 @@ def kept_wasm() -> bytes:
     return files("nonlinear.export").joinpath("wasm", _NAME).read_bytes()
 
 
-def record() -> dict[str, Any]:
+def record() -> Tree:
     """What is known of the kept module: hash of its sources and of itself, compiler."""
     text = files("nonlinear.export").joinpath("wasm", _RECORD).read_text(encoding="utf-8")
-    known: dict[str, Any] = json.loads(text)
+    known: Tree = json.loads(text)
     return known
 
 

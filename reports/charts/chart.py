@@ -6,7 +6,7 @@ A column is a picture of its own, so that columns stack where the screen is narr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -140,9 +140,9 @@ class Panel:
         """Shade a stretch of x."""
         self.items.append(Band(low=low, high=high, across="x", look=Look(**_shade(look)), label=label))
 
-    def band_y(self, low: float, high: float, label: str = "", **look: Any) -> None:
+    def band_y(self, low: float, high: float, **look: Any) -> None:
         """Shade a stretch of y."""
-        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look)), label=label))
+        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look))))
 
     def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
         """Fill outlines."""
@@ -214,6 +214,6 @@ def numbers(values: Values) -> np.ndarray:
     return np.asarray(values, dtype=float)
 
 
-def _shade(look: dict[str, Any]) -> dict[str, Any]:
+def _shade(look: Mapping[str, Any]) -> dict[str, Any]:
     """Fill with the colour, faintly, without an edge."""
     return {"fill": look.get("colour", "c1"), "opacity": 0.13, "width": 0.0, **look}

@@ -6,7 +6,7 @@ paper the light colour itself.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 COLOURS = {
     "ink": "#1f2933",
@@ -22,10 +22,9 @@ COLOURS = {
     "c7": "#7a5c1e",
 }
 BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
-INK, MUTED, PAPER = "ink", "muted", "paper"
+INK, MUTED = "ink", "muted"
 # lengths of dash and gap; the first is a full line
 DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")
-DOTTED, DASHED = 2, 1
 MARKERS = "osD^v+x"
 HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
 
@@ -52,7 +51,24 @@ HATCH_PATHS = {
 }
 
 
-def series(k: int) -> dict[str, Any]:
+class Style(TypedDict, total=False):
+    """How an item of a chart is drawn: fields of `reports.charts.chart.Look` and of a curve, by name."""
+
+    colour: str
+    dash: int
+    width: float
+    opacity: float
+    marker: str
+    size: float
+    hollow: bool
+    fill: str
+    hatch: str
+    every: int
+    line: bool
+    read: bool
+
+
+def series(k: int) -> Style:
     """Give colour and dash of the k-th series."""
     return {"colour": SERIES[k % 7], "dash": k % 7}
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 
@@ -62,7 +63,7 @@ def corners(
     leave_with(result.passed)
 
 
-def _json(result: Corners) -> dict[str, Any]:
+def _json(result: Corners) -> Tree:
     from dataclasses import asdict
 
     return {
@@ -93,13 +94,15 @@ def _json(result: Corners) -> dict[str, Any]:
 
 
 def _lines(corner: Corner) -> list[str]:
-    from reports.sections.corners import least, unmet
+    from actuator_lti.quantities import CORNERED, QUANTITIES
+    from reports.sections.corners import superlative, unmet, worst
 
     parts = []
-    for attribute, words, unit in (("gain_margin_db", "gain", "dB"), ("phase_margin_deg", "phase", "deg")):
-        result = least(corner, attribute)
-        if result is not None:
-            parts.append(f"least {words} margin {result[0]:.1f} {unit} ({result[1]} loop)")
+    for quantity in (QUANTITIES[name] for name in CORNERED):
+        found = worst(corner, quantity)
+        if found is not None:
+            value, unit = found[0] * quantity.shown[1], quantity.shown[0]
+            parts.append(f"{superlative(quantity)} {quantity.words} {value:.1f} {unit} ({found[1]} loop)")
     missed = unmet(corner)
     parts.append(f"not met: {missed}" if missed else "all met")
     return [f"  {corner.name}: {corner.words}", f"    {', '.join(parts)}"]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import JsonOption, QuietOption
 from reports.cli.targets import folder_for_results
@@ -146,7 +147,7 @@ def _show(sections: list[Section], verdict: bool | None) -> None:
         print_section(made, verdict if k == 0 else None)
 
 
-def _data(results: list[CorrelationResult]) -> dict[str, Any]:
+def _data(results: list[CorrelationResult]) -> Tree:
     """Every record, and all of them together."""
     from dataclasses import asdict
 
@@ -159,7 +160,7 @@ def _data(results: list[CorrelationResult]) -> dict[str, Any]:
     }
 
 
-def _plain(result: CorrelationResult) -> dict[str, Any]:
+def _plain(result: CorrelationResult) -> Tree:
     from dataclasses import asdict
 
     from reports.identification_json import inputs_json

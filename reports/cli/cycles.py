@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 
@@ -36,7 +37,7 @@ def cycles(
     leave_with(result.hunting is None)
 
 
-def _json(limit_cycles: LimitCycles) -> dict[str, Any]:
+def _json(limit_cycles: LimitCycles) -> Tree:
     """SI, at the output."""
     return {
         "design": limit_cycles.design.name,

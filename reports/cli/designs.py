@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from actuator_lti.tree import Tree
 from reports.cli.options import JsonOption
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def designs(as_json: JsonOption = False) -> None:
         out.print(Padding(Text(facts), (0, 0, 0, 4)))
 
 
-def _row(design: Design) -> dict[str, Any]:
+def _row(design: Design) -> Tree:
     """What the list says of one design."""
     from actuator_lti.design import design_hash, warnings_of
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from actuator_lti.tree import Tree
+
 if TYPE_CHECKING:
     from actuator_lti.design import Design
 
@@ -62,7 +64,7 @@ def output_quantity(option: str, words: str | None, drive: Design) -> float | No
         raise InputError(f'{option} {words!r}: {reason}; allowed: a value such as "{example}"') from None
 
 
-def read_changes(changes: Sequence[str]) -> dict[str, Any]:
+def read_changes(changes: Sequence[str]) -> Tree:
     """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
 
     Examples
@@ -72,7 +74,7 @@ def read_changes(changes: Sequence[str]) -> dict[str, Any]:
     """
     from actuator_lti.errors import InputError
 
-    result: dict[str, Any] = {}
+    result: Tree = {}
     for words in changes:
         key, equals, value = words.partition("=")
         if not equals or not key.strip():

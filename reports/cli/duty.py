@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive, output_quantity
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, read_load
 
@@ -76,7 +77,7 @@ def _known(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _json(result: Duty) -> dict[str, Any]:
+def _json(result: Duty) -> Tree:
     """Everything but the curves, SI."""
     from dataclasses import asdict
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 from reports.cli.targets import folder_for_results, refuse_existing
@@ -81,7 +82,7 @@ def _say(code_check: CodeCheck | None) -> None:
         print_line(summary(code_check))
 
 
-def _check_json(code_check: CodeCheck | None) -> dict[str, Any]:
+def _check_json(code_check: CodeCheck | None) -> Tree:
     from reports.export_check import summary
 
     return (

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive, output_quantity
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, read_load
 
@@ -75,7 +76,7 @@ def failures(
         print_line(line)
 
 
-def _json(result: Failures) -> dict[str, Any]:
+def _json(result: Failures) -> Tree:
     """Everything but the curves, SI."""
     from dataclasses import asdict, fields
 

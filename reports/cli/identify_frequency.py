@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
@@ -72,7 +73,7 @@ def bench(folder: Path, name: str, drive: Design, seed: int, force: bool, as_jso
     )
 
 
-def as_data(result: FrequencyResult, written: Path | None) -> dict[str, Any]:
+def as_data(result: FrequencyResult, written: Path | None) -> Tree:
     """The result as plain data, in SI."""
 
     from reports.identification_json import inputs_json, items_json

@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
@@ -54,7 +55,7 @@ def named_apart(records: Sequence[Any], taken: Sequence[str] = ()) -> list[Any]:
     return out
 
 
-def as_data(result: BenchResult, written: Path | None) -> dict[str, Any]:
+def as_data(result: BenchResult, written: Path | None) -> Tree:
     """The result as plain data, in SI."""
 
     from reports.identification_json import inputs_json, items_json

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
@@ -72,7 +73,7 @@ def margins(
     figures = all_loop_figures(loops, step=form != "continuous", certify=True)
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
-    where: dict[str, Any] = {
+    where: Tree = {
         "design": drive.name,
         "form": form,
         "operating_point": operating_point,

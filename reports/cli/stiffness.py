@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from math import isfinite, isinf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 
@@ -57,7 +58,7 @@ def _known(value: float | None) -> float | None:
     return None if value is None or not isfinite(value) else float(value)
 
 
-def _json(result: Stiffness) -> dict[str, Any]:
+def _json(result: Stiffness) -> Tree:
     """Everything for a machine; null where a stiffness is infinite."""
     import numpy as np
 

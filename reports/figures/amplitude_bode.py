@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict
+from typing import Literal, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -66,7 +66,7 @@ def _responses(panel: Panel, data: Data, key: Literal["gain_db", "phase_deg"]) -
     linear = {"colour": style.MUTED, "width": 4.2, "opacity": 0.45}
     panel.curve(data["frequency_hz"], data["linear"][key], "linear", **linear)
     for k, series in enumerate(data["series"]):
-        look: dict[str, Any] = {**style.series(k), "marker": MARKERS[k % 7], "size": 4.4, "every": 6}
+        look: style.Style = {**style.series(k), "marker": MARKERS[k % 7], "size": 4.4, "every": 6}
         panel.curve(data["frequency_hz"], series[key], series["label"], **look)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -110,7 +110,7 @@ def _phase_margins(data: Data, top: Panel, bottom: Panel, shown: int) -> None:
             continue
         phase = _at(f, data["frequency_hz"], data["series"][0]["phase_deg"])
         border = 180.0 * (2 * round(((phase - deg) / 180.0 - 1) / 2) + 1)
-        thin: dict[str, Any] = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
+        thin: style.Style = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
         top.points([f], [0.0], colour=GREEN, size=6.5, read=False)
         top.curve([f, f], [0.0, top_low], **thin)
         bottom.curve([f, f], [high, phase], **thin)

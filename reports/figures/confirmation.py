@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -64,7 +64,7 @@ def _released(panel: Panel, data: Data) -> None:
     """Border over linear border for small, medium and large deviations."""
     for k, item in enumerate(data["released"]):
         x = [j + 0.06 * (k - len(data["released"]) / 2) for j in range(len(item["sizes"]))]
-        look: dict[str, Any] = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
+        look: style.Style = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
         panel.curve(x, _drawn(item["without"]), item["label"], marker="o", **look)
         panel.curve(x, _drawn(item["with_friction"]), item["label"], marker="s", hollow=True, dash=1, **look)
     panel.rule_y(1.0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -54,7 +54,7 @@ def _waits(panel: Panel, data: Data) -> None:
     """Draw the time until the output moves against the size of the step."""
     for k, wait in enumerate(data["waits"]):
         panel.curve(wait["amplitude"], wait["predicted_ms"], f"{wait['label']}: predicted", **style.series(k))
-        look: dict[str, Any] = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
+        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
         panel.points(wait["amplitude"], wait["simulated_ms"], f"{wait['label']}: simulated", **look)
     panel.x.log = panel.y.log = True
     panel.x.label, panel.y.label = f"step, {data['wait_unit']}", "time to first motion, ms"

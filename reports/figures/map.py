@@ -20,7 +20,7 @@ COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE} | {
 WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"} | {
     name: limiter.words for name, limiter in LIMITERS.items()
 }
-GLYPHS: dict[str, dict[str, Any]] = {
+GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},
     "distorted": {"marker": ".", "size": 4.2},
@@ -133,7 +133,7 @@ def _glyphs(panel: Panel, names: list[str], waveform: np.ndarray, x: np.ndarray,
 def _lines(panel: Panel, data: Data) -> None:
     """Draw A_k(w) of every limiter, and the amplitudes at which the simulator first limits."""
     for line in data["onset"]:
-        look: dict[str, Any] = {"colour": COLOURS[line["name"]], "dash": LINES[line["name"]], "width": 2.3}
+        look: style.Style = {"colour": COLOURS[line["name"]], "dash": LINES[line["name"]], "width": 2.3}
         panel.curve(data["frequency_hz"], line["amplitude"], line["label"], **look)
     for k, points in enumerate(data["points"]):
         look = {"colour": style.INK, "marker": "Dv"[k % 2], "size": 7.0, "hollow": True}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict
+from typing import Literal, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Values
@@ -54,7 +54,7 @@ def draw(data: Data) -> Chart:
     return chart
 
 
-def _look(k: int) -> dict[str, Any]:
+def _look(k: int) -> style.Style:
     colour = style.INK if k == 0 else style.SERIES[(k - 1) % 7]
     return {"colour": colour, "dash": k % 7, "width": 2.4 if k == 0 else 1.7}
 

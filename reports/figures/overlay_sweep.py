@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -57,7 +57,7 @@ def _overlay(panel: Panel, data: Data, linear: Values, measured: Values) -> None
     """Draw the linear line and the measured points."""
     f = data["frequency_hz"]
     panel.curve(f, linear, "linear loop", colour=style.BLUE)
-    look: dict[str, Any] = {"size": 5.0, "hollow": True, "colour": style.ORANGE}
+    look: style.Style = {"size": 5.0, "hollow": True, "colour": style.ORANGE}
     panel.points(f, measured, "measured by injection", **look)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -29,7 +29,7 @@ def draw(data: Data) -> Chart:
     chart = Chart(width=style.WIDE, height=500.0)
     top, bottom, off = chart.column(3, 3, 2)
     for k, series in enumerate(data["series"]):
-        look: dict[str, Any] = style.series(k)
+        look: style.Style = style.series(k)
         if series["points"]:
             look = {"colour": style.SERIES[k % 7], "marker": "o", "size": 6.0, "hollow": True, "line": False}
         top.curve(data["frequency_hz"], series["magnitude_db"], series["label"], **look)

@@ -9,7 +9,20 @@ from typing import Any
 import numpy as np
 
 from reports.charts.chart import Chart, Panel
-from reports.charts.paint import BLUE, BROWN, GREEN, INK, MUTED, ORANGE, PURPLE, RED, SERIES, SKY, series
+from reports.charts.paint import (
+    BLUE,
+    BROWN,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    RED,
+    SERIES,
+    SKY,
+    Style,
+    series,
+)
 from reports.numbers import hertz, time_unit, to_minus
 
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
@@ -29,6 +42,7 @@ __all__ = [
     "WIDE",
     "Chart",
     "Panel",
+    "Style",
     "Values",
     "bound",
     "differences",

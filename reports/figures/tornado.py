@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart
@@ -35,7 +35,7 @@ def draw(data: Data) -> Chart:
     bars, base = data["bars"][:MOST], data["base"]
     chart = Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
     panel = chart.panel()
-    low: dict[str, Any] = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
+    low: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
         if bar["low"] is not None:
             panel.bar(float(k), base, bar["low"], data["low_label"], **low)

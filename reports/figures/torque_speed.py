@@ -5,7 +5,7 @@ Motion backwards is turned by half a turn, so that torque below zero brakes.
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart, Panel, Values
@@ -57,7 +57,7 @@ def draw(data: Data) -> Chart:
     panel.y.limits(-1.12 * data["top"], 1.25 * data["top"])
     panel.rule_y(0.0)
     for k, path in enumerate(data["paths"]):
-        look: dict[str, Any] = {"colour": style.SERIES[(k + 2) % 7], "dash": k % 7, "width": 1.5}
+        look: style.Style = {"colour": style.SERIES[(k + 2) % 7], "dash": k % 7, "width": 1.5}
         panel.curve(path["speed"], path["torque"], path["label"], **look)
     for bound in data["bounds"]:
         _bound(panel, bound, data)
@@ -74,7 +74,7 @@ def _bound(panel: Panel, bound: Line, data: Data) -> None:
     """Draw one bound in both halves, named once."""
     colour, speed, torque = BOUND_COLOURS.get(bound["label"], style.INK), bound["speed"], bound["torque"]
     upright = speed[0] == speed[-1]
-    look: dict[str, Any] = {"colour": colour, "width": 1.3, "dash": 1}
+    look: style.Style = {"colour": colour, "width": 1.3, "dash": 1}
     if upright:
         panel.rule_x(speed[0], bound["label"], **look)
         return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NotRequired, TypedDict
+from typing import NotRequired, TypedDict
 
 from reports.figures import style
 from reports.figures.style import Chart
@@ -42,16 +42,16 @@ def draw(data: Data) -> Chart:
         if chosen:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
-    required: dict[str, Any] = {"label": "required", "colour": style.RED, "width": 1.2, "dash": 1}
+    required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1}
     band, margin, at = data.get("bandwidth_min_hz"), data.get("phase_margin_min_deg"), data.get("chosen")
     if band is not None:
         panel.x.see([band])
-        panel.rule_x(band, **required)
+        panel.rule_x(band, label="required", **required)
     if margin is not None:
         panel.y.see([margin])
-        panel.rule_y(margin, **required)
+        panel.rule_y(margin, label="required", **required)
     if at is not None:
-        look: dict[str, Any] = {"marker": "D", "size": 9.0, "colour": style.ORANGE}
+        look: style.Style = {"marker": "D", "size": 9.0, "colour": style.ORANGE}
         panel.points([at["bandwidth_hz"]], [at["phase_margin_deg"]], "tuned", **look)
     panel.x.label = "bandwidth of the position loop, Hz"
     panel.y.label = "smallest phase margin of all loops, deg"

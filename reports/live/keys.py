@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
 from nonlinear.export.page import changes_figure, changes_row, figure_statements, row_statements
+from reports.live_schema import FixedKey, NamedKey, SliderKey
 
 Figure = tuple[str, float]  # of the whole drive: name, load in N m
 
@@ -43,8 +43,8 @@ class Followed:
         cannot be followed.
     """
 
-    free: list[dict[str, Any]]
-    fixed: list[dict[str, Any]]
+    free: list[SliderKey]
+    fixed: list[FixedKey]
     lines: list[str]
     figures: dict[Figure, list[str]]
 
@@ -52,8 +52,8 @@ class Followed:
 def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     """Follow every numeric key of a design into its row, and into some figures of the whole drive."""
     asked = tuple(dict.fromkeys(figures))
-    free: list[dict[str, Any]] = []
-    fixed: list[dict[str, Any]] = []
+    free: list[SliderKey] = []
+    fixed: list[FixedKey] = []
     for path in paths_of(design):
         if path.startswith("validation."):
             continue
@@ -94,7 +94,7 @@ def _top(design: Design, path: str) -> float:
     return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
 
 
-def _named(design: Design, path: str) -> dict[str, Any]:
+def _named(design: Design, path: str) -> NamedKey:
     """Give path, value and unit as the design file writes them."""
     field, _ = located(design, path)
     value, known = parameter_value(design, path), design.parameters.get(path)
@@ -122,7 +122,7 @@ def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, flo
     return own, value / said
 
 
-def _slider(design: Design, path: str) -> dict[str, Any]:
+def _slider(design: Design, path: str) -> SliderKey:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
     made, value = _named(design, path), parameter_value(design, path)

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from actuator_lti.quantities import (
+    DRIVE_QUANTITIES,
+    LOOP_QUANTITIES,
+    LOOPS,
+    QUANTITIES,
+    Quantity,
+    judged_loops,
+)
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, page
@@ -17,6 +23,15 @@ from reports.figures.map import COLOURS, WORDS
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
+from reports.live_schema import (
+    FollowedFigure,
+    FollowedLimit,
+    LiveData,
+    MapData,
+    NotFollowed,
+    Refused,
+    StepData,
+)
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
 MAP = "The friction of the loops has the slope of the first piece of its map."
@@ -27,7 +42,7 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design) -> dict[str, Any]:
+def live_model(design: Design) -> LiveData | Refused:
     """Give the page's data, or why there is none under ``refused``."""
     if not design.controller.stages:
         return {"refused": OPEN}
@@ -55,6 +70,7 @@ def live_model(design: Design) -> dict[str, Any]:
         "multiples": [list(pair) for pair in _multiples(design)],
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
+        "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
         "requirements": [*_on_loops(design), *_on_drive(design, result.figures)],
         "apart": _apart(design, result.figures),
         "step": _step(design),
@@ -63,6 +79,19 @@ def live_model(design: Design) -> dict[str, Any]:
         "map": _map(design),
         "text": text,
         "patches": places,
+    }
+
+
+def _followed(quantity: Quantity) -> FollowedFigure:
+    """Give a column of the page's table."""
+    unit, factor = quantity.shown
+    return {
+        "name": quantity.name,
+        "label": quantity.label,
+        "unit": unit,
+        "factor": factor,
+        "timed": quantity.timed,
+        "response": quantity.of_response,
     }
 
 
@@ -80,7 +109,7 @@ def _multiples(design: Design) -> list[tuple[str, str]]:
     return [("control.position.every", "control.velocity.every")]
 
 
-def _limit(item: Requirement) -> dict[str, Any]:
+def _limit(item: Requirement) -> FollowedLimit:
     """Give a requirement as the page judges it."""
     quantity = QUANTITIES[item.quantity]
     return {
@@ -89,13 +118,14 @@ def _limit(item: Requirement) -> dict[str, Any]:
         "quantity": item.quantity,
         "words": quantity.words,
         "absolute": quantity.absolute,
+        "timed": quantity.timed,
         "unit": "" if item.unit == "1" else item.unit,
         "minimum": item.minimum,
         "maximum": item.maximum,
     }
 
 
-def _on_loops(design: Design) -> list[dict[str, Any]]:
+def _on_loops(design: Design) -> list[FollowedLimit]:
     """Give the requirements on loops, one for each loop that it holds for."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
     return [
@@ -116,7 +146,7 @@ def _figures(design: Design) -> list[Figure]:
     ]
 
 
-def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[str, Any]]:
+def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[FollowedLimit]:
     """Give the requirements on the whole drive whose figures follow, each with its statements."""
     return [
         {**_limit(item), "load": item.load_Nm or 0.0, "lines": figures[item.quantity, item.load_Nm or 0.0]}
@@ -125,7 +155,7 @@ def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[
     ]
 
 
-def _apart(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[str, Any]]:
+def _apart(design: Design, figures: Mapping[Figure, list[str]]) -> list[NotFollowed]:
     """Give the requirements that do not follow, with what they limit."""
     return [
         {"id": item.id, "words": QUANTITIES[item.quantity].words}
@@ -134,7 +164,7 @@ def _apart(design: Design, figures: Mapping[Figure, list[str]]) -> list[dict[str
     ]
 
 
-def _step(design: Design) -> dict[str, Any]:
+def _step(design: Design) -> StepData:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
     outermost, linear_axis = design.controller.outermost, design.axis == "linear"
     if outermost == "position":
@@ -158,7 +188,7 @@ def _step(design: Design) -> dict[str, Any]:
     }
 
 
-def _map(design: Design) -> dict[str, Any] | None:
+def _map(design: Design) -> MapData | None:
     """Give the cells of the map of sines, and the rule that names them; none without a position loop."""
     if design.controller.position is None:
         return None

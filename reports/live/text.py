@@ -7,11 +7,12 @@ from typing import Any
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import overridden_text, write_design
+from reports.live_schema import SliderKey
 
 MARK = "@@changed@@"
 
 
-def patches(design: Design, keys: Sequence[dict[str, Any]]) -> tuple[str, list[list[Any]]]:
+def patches(design: Design, keys: Sequence[SliderKey]) -> tuple[str, list[list[Any]]]:
     """Give the text of a design, and for each key what its change replaces: from, to, before, after.
 
     The changed text is ``before``, the value, ``after`` in place of the characters from ``from`` to ``to``.

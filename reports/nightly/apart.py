@@ -1,123 +1,245 @@
-"""Jobs of a night on a Dask cluster: each in a process of its own there, its result brought home.
+"""Jobs of a night, each in a process that can be ended; what runs at once says `analyses.engine.Engine`.
 
-A process of its own can be ended when it takes too long or too much memory, and a job that kills it does not
-take the Dask worker along. A lost worker's jobs are done again elsewhere; what is finished is in the cache.
+A process of its own can be ended when it takes too long or too much memory, and a job that kills it takes
+nobody along. Here the processes stay warm from job to job, on a Dask cluster each job has a fresh one. Its
+result comes home as an entry of the cache; a lost Dask worker's jobs are done again elsewhere.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from queue import SimpleQueue
-from threading import Thread
+from threading import Lock, Timer
+from typing import Any
 
 from actuator_lti.errors import InputError
 from analyses.engine import Engine
+from reports.nightly import worker
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.limits import die_with_parent, limit_memory
-from reports.nightly.pool import ONE_THREAD, Done, Task, ended
-from reports.nightly.worker import execute, resolve
 
-_CHILD = "from reports.nightly.apart import child; child()"
+START_LIMIT_S = 180.0
+_CHILD = "import sys; from reports.nightly.worker import main; main(sys.argv[1], int(sys.argv[2]))"
+# One thread a process: the jobs themselves are what runs in parallel.
+_ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
 
 
-class Cluster:
-    """Build tasks on a Dask cluster; the counterpart of `reports.nightly.pool.Pool`.
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """Something to build: an address, what the build function gets, and how many time limits it may take."""
+
+    key: str
+    payload: Mapping[str, Any]
+    limits: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Done:
+    """How a task ended: ``done`` (and in the cache), ``error``, ``timeout``, ``crash`` or ``disk``."""
+
+    key: str
+    status: str
+    message: str = ""
+    detail: str = ""
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What builds a task, and what it may take.
 
     Parameters
     ----------
     build : str
-        ``module:function``, as for the pool.
-    cache : pathlib.Path
-        Folder of the store, here; the workers need not see it.
-    engine : Engine
+        ``module:function``; gets a payload, returns ``(meta, files)`` (see `reports.nightly.cache`).
     time_limit_s : float
-    memory_limit_bytes : int
+        A task that takes longer is ended, with its process.
+    memory_bytes : int
+        A process that asks for more gets none.
     """
 
-    def __init__(
-        self, build: str, cache: Path, engine: Engine, time_limit_s: float, memory_limit_bytes: int
-    ) -> None:
-        self._work = partial(build_apart, build, time_limit_s, memory_limit_bytes)
-        self._store = Cache(cache)
-        self._engine = engine
+    build: str
+    time_limit_s: float
+    memory_bytes: int
 
-    def run(self, tasks: Sequence[Task]) -> Iterator[Done]:
-        """Yield how each task ended, in the order in which they end; each is in the cache by then."""
-        ends: SimpleQueue[Done | BaseException] = SimpleQueue()
 
-        def keep(task: Task, answer: tuple[Done, bytes]) -> None:
-            ends.put(self._kept(*answer))
+def build_each(
+    tasks: Sequence[Task], limits: Limits, engine: Engine | None, cache: Cache, sink: Callable[[Done], None]
+) -> None:
+    """Build every task once and tell how each ended, in the order in which they end.
 
-        def work() -> None:
-            try:
-                self._engine.map(self._work, tasks, keep)
-            except BaseException as error:  # noqa: BLE001 - raised in the thread that waits
-                ends.put(error)
+    Without an engine they are built in this process: with no limit, and in the order of the tasks.
+    """
 
-        Thread(target=work, daemon=True).start()
-        for _ in tasks:
-            end = ends.get()
-            if isinstance(end, BaseException):
-                raise end
-            yield end
+    def keep(task: Task, answer: tuple[Done, bytes]) -> None:
+        sink(_kept(cache, *answer))
 
-    def _kept(self, done: Done, entry: bytes) -> Done:
-        if done.status != "done":
-            return done
+    if engine is None:
+        function = worker.resolve(limits.build)
+        for task in tasks:
+            start = time.monotonic()
+            keep(task, _done(task, start, worker.execute(function, task.key, task.payload)))
+    elif engine.distributed:
+        engine.map(partial(build_apart, limits), tasks, keep)
+    else:
+        warm = _Warm(limits)
         try:
-            self._store.take(done.key, entry)
-        except InputError as error:
-            return ended(done, "disk", str(error))
-        except CorruptEntry as error:
-            return ended(done, "crash", f"its result came damaged ({error})")
-        return done
+            engine.map(warm.build, tasks, keep)
+        finally:
+            warm.close()
 
 
-def build_apart(build: str, time_limit_s: float, memory_limit_bytes: int, task: Task) -> tuple[Done, bytes]:
+def build_apart(limits: Limits, task: Task) -> tuple[Done, bytes]:
     """Build one task in a process of its own; how it ended, and the entry for the cache."""
-    start, limit_s = time.monotonic(), time_limit_s * task.limits
-    question = pickle.dumps((build, memory_limit_bytes, task.key, dict(task.payload)))
-    environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    status, message, detail, entry = "timeout", f"did not end within {limit_s:g} s", "", b""
+    child = _Child(limits)
     try:
-        done = subprocess.run(
-            [sys.executable, "-c", _CHILD],
-            input=question, capture_output=True, timeout=limit_s, env=environment, check=False,
+        return child.build(task)
+    finally:
+        child.close()
+
+
+class _Child:
+    """A process that builds one task after the other, seen from its parent."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        self._late = self._ready = False
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", _CHILD, limits.build, str(limits.memory_bytes)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
+            env={**os.environ, **_ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
-        if done.returncode == 0:
-            status, message, detail, entry = pickle.loads(done.stdout)
-        else:
-            how = f"signal {-done.returncode}" if done.returncode < 0 else f"status {done.returncode}"
-            status, message, detail = (
-                "crash",
-                f"its process ended ({how})",
-                done.stderr[-2000:].decode("latin-1"),
-            )
-    except subprocess.TimeoutExpired:
-        pass
+
+    def build(self, task: Task) -> tuple[Done, bytes]:
+        """Build a task within its time; where that fails the process is at its end."""
+        said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
+        if not self._ready:
+            self._ready = self._answer(START_LIMIT_S) == worker.READY
+            if not self._ready:
+                why = f"the worker process could not start: {self._end(START_LIMIT_S)}"
+                return _done(task, start, ("crash", why, self._last_words(said), b""))
+            start = time.monotonic()
+        limit_s = self._limits.time_limit_s * task.limits
+        answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
+        if answer is None:
+            status, detail = ("timeout", "") if self._late else ("crash", self._last_words(said))
+            answer = (status, self._end(limit_s), detail, b"")
+        return _done(task, start, answer)
+
+    def _answer(self, limit_s: float, question: Any = None) -> Any:
+        """What the process says within the limit; None where it ends instead."""
+        ask, listen = self._process.stdin, self._process.stdout
+        assert ask is not None
+        assert listen is not None
+        clock = Timer(limit_s, self._too_late)
+        clock.daemon = True
+        clock.start()
+        try:
+            if question is not None:
+                pickle.dump(question, ask)
+                ask.flush()
+            return pickle.load(listen)
+        except (EOFError, OSError, pickle.UnpicklingError, ValueError):
+            self._process.wait()
+            return None
+        finally:
+            clock.cancel()
+
+    def _too_late(self) -> None:
+        self._late = True
+        self._process.kill()
+
+    def _end(self, limit_s: float) -> str:
+        """In words how the process ended."""
+        if self._late:
+            return f"did not end within {limit_s:g} s"
+        code = self._process.returncode
+        return f"its process ended ({f'signal {-code}' if code < 0 else f'status {code}'})"
+
+    def _last_words(self, since: int) -> str:
+        size = self._said.seek(0, os.SEEK_END)
+        self._said.seek(max(since, size - 2000))
+        return self._said.read().decode("latin-1")
+
+    @property
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self._process.kill()
+        self._process.wait()
+
+    def close(self) -> None:
+        """End the process and give back its pipes; not while another thread waits for its answer."""
+        self.end()
+        for stream in (self._process.stdin, self._process.stdout, self._said):
+            if stream is not None:
+                with contextlib.suppress(OSError):  # a question that nobody has read
+                    stream.close()
+
+
+class _Warm:
+    """Processes that go from task to task: one for each that is under way."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._lock = Lock()
+        self._idle: list[_Child] = []
+        self._busy: list[_Child] = []
+        self._closed = False
+
+    def build(self, task: Task) -> tuple[Done, bytes]:
+        """Build a task in an idle process, or in a new one."""
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("no task after the end")
+            child = self._idle.pop() if self._idle else _Child(self._limits)
+            self._busy.append(child)
+        try:
+            return child.build(task)
+        finally:
+            with self._lock:
+                self._busy.remove(child)
+                if child.alive and not self._closed:
+                    self._idle.append(child)
+                else:
+                    child.close()
+
+    def close(self) -> None:
+        """End all processes, also one whose answer is awaited: its thread then has its end."""
+        with self._lock:
+            self._closed = True
+            for child in self._busy:
+                child.end()
+            for child in self._idle:
+                child.close()
+
+
+def _kept(cache: Cache, done: Done, entry: bytes) -> Done:
+    """Put a result into the cache: an error of the disk is none of its design."""
+    if done.status != "done":
+        return done
+    try:
+        cache.take(done.key, entry)
+    except InputError as error:
+        return replace(done, status="disk", message=str(error))
+    except CorruptEntry as error:
+        return replace(done, status="crash", message=f"its result came damaged ({error})")
+    return done
+
+
+def _done(task: Task, start: float, answer: worker.Answer) -> tuple[Done, bytes]:
+    status, message, detail, entry = answer
     seconds = time.monotonic() - start
     return Done(key=task.key, status=status, message=message, detail=detail, seconds=seconds), entry
-
-
-def child() -> None:
-    """The other side of `build_apart`: question on standard input, answer on standard output."""
-
-    die_with_parent()
-    answer_to = os.dup(1)
-    os.dup2(2, 1)  # what a build prints is no answer
-    build, memory, key, payload = pickle.load(sys.stdin.buffer)
-    limit_memory(memory)
-    with tempfile.TemporaryDirectory(prefix="nightly-") as folder:
-        store = Cache(Path(folder))
-        status, message, detail = execute(resolve(build), store, key, payload)
-        entry = store.path(key).read_bytes() if status == "done" else b""
-    with os.fdopen(answer_to, "wb") as answer:
-        pickle.dump((status, message, detail, entry), answer)

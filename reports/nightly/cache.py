@@ -56,15 +56,8 @@ class Cache:
         return self.folder / key[:2] / f"{key}.entry"
 
     def write(self, key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
-        """Store a result; the hashes of its files go into ``meta["files"]``."""
-        full = {**meta, "key": key, "files": {name: sha256(data) for name, data in files.items()}}
-        buffer = io.BytesIO()
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=_COMPRESSION) as archive:
-            archive.writestr("meta.json", json.dumps(full, allow_nan=False))
-            for name, data in files.items():
-                archive.writestr(f"files/{name}", data)
-        body = buffer.getvalue()
-        self._put(self.path(key), MAGIC + sha256(body).encode() + b"\n" + body)
+        """Store a result (see `sealed`)."""
+        self._put(self.path(key), sealed(key, meta, files))
 
     def take(self, key: str, data: bytes) -> None:
         """Store an entry that was made elsewhere.
@@ -122,6 +115,18 @@ class Cache:
                 path.unlink(missing_ok=True)
                 removed += 1
         return removed
+
+
+def sealed(key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
+    """Make the entry of a result; the hashes of its files go into ``meta["files"]``."""
+    full = {**meta, "key": key, "files": {name: sha256(data) for name, data in files.items()}}
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=_COMPRESSION) as archive:
+        archive.writestr("meta.json", json.dumps(full, allow_nan=False))
+        for name, data in files.items():
+            archive.writestr(f"files/{name}", data)
+    body = buffer.getvalue()
+    return MAGIC + sha256(body).encode() + b"\n" + body
 
 
 def _opened(key: str, data: bytes) -> Entry:

@@ -97,7 +97,8 @@ class Columns:
         tolerance = np.where(self.verdict, 0.5, np.maximum(self.absolute, self.relative * size))
         delta = after - before
         moved = np.flatnonzero((old | new) & ~(np.abs(delta) <= tolerance))
-        worse = np.where(old & new, delta * self.better < 0.0, False)
+        larger = np.where(np.abs(self.better) == 2, np.abs(after) - np.abs(before), delta)
+        worse = np.where(old & new, larger * self.better < 0.0, False)
         worse = np.where(self.verdict, (after == 0.0) | (~new & (before == 1.0)), worse)
         known = self.verdict | (old & new & (self.better != 0))
         with np.errstate(divide="ignore", invalid="ignore"):

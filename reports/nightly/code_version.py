@@ -18,6 +18,7 @@ PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
 LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2", "typst")
 _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 _GIT_TIME_LIMIT_S = 10.0
+COMMITS = 8  # named at most between two nights
 # A work tree is data: nothing that its own configuration names is started.
 _SAFE_GIT = (
     "--no-pager", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-c"
@@ -69,11 +70,11 @@ def commit_of(path: Path) -> str:
     return _git(path, "rev-parse", "--verify", "HEAD^{commit}").strip()
 
 
-def commits_between(path: Path, old: str, new: str, limit: int = 8) -> tuple[str, ...]:
+def commits_between(path: Path, old: str, new: str) -> tuple[str, ...]:
     """First lines of the commits that lead from one commit to another, newest first."""
     if not old or not new or old == new:
         return ()
-    text = _git(path, "log", f"--max-count={limit}", "--format=%h %s", f"{old}..{new}", "--")
+    text = _git(path, "log", f"--max-count={COMMITS}", "--format=%h %s", f"{old}..{new}", "--")
     return tuple(one_line(line, 120) for line in text.splitlines() if line.strip())
 
 

@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 from reports.document_schema import Document, Section
 from reports.nightly.figures import digest
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
 
-def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]:
+def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     """Compute a report and write it out.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from markupsafe import Markup
@@ -21,11 +21,22 @@ from reports.nightly.view import DesignView, Overview
 MAX_CHARTS = 60
 
 
+class CourseChart(TypedDict):
+    """A figure over the nights: its drawing, and the nights in which its level changed."""
+
+    title: str
+    id: str
+    unit: str
+    svg: Markup
+    points: list[tuple[str, ChangePoint]]
+    flaps: bool
+
+
 @dataclass
 class Course:
     """Charts for the page, figures without a change, change points and number of moves by night."""
 
-    charts: list[dict[str, Any]] = field(default_factory=list)
+    charts: list[CourseChart] = field(default_factory=list)
     steady: list[Figure] = field(default_factory=list)
     marks: dict[int, list[tuple[Figure, ChangePoint]]] = field(default_factory=dict)
     moved: dict[int, int] = field(default_factory=dict)
@@ -76,9 +87,11 @@ class _Writer:
             return
         for point in points:
             self.course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
-        self.course.charts.append({**self._chart(figure, values, points), "flaps": to_and_fro})
+        self.course.charts.append(self._chart(figure, values, points, to_and_fro))
 
-    def _chart(self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint]) -> dict[str, Any]:
+    def _chart(
+        self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint], to_and_fro: bool
+    ) -> CourseChart:
         verdict = self.verdicts.get(figure.name)
         chart = Chart(
             title=verdict.label if verdict is not None else figure.name,
@@ -96,6 +109,7 @@ class _Writer:
             "unit": figure.unit,
             "svg": Markup(line_chart(chart, f"t{len(self.course.charts)}")),
             "points": [(self.days[p.index], p) for p in points],
+            "flaps": to_and_fro,
         }
 
 

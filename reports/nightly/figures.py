@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from actuator_lti.tree import Tree
 from reports.nightly.text import one_line
 from reports.verdict_summary import verdict_words
 
@@ -15,14 +16,11 @@ MAX_TABLE_ROWS = 200
 REQUIREMENTS = "requirements"  # verdicts on the design's own requirements; others are checks and odds
 _NO_RESULTS = ("Where the time went",)  # tables that differ from run to run
 _INPUT_SECTIONS = ("parameters", "provenance")
-# Which way is better, by what the name holds; figures of no known direction change but do not regress.
-_LARGER = ("margin", "bandwidth", "minus3db", "minus90deg", "output_rate", "acceleration", "probability")
-_SMALLER = ("overshoot", "rise_time", "settling", "peak", "motor_current", "standing_error", "distortion")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:
-    """One number of a report; ``better`` is +1 where larger is better, -1 where smaller is, else 0."""
+    """One number of a report; ``better`` says which way is (see `reports.document.column`)."""
 
     name: str
     value: float | None
@@ -48,7 +46,7 @@ class Verdict:
     what: str = REQUIREMENTS
 
 
-def digest(document: Mapping[str, Any]) -> dict[str, Any]:
+def digest(document: Mapping[str, Any]) -> Tree:
     """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
     verdicts = list(verdicts_of(document))
     figures = list(figures_of(document))
@@ -165,7 +163,7 @@ def _of_block(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
             if value is not None:
                 name = f"{section} / {one_line(str(item.get('label', '')), 120)}"
                 yield Figure(
-                    name=name, value=value, unit=str(item.get("unit", "") or ""), better=direction(name)
+                    name=name, value=value, unit=str(item.get("unit", "") or ""), better=_direction(item)
                 )
     elif block.get("kind") == "table" and len(block.get("rows", ())) <= MAX_TABLE_ROWS:
         yield from _of_table(section, block)
@@ -193,24 +191,14 @@ def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
                     name=f"{section} / {caption} / {label} / {one_line(words, 40)}",
                     value=number(value),
                     unit=str(column.get("unit", "") or ""),
-                    better=direction(f"{column['key']} {words}"),
+                    better=_direction(column),
                 )
 
 
-def direction(name: str) -> int:
-    """+1 where more of it is better, -1 where less is, 0 where that cannot be said.
-
-    Examples
-    --------
-    >>> direction("phase_margin_deg"), direction("overshoot"), direction("crossover")
-    (1, -1, 0)
-    """
-    if "margin_hz" in name or "margin_rad" in name:  # the frequency at which a margin is found
-        return 0
-    key = name.lower().replace(" ", "_").replace("-", "_")
-    if any(word in key for word in _SMALLER):
-        return -1
-    return 1 if any(word in key for word in _LARGER) else 0
+def _direction(shown: Mapping[str, Any]) -> int:
+    """As the section declares it."""
+    better = shown.get("better", 0)
+    return better if better in (-2, -1, 0, 1, 2) else 0
 
 
 def _is_number(value: object) -> bool:

@@ -81,11 +81,11 @@ def gravest(comparison: Comparison, verdicts: Sequence[Verdict]) -> tuple[str, b
     return change_words(first, comparison, verdicts), bool(first.worse)
 
 
-def main_changes(comparison: Comparison, count: int = SHOWN) -> tuple[Change, ...]:
+def main_changes(comparison: Comparison) -> tuple[Change, ...]:
     """Give the changes to read first: distances to requirements, then the rest; no figure twice."""
     valued = [c for c in comparison.changes if c.kind not in ("verdict", "requirement", "check")]
     ranked = sorted(valued, key=lambda c: (not c.worse, c.kind != "distance"))
-    return tuple(ranked[:count])
+    return tuple(ranked[:SHOWN])
 
 
 def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Verdict]) -> str:

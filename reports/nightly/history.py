@@ -22,6 +22,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 from reports.nightly import schema, sums
 from reports.nightly.figures import Figure
 from reports.nightly.job import canonical
@@ -260,7 +261,7 @@ class History:
         return [(row[0], row[1]) for row in rows]
 
     @_whole
-    def inputs(self, snapshot: int) -> dict[str, Any]:
+    def inputs(self, snapshot: int) -> Tree:
         """Return parameters and settings behind a result."""
         row = self.connection.execute(
             "SELECT i.body, i.sha FROM snapshots s JOIN inputs i ON i.id = s.input WHERE s.id = ?",

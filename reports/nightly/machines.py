@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TypedDict
 from xml.sax.saxutils import escape, quoteattr
 
+from actuator_lti.tree import Tree
 from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.figures import Verdict
 from reports.nightly.text import markdown_cell, one_line
@@ -21,7 +22,88 @@ STATE_WORDS = {"broken": "no result", "fail": "failing", "regression": "regresse
 _SIGNS = {"broken": "⚠", "fail": "✗", "regression": "▼", "pass": "✓"}
 
 
-def summary(night: Overview) -> dict[str, Any]:
+class RequirementJson(TypedDict):
+    """A requirement of a design, as `Verdict`."""
+
+    id: str
+    label: str
+    value: float | None
+    limit: str
+    unit: str
+    distance: float | None
+    passed: bool | None
+
+
+class ChangeJson(TypedDict):
+    """A figure that moved, as `Change`."""
+
+    figure: str
+    unit: str
+    before: float | None
+    after: float | None
+    tolerance: float
+    worse: bool | None
+    flapping: bool
+
+
+class ComparisonJson(TypedDict):
+    """A design against an earlier night."""
+
+    run: int | None
+    note: str
+    figures: list[ChangeJson]
+    behind_it: list[str]
+
+
+class DesignJson(TypedDict):
+    """What came of one design."""
+
+    name: str
+    kind: str
+    state: str
+    status: str
+    message: str
+    failed: int
+    total: int
+    worst_requirement: str | None
+    worst_relative_distance: float | None
+    flapping: bool
+    cached: bool
+    report: str | None
+    requirements: list[RequirementJson]
+    changes_since_last_night: ComparisonJson
+    changes_since_baseline: ComparisonJson
+    approved_by: str | None
+    approved_because: str | None
+
+
+class CodeJson(TypedDict):
+    """What computed the night."""
+
+    hash: str
+    commit: str
+    libraries: dict[str, str]
+
+
+class NightJson(TypedDict):
+    """``summary.json``."""
+
+    schema: str
+    version: int
+    study: str
+    run: int
+    started: str
+    finished: str | None
+    code: CodeJson
+    study_commit: str
+    history: Tree
+    exit_status: int
+    counts: dict[str, int]
+    gone: list[str]
+    designs: list[DesignJson]
+
+
+def summary(night: Overview) -> NightJson:
     """What came of a night, as plain JSON."""
     return {
         "schema": SCHEMA,
@@ -49,7 +131,7 @@ def summary_text(night: Overview) -> str:
     return json.dumps(summary(night), ensure_ascii=True, allow_nan=False, indent=1) + "\n"
 
 
-def _design(design: DesignView) -> dict[str, Any]:
+def _design(design: DesignView) -> DesignJson:
     result = design.result
     return {
         "name": design.name,
@@ -72,7 +154,7 @@ def _design(design: DesignView) -> dict[str, Any]:
     }
 
 
-def _requirement(verdict: Verdict) -> dict[str, Any]:
+def _requirement(verdict: Verdict) -> RequirementJson:
     return {
         "id": verdict.id,
         "label": verdict.label,
@@ -84,7 +166,7 @@ def _requirement(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-def _comparison(comparison: Comparison) -> dict[str, Any]:
+def _comparison(comparison: Comparison) -> ComparisonJson:
     return {
         "run": comparison.run.id if comparison.run else None,
         "note": comparison.note,
@@ -93,7 +175,7 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _change(change: Change) -> dict[str, Any]:
+def _change(change: Change) -> ChangeJson:
     return {
         "figure": change.figure,
         "unit": change.unit,

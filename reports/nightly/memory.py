@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_json
+from actuator_lti.tree import Tree
 
 
 class HistoryLost(Exception):
@@ -34,7 +34,7 @@ class Memory:
     nights: int
     approvals: int
 
-    def plain(self) -> dict[str, Any]:
+    def plain(self) -> Tree:
         """As it stands in ``summary.json``."""
         return asdict(self)
 

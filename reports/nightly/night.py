@@ -16,7 +16,7 @@ from actuator_lti.reading import shown_path
 from analyses.engine import Engine
 from reports.nightly import memory
 from reports.nightly import site as site_files
-from reports.nightly.apart import Cluster
+from reports.nightly.apart import Done, Limits, Task, build_each
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
@@ -24,7 +24,6 @@ from reports.nightly.figures import Figure
 from reports.nightly.history import History, open_history
 from reports.nightly.job import Job, Outcome, check_jobs
 from reports.nightly.lock import hold
-from reports.nightly.pool import Done, Pool, Task
 from reports.nightly.records import NewResult
 from reports.nightly.text import one_line
 from reports.nightly.tolerance import Tolerances
@@ -260,27 +259,24 @@ def _outcomes(
     todo = {keys[job.name]: job for job in jobs if job.name not in result}
     if progress is not None:
         progress(len(result), len(jobs))
-    pool = _pool(use, cache.folder)
-    for done in pool.run([_task(key, job) for key, job in todo.items()]):
+
+    def take(done: Done) -> None:
         job = todo[done.key]
         result[job.name] = _built(cache, job, done)
         if progress is not None:
             progress(len(result), len(jobs))
+
+    limits = Limits(build=use.build, time_limit_s=use.time_limit_s, memory_bytes=use.memory_limit_bytes)
+    here = Engine(threads=use.workers) if use.workers else None
+    build_each([_task(key, job) for key, job in todo.items()], limits, use.engine or here, cache, take)
     return [result[job.name] for job in jobs]
 
 
 def _task(key: str, job: Job) -> Task:
-    """What a job asks of the pool; a comparison takes as long as the designs that it holds."""
+    """What a job asks for; a comparison takes as long as the designs that it holds."""
     study = job.payload.get("study")
     designs = len(study["designs"]) if isinstance(study, Mapping) else 1
     return Task(key=key, payload=job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
-
-
-def _pool(use: Settings, folder: Path) -> Pool | Cluster:
-    """Who builds: processes here, or a Dask cluster."""
-    if use.engine is not None and use.engine.distributed:
-        return Cluster(use.build, folder, use.engine, use.time_limit_s, use.memory_limit_bytes)
-    return Pool(use.build, folder, use.workers, use.time_limit_s, use.memory_limit_bytes)
 
 
 def _from_cache(cache: Cache, job: Job, key: str, tell: Say) -> Outcome | None:

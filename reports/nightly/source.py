@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_toml, shown, shown_path
+from actuator_lti.tree import Tree
 from reports.nightly.job import Job
 from reports.nightly.night import Study
 from reports.nightly.tolerance import Tolerances, read_tolerances
@@ -53,13 +54,13 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
 
         design = load_design(path)
         file = study_of(design)
-        table: dict[str, Any] = {}
+        table: Tree = {}
         check = True if validation is None else validation
     else:
         file, table = _read_file(Path(path))
         check = file.validation if validation is None else validation
     tolerances = _tolerances(table, path)
-    settings: dict[str, Any] = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
+    settings: Tree = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
     if file.monte_carlo is not None:
         settings["monte_carlo"] = {"samples": file.monte_carlo.samples, "seed": file.monte_carlo.seed}
     return Study(
@@ -71,7 +72,7 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     )
 
 
-def _read_file(path: Path) -> tuple[StudyFile, dict[str, Any]]:
+def _read_file(path: Path) -> tuple[StudyFile, Tree]:
     from analyses.study import study_from_tree
 
     where = shown_path(path)

@@ -1,25 +1,26 @@
-"""The other side of the pool: a process that builds one report after the other."""
+"""The other side of a job's process: it builds one report after the other until its parent is gone."""
 
 from __future__ import annotations
 
 import importlib
 import os
+import pickle
 import signal
-import threading
 import traceback
-from collections.abc import Callable
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Mapping
+from queue import SimpleQueue
+from threading import Thread
+from typing import Any, BinaryIO
 
 from actuator_lti.errors import InputError
-from reports.nightly.cache import Cache
+from reports.nightly.cache import sealed
 from reports.nightly.limits import die_with_parent, limit_memory
 from reports.nightly.text import one_line
 
-# A worker that hangs in compiled code without its parent is ended by the system this long after its limit.
+# A process that hangs in compiled code without its parent is ended by the system this long after its limit.
 GRACE_S = 15
+READY = b"ready"
+Answer = tuple[str, str, str, bytes]  # status, message, detail, entry for the cache
 
 
 def resolve(name: str) -> Callable[..., Any]:
@@ -28,66 +29,59 @@ def resolve(name: str) -> Callable[..., Any]:
     return getattr(importlib.import_module(module), function)
 
 
-def main(connection: Connection, build: str, cache: Path, memory_bytes: int) -> None:
-    """Receive ``(key, payload, limit)``, build, store, answer; ends with the pipe or the parent."""
-    _end_with_parent()
+def main(build: str, memory_bytes: int) -> None:
+    """Read ``(key, payload, limit)`` from standard input, build, answer on standard output; never returns."""
+    die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a build prints is no answer
     limit_memory(memory_bytes)
+    questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
+    Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), questions), daemon=True).start()
     function = resolve(build)
-    store = Cache(cache)
-    connection.send(("ready", "", ""))
+    _say(answers, READY)
     while True:
-        try:
-            task = connection.recv()
-        except (EOFError, OSError):
-            return
-        if task is None:
-            return
-        key, payload, time_limit_s = task
+        key, payload, time_limit_s = questions.get()
         _alarm(time_limit_s + GRACE_S)
-        connection.send(execute(function, store, key, payload))
+        _say(answers, execute(function, key, payload))
         _alarm(0)
 
 
-def execute(
-    function: Callable[..., Any], store: Cache, key: str, payload: dict[str, Any]
-) -> tuple[str, str, str]:
-    """Build one report and store it; ``("done", "", "")``, or what went wrong and where.
+def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
+    """Build one report; ``("done", "", "", entry)``, or what went wrong and where.
 
-    Any error of the build belongs to its design and is reported as such; errors of the disk are not.
+    Any error of the build belongs to its design and is reported as such.
     """
     try:
-        meta, files = function(payload)
+        meta, files = function(dict(payload))
     except InputError as error:
-        return ("error", one_line(str(error), 600), "")
+        return ("error", one_line(str(error), 600), "", b"")
     except MemoryError:
-        return ("error", "needs more memory than a job may take: see --memory-limit", "")
+        return ("error", "needs more memory than a job may take: see --memory-limit", "", b"")
     except Exception as error:  # noqa: BLE001 - the one place where a design may raise anything
         where = "".join(traceback.format_exception(error)[-6:])
-        return ("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:])
+        return ("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:], b"")
     try:
-        store.write(key, meta, files)
-    except InputError as error:
-        return ("disk", one_line(str(error), 400), "")
+        return ("done", "", "", sealed(key, meta, files))
     except (TypeError, ValueError) as error:
-        return ("error", f"result is no JSON: {one_line(str(error), 300)}", "")
-    return ("done", "", "")
+        return ("error", f"result is no JSON: {one_line(str(error), 300)}", "", b"")
+
+
+def _listen(source: BinaryIO, questions: SimpleQueue[Any]) -> None:
+    """Hand on what is asked; the end of the pipe is that of the parent."""
+    while True:
+        try:
+            questions.put(pickle.load(source))
+        except EOFError:
+            os._exit(0)
+
+
+def _say(answers: BinaryIO, what: Any) -> None:
+    pickle.dump(what, answers)
+    answers.flush()
 
 
 def _alarm(seconds: float) -> None:
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, seconds)
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    if parent is None:
-        return
-
-    def watch() -> None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-    die_with_parent()

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from actuator_lti.tree import Tree
 from reports.document import figures, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
@@ -26,7 +27,7 @@ _WORDS = {True: "met", False: "not met", None: "not judged"}
 _STATES = {True: "pass", False: "fail", None: "info"}
 
 
-def printable(made: Mapping[str, Any]) -> dict[str, Any]:
+def printable(made: Mapping[str, Any]) -> Tree:
     """Turn a document into what ``report.typ`` reads; nothing in it is markup any more."""
     blocks = figures(made)
     drawings = dict(zip(map(id, blocks), draw_all(blocks, page=False), strict=True))
@@ -77,7 +78,7 @@ def _required(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
                 yield from block["items"]
 
 
-def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:
+def _verdict(item: Mapping[str, Any]) -> Tree:
     limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'short:6')}".strip()
     return {
         "state": _STATES[item.get("passed")],
@@ -95,7 +96,7 @@ def _verdict(item: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
+def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
     return {
         "title": clean(part["title"], MAX_TITLE),
         "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
@@ -104,9 +105,9 @@ def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, 
     }
 
 
-def _paired(made: Sequence[tuple[dict[str, Any], Mapping[str, Any]]]) -> list[dict[str, Any]]:
+def _paired(made: Sequence[tuple[Tree, Mapping[str, Any]]]) -> list[Tree]:
     """Put half-wide figures that follow each other in pairs beside each other."""
-    blocks: list[dict[str, Any]] = []
+    blocks: list[Tree] = []
     for printed, block in made:
         if printed["kind"] != "figure" or block.get("layout", "wide") == "wide":
             blocks.append(printed)
@@ -117,7 +118,7 @@ def _paired(made: Sequence[tuple[dict[str, Any], Mapping[str, Any]]]) -> list[di
     return blocks
 
 
-def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, Any]:
+def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
     kind = block["kind"]
     if kind == "table":
         return _table(block)
@@ -136,7 +137,7 @@ def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> dict[str, A
     return {"kind": "text", "paragraphs": [clean(p, MAX_TEXT) for p in str(block["text"]).split("\n\n")]}
 
 
-def _glance(block: Mapping[str, Any]) -> dict[str, Any]:
+def _glance(block: Mapping[str, Any]) -> Tree:
     """Print the first screen as the table of its loops, with the weakest point and the findings as note."""
     cells = block["loops"][0]["figures"] if block["loops"] else []
     columns = [{"label": "Loop", "unit": "", "align": "left"}]
@@ -155,7 +156,7 @@ def _glance(block: Mapping[str, Any]) -> dict[str, Any]:
     return {"kind": "table", "caption": "Each loop", "note": note, "columns": columns, "rows": rows}
 
 
-def _figure(block: Mapping[str, Any], svg: str) -> dict[str, Any]:
+def _figure(block: Mapping[str, Any], svg: str) -> Tree:
     """Scale every figure alike, so that their lettering is the same; half-wide ones stand in pairs."""
     size = _SIZE.search(svg)
     most = LINE_PT if block.get("layout", "wide") == "wide" else HALF_PT
@@ -168,7 +169,7 @@ def _with_unit(value: Any, unit: object) -> str:
     return f"{clean(show(value), 300)} {clean(unit, 30)}".strip()
 
 
-def _table(block: Mapping[str, Any]) -> dict[str, Any]:
+def _table(block: Mapping[str, Any]) -> Tree:
     columns: Sequence[Mapping[str, Any]] = block["columns"]
     return {
         "kind": "table",

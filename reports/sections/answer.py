@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from actuator_lti.quantities import AT_A_GLANCE
 from analyses.loop_figures import LoopFigures
 from analyses.responses import frequency_grid
 from reports import document as doc
@@ -12,17 +13,9 @@ from reports.document_schema import Block, GlanceBlock, GlanceFigure, GlanceLoop
 from reports.findings import Finding, gathered, plain
 from reports.numbers import short
 from reports.sections import loop as loop_section
-from reports.sections.margins import margin_row, response_row, worst_status
+from reports.sections.margins import margin_row, shown, worst_status
 from reports.sections.names import LOOPS
 
-# key of the row, quantity of a requirement, words, unit, decimals
-FIGURES = (
-    ("gain_margin_db", "gain_margin", "Gain margin", "dB", "fix:1"),
-    ("phase_margin_deg", "phase_margin", "Phase margin", "deg", "fix:1"),
-    ("delay_margin_ms", "delay_margin", "Delay margin", "ms", "sig:3"),
-    ("s_peak_db", "sensitivity_peak", "Peak of S", "dB", "fix:2"),
-    ("minus3db_hz", "bandwidth", "−3\N{NO-BREAK SPACE}dB bandwidth", "Hz", "sig:3"),
-)
 SHOWN = 5
 
 
@@ -47,26 +40,25 @@ def section(
 
 
 def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -> GlanceLoop:
-    """Give the five figures of a loop, each with the requirement that is nearest to it."""
-    margins = margin_row(figures)
-    row: dict[str, Any] = {**margins, **response_row(figures)}
+    """Give the chosen figures of a loop, each with the requirement that is nearest to it."""
     cells: list[GlanceFigure] = []
-    for key, quantity, label, unit, form in FIGURES:
-        own = [item for item in items if item.get("quantity") == quantity and item.get("loop") == name]
+    for quantity in AT_A_GLANCE:
+        own = [item for item in items if item.get("quantity") == quantity.name and item.get("loop") == name]
         nearest = min(own, key=_nearness, default=None)
         cells.append(
             {
-                "label": label,
-                "value": row[key],
-                "unit": unit,
-                "format": form,
+                "label": quantity.label,
+                "value": shown(quantity, figures),
+                "unit": quantity.shown[0],
+                "format": quantity.at_a_glance,
                 "limit": nearest["limit"] if nearest else None,
                 "comparison": nearest["comparison"] if nearest else "",
                 "distance": nearest["distance"] if nearest else None,
                 "passed": nearest["passed"] if nearest else None,
             }
         )
-    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": margins["stable"], "figures": cells}
+    stable = margin_row(figures)["stable"]
+    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": stable, "figures": cells}
 
 
 def weakest(items: Sequence[Mapping[str, Any]]) -> Weakest | None:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3
-Changes = list[tuple[str, float]]
 
 
 def section(comparison: Comparison) -> Section:

@@ -101,15 +101,15 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
 
 
 def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
-    threshold = conditional.threshold_rad
+    threshold, full_rad = conditional.threshold_rad, conditional.full_deflection_rad
     items = [
-        doc.fact("Largest step that settles", (threshold or conditional.full_deflection_rad) * scale, unit),
-        doc.fact("Full deflection", conditional.full_deflection_rad * scale, unit),
+        doc.fact("Largest step that settles", (threshold or full_rad) * scale, unit, better=1),
+        doc.fact("Full deflection", full_rad * scale, unit),
     ]
     for point, margins in conditional.margins.items():
         if margins.stable and margins.gain_lower > 0.0:
             label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"
-            items.append(doc.fact(label, 20.0 * math.log10(margins.gain_lower), "dB"))
+            items.append(doc.fact(label, 20.0 * math.log10(margins.gain_lower), "dB", better=2))
     return doc.facts(items)
 
 
@@ -117,7 +117,7 @@ def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> Bloc
     columns = [
         doc.column("limiter", "Limit"),
         doc.column("point", "In front of it"),
-        doc.column("gain", "Lower gain margin", "dB", format="sig:4"),
+        doc.column("gain", "Lower gain margin", "dB", format="sig:4", better=2),
         doc.column("ratio", "Amplitude over limit", format="sig:3"),
         doc.column("hertz", "Oscillates at", "Hz", format="sig:3"),
         doc.column("output", "Output", unit, format="sig:3"),

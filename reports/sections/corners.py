@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+from actuator_lti.quantities import CORNERED, QUANTITIES, Quantity
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
-from reports.sections.names import LOOPS
+from reports.sections.margins import shown
+from reports.sections.names import LOOPS, figure_column
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.corners import Corner, Corners
     from analyses.loop_figures import LoopFigures
+
+PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 
 
 def of_design(design: Design) -> Section:
@@ -57,41 +61,36 @@ def unmet(corner: Corner) -> str:
     return ", ".join([*loops, *(one.id for one in corner.verdicts if one.passed is False)])
 
 
-def least(corner: Corner, attribute: str) -> tuple[float, str] | None:
-    """The smallest margin over the loops, and its loop; None where there is none."""
-    result = [
-        (abs(value), name)
+def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
+    """The worst of a figure over the loops, and its loop; None where there is none."""
+    found = [
+        (value, name)
         for name, one in corner.figures.items()
-        if one.stable and (value := getattr(one.margins, attribute)) is not None
+        if one.stable and (value := quantity.read(one)) is not None
     ]
-    return min(result, default=None)
+    return min(found, key=lambda each: quantity.better * each[0], default=None)
 
 
 def _summary_table(result: Corners) -> Block:
-    columns = [
-        doc.column("corner", "Corner"),
-        doc.column("gain", "Least gain margin", "dB", format="fix:1"),
-        doc.column("gain_loop", "in"),
-        doc.column("phase", "Least phase margin", "deg", format="fix:1"),
-        doc.column("phase_loop", "in"),
-        doc.column("unmet", "Not met"),
-    ]
+    columns = [doc.column("corner", "Corner")]
+    for name in CORNERED:
+        label = f"{superlative(QUANTITIES[name])} {QUANTITIES[name].words}".capitalize()
+        columns += [figure_column(name, name, label=label, format="fix:1"), doc.column(f"{name}_loop", "in")]
+    columns.append(doc.column("unmet", "Not met"))
     rows = []
     for corner in result.corners:
-        gain, phase = least(corner, "gain_margin_db"), least(corner, "phase_margin_deg")
-        rows.append(
-            {
-                "corner": corner.name,
-                "gain": gain and gain[0],
-                "gain_loop": LOOPS[gain[1]] if gain else "",
-                "phase": phase and phase[0],
-                "phase_loop": LOOPS[phase[1]] if phase else "",
-                "unmet": unmet(corner),
-                "_status": None if corner.passed else "fail",
-            }
-        )
+        row: Row = {"corner": corner.name}
+        for name in CORNERED:
+            found = worst(corner, QUANTITIES[name])
+            row |= {name: found and found[0], f"{name}_loop": LOOPS[found[1]] if found else ""}
+        rows.append({**row, "unmet": unmet(corner), "_status": None if corner.passed else "fail"})
     note = "The least margin is that of the stable loops; others are named under what is not met."
     return doc.table("Corners", columns, rows, note)
+
+
+def superlative(quantity: Quantity) -> str:
+    """What the worst of a figure is."""
+    return "least" if quantity.better > 0 else "largest"
 
 
 def _loop_table(rows: list[Row]) -> Block:
@@ -99,9 +98,10 @@ def _loop_table(rows: list[Row]) -> Block:
         doc.column("corner", "Corner"),
         doc.column("loop", "Loop"),
         doc.column("stable", "Stable", format="yesno"),
-        doc.column("gain", "Gain margin", "dB", format="fix:1"),
-        doc.column("phase", "Phase margin", "deg", format="fix:1"),
-        doc.column("bandwidth", "−3\N{NO-BREAK SPACE}dB bandwidth", "Hz", format="sig:3"),
+        *(
+            figure_column(each.name, each.name, label=each.label, format=each.at_a_glance)
+            for each in PER_LOOP
+        ),
     ]
     return doc.table("Loops at the corners", columns, rows)
 
@@ -111,7 +111,5 @@ def _row(corner: Corner, name: str, one: LoopFigures) -> Row:
         "corner": corner.name,
         "loop": LOOPS[name],
         "stable": one.stable,
-        "gain": one.margins.gain_margin_db,
-        "phase": one.margins.phase_margin_deg,
-        "bandwidth": one.bandwidth.minus3db_hz if one.bandwidth else None,
+        **{each.name: shown(each, one) for each in PER_LOOP},
     }

@@ -58,8 +58,8 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),
         doc.fact("at a motor speed of", one.ripple_at_rad_s, speed),
-        doc.fact("Standing error, one count", one.standing_rad * scale, unit),
-        doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit),
+        doc.fact("Standing error, one count", one.standing_rad * scale, unit, better=-1),
+        doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit, better=-1),
         doc.fact(
             f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function",
             one.linear_rad * scale,

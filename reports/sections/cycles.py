@@ -74,7 +74,7 @@ def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
         doc.column("cause", "Cause"),
         doc.column("friction", "Dry friction"),
         doc.column("kind", "Kind"),
-        doc.column("size", "Foreseen, peak", small, format="sig:3"),
+        doc.column("size", "Foreseen, peak", small, format="sig:3", better=-1),
         doc.column("hz", "at", "Hz", format="sig:3"),
         doc.column("seen", "Simulated", small, format="sig:3"),
         doc.column("seen_hz", "at", "Hz", format="sig:3"),
@@ -107,7 +107,7 @@ def _rests(result: LimitCycles, fine: float, small: str) -> Block:
         doc.column("load", "Load", load_unit(result.design), format="short:4"),
         doc.column("step", "Step", small, format="sig:3"),
         doc.column("end", "Ends"),
-        doc.column("size", "Swing, peak", small, format="sig:3"),
+        doc.column("size", "Swing, peak", small, format="sig:3", better=-1),
         doc.column("hz", "at", "Hz", format="sig:3"),
     ]
     rows = [_rest_row(one, fine) for one in result.rests]

@@ -31,7 +31,7 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
         doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
         *(doc.column(key, label.capitalize(), "deg", format="fix:2") for key, label in parts.items()),
         doc.column("total", "Phase in all", "deg", format="fix:2"),
-        doc.column("margin", "Left to −180°", "deg", format="fix:2"),
+        doc.column("margin", "Left to −180°", "deg", format="fix:2", better=1),
         doc.column("one_more", "One more sample", "deg", format="fix:2"),
     ]
     nothing: Row = dict.fromkeys(parts, 0.0)

@@ -73,9 +73,9 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
         doc.column("case", "Failure"),
         doc.column("near", f"To {near}", format="ms:3"),
         doc.column("stop", "To the stop", format="ms:3"),
-        doc.column("seen", "Until detected", unit, format="sig:3"),
-        doc.column("current", "Peak current", "A", format="sig:3"),
-        doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3"),
+        doc.column("seen", "Until detected", unit, format="sig:3", better=-1),
+        doc.column("current", "Peak current", "A", format="sig:3", better=-1),
+        doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3", better=-1),
         doc.column("protected", "I²t acts at", format="ms:3"),
         doc.column("words", "What happens"),
     ]

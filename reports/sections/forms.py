@@ -12,7 +12,7 @@ from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
 from reports.sections.loop import bode_data, nyquist_hz
 from reports.sections.margins import cells, evidence_notes, margin_row, response_row
-from reports.sections.names import FORMS, LOOPS
+from reports.sections.names import FORMS, LOOPS, figure_column
 
 if TYPE_CHECKING:
     from reports.figures import forms as forms_figure
@@ -21,13 +21,13 @@ COLUMNS = [
     doc.column("loop", "Loop"),
     doc.column("form", "Form"),
     doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
-    doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
+    figure_column("phase_margin", "phase_margin_deg", format="fix:2"),
     doc.column("phase_cost_deg", "against ideal", "deg", format="fix:2"),
-    doc.column("gain_margin_db", "Gain margin", "dB", format="fix:2"),
-    doc.column("delay_margin_ms", "Delay margin", "ms", format="sig:3"),
-    doc.column("s_peak_db", "Peak of S", "dB", format="fix:2"),
-    doc.column("minus3db_hz", "−3 dB", "Hz", format="sig:4"),
-    doc.column("minus90deg_hz", "−90°", "Hz", format="sig:4"),
+    figure_column("gain_margin", "gain_margin_db", format="fix:2"),
+    figure_column("delay_margin", "delay_margin_ms", format="sig:3"),
+    figure_column("sensitivity_peak", "s_peak_db", format="fix:2"),
+    figure_column("bandwidth", "minus3db_hz", format="sig:4"),
+    figure_column("bandwidth_90deg", "minus90deg_hz", format="sig:4"),
 ]
 
 

@@ -12,6 +12,7 @@ from reports.document import abscissa, rounded
 from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.limits import words_of
+from reports.sections.names import figure_column
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -260,8 +261,8 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
         doc.column("amplitude", "Amplitude", unit, format="sig:3"),
-        doc.column("gain", "−3 dB", "Hz", format="sig:3"),
-        doc.column("phase", "−90°", "Hz", format="sig:3"),
+        figure_column("bandwidth", "gain", format="sig:3"),
+        figure_column("bandwidth_90deg", "phase", format="sig:3"),
         doc.column("note", "Note"),
     ]
     rows = []

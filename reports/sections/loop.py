@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.quantities import AT_A_GLANCE
 from analyses.loop_figures import LoopFigures
 from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
 from reports import document as doc
@@ -22,6 +23,7 @@ from reports.sections.margins import (
     finite,
     margin_row,
     response_row,
+    shown,
     worst_status,
 )
 from reports.sections.names import LOOPS, hertz
@@ -86,23 +88,22 @@ def _intro(name: str, figures: LoopFigures) -> str:
 
 def _facts(figures: LoopFigures) -> Block:
     """Give the figures to remember of this loop."""
-    margins, response = margin_row(figures), response_row(figures)
     chosen = [
-        ("Gain margin", margins["gain_margin_db"], "dB", 1),
-        ("Phase margin", margins["phase_margin_deg"], "deg", 1),
-        ("Gain crossover", margins["crossover_hz"], "Hz", None),
-        ("Delay margin", margins["delay_margin_ms"], "ms", None),
-        ("Peak of S", margins["s_peak_db"], "dB", 2),
-        ("−3\N{NO-BREAK SPACE}dB bandwidth", response["minus3db_hz"], "Hz", None),
+        doc.fact(
+            each.label, _short(shown(each, figures), each.at_a_glance), each.shown[0], better=each.direction
+        )
+        for each in AT_A_GLANCE
     ]
-    return doc.facts(doc.fact(label, _short(value, places), unit) for label, value, unit, places in chosen)
+    crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
+    return doc.facts([*chosen, doc.fact("Gain crossover", crossover, "Hz")])
 
 
-def _short(value: float | None, places: int | None) -> float | None:
+def _short(value: float | None, format: str) -> float | None:
     """Cut a figure to what a reader remembers; the tables hold every digit."""
     if value is None:
         return None
-    return round(value, places) if places is not None else float(f"{value:.3g}")
+    kind, _, places = format.partition(":")
+    return round(value, int(places)) if kind == "fix" else float(f"{value:.{places}g}")
 
 
 def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "") -> Block:

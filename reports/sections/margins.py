@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TypedDict, cast
 
+from actuator_lti.quantities import Quantity
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
 from reports.numbers import to_minus
-from reports.sections.names import LOOPS, hertz
+from reports.sections.names import LOOPS, figure_column, hertz
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -25,26 +26,26 @@ MARGIN_COLUMNS = [
     doc.column("loop", "Loop"),
     doc.column("stable", "Closed loop"),
     doc.column("evidence", "Margins are"),
-    doc.column("gain_margin_db", "Gain margin", "dB", format="fix:2"),
+    figure_column("gain_margin", "gain_margin_db", format="fix:2"),
     doc.column("gain_margin_hz", "at", "Hz", format="sig:4"),
-    doc.column("phase_margin_deg", "Phase margin", "deg", format="fix:2"),
+    figure_column("phase_margin", "phase_margin_deg", format="fix:2"),
     doc.column("crossover_hz", "at", "Hz", format="sig:4"),
-    doc.column("delay_margin_ms", "Delay margin", "ms", format="ms:3"),
-    doc.column("delay_margin_samples", "", "samples", format="sig:3"),
-    doc.column("modulus_margin", "Modulus margin", format="fix:3"),
-    doc.column("s_peak_db", "Peak of S", "dB", format="fix:2"),
-    doc.column("disk_margin", "Disk margin", format="fix:3"),
+    figure_column("delay_margin", "delay_margin_ms", format="ms:3"),
+    doc.column("delay_margin_samples", "", "samples", format="sig:3", better=1),
+    figure_column("modulus_margin", "modulus_margin", format="fix:3"),
+    figure_column("sensitivity_peak", "s_peak_db", format="fix:2"),
+    doc.column("disk_margin", "Disk margin", format="fix:3", better=1),
 ]
 RESPONSE_COLUMNS = [
     doc.column("loop", "Loop"),
-    doc.column("minus3db_hz", "−3 dB", "Hz", format="sig:4"),
-    doc.column("minus90deg_hz", "−90°", "Hz", format="sig:4"),
-    doc.column("resonance_db", "Resonance", "dB", format="fix:2"),
+    figure_column("bandwidth", "minus3db_hz", format="sig:4"),
+    figure_column("bandwidth_90deg", "minus90deg_hz", format="sig:4"),
+    figure_column("resonance_peak", "resonance_db", format="fix:2"),
     doc.column("resonance_hz", "at", "Hz", format="sig:4"),
-    doc.column("t_peak_db", "Peak of T", "dB", format="fix:2"),
-    doc.column("rise_ms", "Rise 10–90 %", "ms", format="ms:3"),
-    doc.column("overshoot_percent", "Overshoot", "%", format="fix:1"),
-    doc.column("settling_ms", "Settling 2 %", "ms", format="ms:3"),
+    doc.column("t_peak_db", "Peak of T", "dB", format="fix:2", better=-1),
+    figure_column("rise_time", "rise_ms", format="ms:3"),
+    figure_column("overshoot", "overshoot_percent", format="fix:1"),
+    figure_column("settling_time", "settling_ms", format="ms:3"),
     doc.column("dc", "Gain at DC", format="sig:4"),
 ]
 CROSSING_COLUMNS = [
@@ -54,7 +55,7 @@ CROSSING_COLUMNS = [
     doc.column("unit", "Unit"),
     doc.column("rad_s", "at", "rad/s", format="sig:5"),
     doc.column("hz", "at", "Hz", format="sig:4"),
-    doc.column("delay_ms", "Delay margin", "ms", format="sig:4"),
+    figure_column("delay_margin", "delay_ms", format="sig:4"),
     doc.column("samples", "", "samples", format="sig:4"),
     doc.column("note", "Remark"),
 ]
@@ -234,6 +235,12 @@ def response_row(figures: LoopFigures) -> ResponseRow:
         "settling_ms": None if step is None else times(step.settling_time_s, 1e3),
         "dc": None if step is None else finite(step.final_value),
     }
+
+
+def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
+    """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
+    value = None if figures.margins.stable is False else quantity.raw(figures)
+    return times(value, quantity.shown[1])
 
 
 def cells(*rows: MarginRow | ResponseRow) -> Row:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
     doc.column("limit", "Limit"),
-    doc.column("probability", "Probability met", "%", format="fix:3"),
+    doc.column("probability", "Probability met", "%", format="fix:3", better=1),
     doc.column("low", "95 % lower bound", "%", format="fix:3"),
     doc.column("high", "95 % upper bound", "%", format="fix:3"),
     doc.column("nominal", "Nominal", format="sig:4"),

@@ -6,6 +6,8 @@ import math
 
 from actuator_lti.design.model import Design
 from actuator_lti.quantities import QUANTITIES as REGISTRY
+from reports import document as doc
+from reports.document_schema import Column
 
 LOOPS = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 FORMS = {"sampled": "sampled", "continuous": "continuous with delays", "ideal": "ideal, no delay"}
@@ -16,6 +18,12 @@ POINTS = {
     "output": "output angle",
 }
 QUANTITIES = {name: quantity.words for name, quantity in REGISTRY.items()}
+
+
+def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> Column:
+    """Describe the column of a figure of the registry: its heading, unit and better direction."""
+    of = REGISTRY[quantity]
+    return doc.column(key, label or of.heading, of.shown[0], format=format, better=of.direction)
 
 
 def load_unit(design: Design) -> str:

@@ -9,7 +9,7 @@ from analyses.loop_survey import OperatingPointFigures
 from reports import document as doc
 from reports.document_schema import Row, Section
 from reports.sections.margins import margin_row, response_row
-from reports.sections.names import load_unit
+from reports.sections.names import figure_column, load_unit
 
 
 def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
@@ -24,9 +24,11 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
     for name in names:
         label = name.capitalize()
         columns += [
-            doc.column(f"{name}_phase", f"{label} PM", "deg", format="fix:1"),
-            doc.column(f"{name}_gain", f"{label} GM", "dB", format="fix:1"),
-            doc.column(f"{name}_band", f"{label} −3\N{NO-BREAK SPACE}dB", "Hz", format="sig:3"),
+            figure_column("phase_margin", f"{name}_phase", label=f"{label} PM", format="fix:1"),
+            figure_column("gain_margin", f"{name}_gain", label=f"{label} GM", format="fix:1"),
+            figure_column(
+                "bandwidth", f"{name}_band", label=f"{label} −3\N{NO-BREAK SPACE}dB", format="sig:3"
+            ),
         ]
     rows = [_row(point, 1.0 if linear else 1e3) for point in points]
     note = (

@@ -72,16 +72,16 @@ def _capability_table(result: Specification) -> Block:
     scale, unit = output_unit(result.design)
     columns = [
         doc.column("load", "Load", load_unit(result.design), format="short:4"),
-        doc.column("rate", "Rate", f"{unit}/s", format="sig:4"),
+        doc.column("rate", "Rate", f"{unit}/s", format="sig:4", better=1),
         doc.column("rate_seen", "Simulated", f"{unit}/s", format="sig:4"),
         doc.column("by", "Set by"),
-        doc.column("push", "Acceleration", f"{unit}/s²", format="sig:4"),
+        doc.column("push", "Acceleration", f"{unit}/s²", format="sig:4", better=1),
         doc.column("push_seen", "Simulated", f"{unit}/s²", format="sig:4"),
     ]
     electric = result.design.motor.has_electrical_dynamics
     if electric:
         columns += [
-            doc.column("current", "Motor current at that rate", "A", format="sig:3"),
+            doc.column("current", "Motor current at that rate", "A", format="sig:3", better=-1),
             doc.column("current_seen", "simulated", "A", format="sig:3"),
             doc.column("ratio", "of continuous", "%", format="sig:3"),
             doc.column("duty", "Duty", "%", format="sig:3"),
@@ -236,9 +236,9 @@ def _step_table(result: Specification) -> Block:
         doc.column("load", "Load", load_unit(result.design), format="short:4"),
         doc.column("step", "Step", unit, format="sig:3"),
         doc.column("fraction", "of full", "%", format="sig:2"),
-        doc.column("rise", "Rise 10–90 %", "ms", format="sig:3"),
-        doc.column("overshoot", "Overshoot", "%", format="fix:1"),
-        doc.column("settle", "Settled to 2 %", "ms", format="ms:3"),
+        doc.column("rise", "Rise 10–90 %", "ms", format="sig:3", better=-1),
+        doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1),
+        doc.column("settle", "Settled to 2 %", "ms", format="ms:3", better=-1),
         doc.column("rate", "Peak rate", f"{unit}/s", format="sig:3"),
         doc.column("limits", "Limits that act"),
     ]

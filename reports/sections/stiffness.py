@@ -90,8 +90,8 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
 def _table(result: Stiffness, unit: str) -> Block:
     columns = [
         doc.column("state", "State"),
-        doc.column("static", "Static", unit, format="sig:4"),
-        doc.column("least", "Least", unit, format="sig:4"),
+        doc.column("static", "Static", unit, format="sig:4", better=1),
+        doc.column("least", "Least", unit, format="sig:4", better=1),
         doc.column("at", "at", "Hz", format="sig:4"),
     ]
     rows = [_row(curve) for curve in result.curves]

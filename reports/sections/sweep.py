@@ -145,7 +145,7 @@ def _agreement(loops: Mapping[str, LoopValidation], points: Mapping[str, PointVa
         doc.column("points", "Points", format="int"),
         doc.column("gain", "Largest gain difference", "dB", format="sig:2"),
         doc.column("phase", "Largest phase difference", "deg", format="sig:2"),
-        doc.column("distortion", "Distortion", "%", format="sig:2"),
+        doc.column("distortion", "Distortion", "%", format="sig:2", better=-1),
         doc.column("unsteady", "Difference of the last two windows", format="sig:2"),
         doc.column("tones", "Multisine: gain difference", "dB", format="sig:2"),
         doc.column("coherence", "1 − coherence", format="sig:2"),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.tree import Tree
 from analyses.conduct import conduct
 from nonlinear import Trajectory
 from reports.document import abscissa, rounded
@@ -77,7 +78,7 @@ def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> lis
     return out
 
 
-def summary(run: Trajectory) -> dict[str, Any]:
+def summary(run: Trajectory) -> Tree:
     """What happened, in numbers (for ``--json``)."""
     limits = {
         name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}

@@ -42,9 +42,9 @@ CONFIRMED_COLUMNS = [
 CHECK_COLUMNS = [
     doc.column("corner", "Design"),
     doc.column("amplitude", "Step", "deg", format="sig:3"),
-    doc.column("rise", "Rise", "ms", format="sig:3"),
-    doc.column("overshoot", "Overshoot", "%", format="fix:1"),
-    doc.column("settling", "Settling 2 %", "ms", format="sig:3"),
+    doc.column("rise", "Rise", "ms", format="sig:3", better=-1),
+    doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1),
+    doc.column("settling", "Settling 2 %", "ms", format="sig:3", better=-1),
     doc.column("error", "Final error", "%", format="fix:2"),
     doc.column("limited", "Limits that act"),
 ]

@@ -79,14 +79,6 @@
     if (size < -4 || size > 6) return minus(value.toExponential(Math.max(count - 1, 0)));
     return minus(value.toFixed(Math.min(Math.max(count - 1 - size, 0), 12)));
   };
-  const FIGURES = [
-    ["gain_margin", "Gain margin", "dB", 1], ["phase_margin", "Phase margin", "deg", 1],
-    ["delay_margin", "Delay margin", "ms", 1e3],
-    ["sensitivity_peak", "Peak of S", "dB", 1], ["bandwidth", "−3\u00a0dB bandwidth", "Hz", 1],
-    ["overshoot", "Overshoot", "%", 1], ["settling_time", "Settling time", "ms", 1e3],
-  ];
-  const TIMED = ["overshoot", "settling_time", "rise_time"];
-  const CLOSED = ["bandwidth", "overshoot", "settling_time"]; // of a break point these say nothing
   const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
   const STABLE = data.quantities.length;
   const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
@@ -179,7 +171,6 @@
     if (n <= 0) return { n };
     if (x.doubtful(stage)) return { n: DOUBT };
     const found = Array.from(view(x.figures_at(stage), STABLE + 1));
-    if (found[STABLE] !== 1) found[PLACE.sensitivity_peak] = found[PLACE.modulus_margin] = NaN; // S has no peak there
     return { n, figures: found, period: x.period_of(stage) };
   };
   const respond = (name, hertz) => {
@@ -365,7 +356,7 @@
     const loop = found.loops[item.loop];
     if (item.loop && (!loop || !loop.figures)) return { item, value: NaN, met: null };
     if (item.loop && loop.figures[STABLE] !== 1) return { item, value: NaN, met: false, words: "unstable" };
-    if (item.loop && loop.waits && TIMED.includes(item.quantity)) return { item, value: NaN, met: null, words: "…" };
+    if (item.loop && loop.waits && item.timed) return { item, value: NaN, met: null, words: "…" };
     let value = item.loop ? loop.figures[PLACE[item.quantity]] : found.drive[k] ?? NaN;
     if (item.absolute) value = Math.abs(value);
     return { item, value, met: Number.isNaN(value) ? null : value >= (item.minimum ?? -Infinity) && value <= (item.maximum ?? Infinity) };
@@ -389,7 +380,7 @@
       return th;
     };
     head.append(heading("Loop", "left", "col"));
-    for (const [, label, unit] of FIGURES) {
+    for (const { label, unit } of data.figures) {
       const th = heading(label + " ", "right", "col");
       th.append(html("span", "unit", unit));
       head.append(th);
@@ -402,19 +393,19 @@
       row.append(th);
       if (!own.figures || !old.figures) {
         const td = html("td", "", NONE[own.figures ? old.n : own.n] || "no loop");
-        td.colSpan = FIGURES.length;
+        td.colSpan = data.figures.length;
         row.append(td);
       } else {
         if (x.phases_of(stageOf(name) ?? data.points[name]) > 1) th.append(" ", html("span", "unit", "fundamental"));
         if (own.figures[STABLE] !== 1) th.append(" ", html("span", "mark fail", "unstable"));
         th.dataset.loop = name;
         th.dataset.stable = own.figures[STABLE];
-        for (const [quantity, , unit, factor] of FIGURES) {
-          if (name in now.points && CLOSED.includes(quantity)) {
+        for (const { name: quantity, unit, factor, timed, response } of data.figures) {
+          if (name in now.points && response) { // of a break point it says nothing
             row.append(html("td"));
             continue;
           }
-          if (own.waits && TIMED.includes(quantity)) {
+          if (own.waits && timed) {
             row.append(html("td", "right", "…"));
             continue;
           }

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from random_drives import random_drive, random_elastic_drive
+from ulps import moved_by_an_ulp
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
@@ -28,7 +29,7 @@ from actuator_lti.loops.periodic import point_blocks
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
-from nonlinear.export import linear, linear_limiters
+from nonlinear.export import linear, linear_limiters, linear_periodic
 from nonlinear.export.c_files import exported
 from nonlinear.export.page import line_of
 
@@ -67,7 +68,10 @@ def numbers(values: list[Any]) -> np.ndarray:
 
 
 def figures_agree(design: Design, ours: dict[str, Any]) -> int:
-    """Compare every figure of every loop; the number of loops compared."""
+    """Compare every figure of every loop; the number of loops compared.
+
+    Equal to 1e-9, or as near as the entries of the loop's matrices determine it (see `ulps`).
+    """
     theirs, count = linear_figures(Population(design, {}, 1)), 0
     for loop in theirs.loops:
         assert ours[loop]["n"] > 0
@@ -79,7 +83,10 @@ def figures_agree(design: Design, ours: dict[str, Any]) -> int:
                 continue
             same = a == b or (math.isnan(a) and math.isnan(b))
             least = 1e-7 if name == "overshoot" else 1e-9  # of the final value, in percent
-            assert same or a == pytest.approx(b, rel=1e-9, abs=least), (design.name, loop, name)
+            if same or a == pytest.approx(b, rel=1e-9, abs=least):
+                continue
+            moved = moved_by_an_ulp(design, loop, LOOP_QUANTITIES[name].timed)
+            assert abs(a - b) <= 4.0 * moved[name], (design.name, loop, name)
         count += 1
     return count
 
@@ -104,7 +111,7 @@ def wanted_response(design: Design, name: str, loop: Loop) -> np.ndarray:
     """L at the angles; of a periodic loop without the many states of its fundamental, which lose digits."""
     z = np.exp(1j * ANGLES)
     if not loop.periodic:
-        return np.asarray(loop.open_loop(z))
+        return np.asarray(loop.plain_open(z))
     wired = wire(design)
     blocks = stage_blocks(wired, name) if name in LOOPS else point_blocks(wired, name)
     return np.array([around_once(blocks, each) for each in z])
@@ -117,15 +124,15 @@ def responses_agree(design: Design, ours: dict[str, Any]) -> None:
     for name in STAGES:
         known, system = ours[name], systems.get(name)
         if known["n"] <= 0:
-            assert system is None or (name == "w_ref" and loops.position is None)
+            long = known["n"] == linear.TOO_LONG and len(system.plain_open.A) > linear_periodic.MOST_STATES
+            assert system is None or (name == "w_ref" and loops.position is None) or long
             continue
         assert system is not None
         assert known["period"] == pytest.approx(system.period_s, rel=1e-12)
         pairs = numbers(known["response"]).reshape(-1, 2)
         wanted = wanted_response(design, name, system)
         got = pairs[:, 0] + 1j * pairs[:, 1]
-        # of the level: what is left beside a zero at Nyquist; a stiff spring's torque is a difference
-        rounding = (1e-14 if design.coupling is None else 1e-12) * np.abs(wanted).max()
+        rounding = 1e-14 * np.abs(wanted).max()  # of the level: what is left beside a zero at Nyquist
         assert (np.abs(got - wanted) <= 1e-9 * np.abs(wanted) + rounding).all(), (design.name, name)
 
 
@@ -208,6 +215,31 @@ def test_random_elastic_drives(tmp_path: Path) -> None:
     loops, limiters = agree_with_the_linear_form(designs, tmp_path)
     assert loops > 50
     assert limiters > 20
+
+
+def test_seeds_that_once_differed(tmp_path: Path) -> None:
+    """52004, 52023: margins of 0.01 deg and 70 dB; 52080: a response of 1e-4 beside states of 1e3.
+
+    The first two differ by rounding of the entries, which is shown; in the last the linear form lost digits.
+    """
+    made = (random_elastic_drive(np.random.default_rng(seed)) for seed in (52004, 52023, 52080))
+    loops, _ = agree_with_the_linear_form(
+        [replace(each, instruments=Instruments()) for each in made], tmp_path
+    )
+    assert loops > 5
+
+
+def test_random_elastic_drives_with_a_damped_load(tmp_path: Path) -> None:
+    """Stiff springs and soft ones, with the two keys of the load that random drives leave out."""
+    designs = []
+    for seed in range(300, 325):
+        design, rng = random_elastic_drive(np.random.default_rng(seed)), np.random.default_rng([seed, 5])
+        damping = 10 ** rng.uniform(-3.0, 0.5) if design.load.path == "back-drivable" else 0.0
+        load = replace(design.load, moment_damping_Nms_rad=damping)
+        designs.append(replace(design, load=load, instruments=Instruments()))
+    assert sum(each.coupling is not None and each.load.moment_damping_Nms_rad > 0.0 for each in designs) > 4
+    loops, _ = agree_with_the_linear_form(designs, tmp_path)
+    assert loops > 40
 
 
 def test_unstable_drives_are_called_so(tmp_path: Path) -> None:

@@ -16,10 +16,11 @@ from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
 from analyses.identification.to_design import design_with_estimate, surface_estimate
 from analyses.records import import_campaign, load_campaign
+from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
 from analyses.virtual_bench import BenchPlan, TrueRun, simulate_bench
-from analyses.virtual_bench_files import bench_campaign, write_bench
-from analyses.virtual_bench_instruments import BenchInstruments, measure_bench
+from analyses.virtual_bench_files import DRIVE_SPEC, SENSOR_SPEC, write_bench
+from analyses.virtual_bench_instruments import BenchInstruments, RunLogs, measure_bench
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 INSTRUMENTS = BenchInstruments()
@@ -34,6 +35,34 @@ def design() -> Design:
 def runs(design: Design) -> tuple[TrueRun, ...]:
     """The 54 runs of the paper, made short: noise and shared errors are drawn on top for each seed."""
     return simulate_bench(design, BenchPlan(duration_s=2.5))
+
+
+def bench_campaign(logs: tuple[RunLogs, ...], design: str, bounds: Instruments) -> Campaign:
+    """The campaign that the files describe, without the files: for runs that are in memory."""
+    folder = Path()
+    runs = [
+        RunEntry(
+            id=log.id,
+            drive=folder / f"run{log.id}_drive.csv",
+            sensor=folder / f"run{log.id}_torque.csv",
+            speed_rad_s=log.speed_setting_rad_s,
+            load_Nm=log.load_setting_Nm,
+            offset_s=None,
+        )
+        for log in logs
+    ]
+    return Campaign(
+        name="virtual bench",
+        design=design,
+        drive=DRIVE_SPEC,
+        sensor=SENSOR_SPEC,
+        join_method="correlation",
+        join_drive_signal="speed",
+        join_sensor_signal="torque",
+        instruments=bounds,
+        runs=tuple(runs),
+        origin=str(folder),
+    )
 
 
 def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:

@@ -8,7 +8,11 @@ import control
 import numpy as np
 import pytest
 
+from actuator_lti import load_design
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design.access import with_values
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.nyquist import slope_at_dc
 from actuator_lti.margins.results import Agreement, StabilityMargins
@@ -198,3 +202,23 @@ def test_a_response_that_vanishes_below_some_frequency_has_no_slope_there() -> N
     """L = 1/x above 1e-4 and 0 below, as rounding cuts it: one pole, and no warning."""
     order, _ = slope_at_dc(lambda x: np.where(x < 1e-4, 0.0, 1.0 / x).astype(complex), 1.0, 3)
     assert order == 1
+
+
+def test_the_sensitivity_of_an_unstable_loop_has_no_peak() -> None:
+    """|S| on the axis is no gain there: nothing settles to it. One answer, for one design and for many."""
+    design = load_design("ilr33-amber")
+    gains = np.array([1.0, 40.0]) * design.parameters["control.position.gain"].value
+    many = linear_figures(Population(design, {"control.position.gain": gains}, 2), time_figures=False)
+    assert many.stable("position").tolist() == [True, False]
+    peaks = many.quantity("sensitivity_peak", "position")
+    distances = many.quantity("modulus_margin", "position")
+    for k, gain in enumerate(gains):
+        loop = assemble_loops(with_values(design, {"control.position.gain": gain})).present["position"]
+        m = stability_margins(loop.open_loop)
+        assert distances[k] == pytest.approx(m.modulus_margin, rel=1e-6)  # a distance it keeps
+        if k == 0:
+            assert peaks[k] == pytest.approx(m.sensitivity_peak_db, rel=1e-6)
+            assert m.sensitivity_peak_db == pytest.approx(-20.0 * math.log10(m.modulus_margin))
+        else:
+            assert np.isnan(peaks[k])
+            assert m.sensitivity_peak_db is None

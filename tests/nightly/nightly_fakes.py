@@ -40,7 +40,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     ]
     columns = [
         column("loop", "loop"),
-        column("phase_margin", "phase margin", "deg", format="fix:1"),
+        column("phase_margin", "phase margin", "deg", format="fix:1", better=1),
         column("crossover", "crossover", "rad/s", format="sig:4"),
     ]
     return document(
@@ -76,7 +76,8 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
     time.sleep(float(payload.get("pause", 0.0)))
     made = fake_document(payload)
     html = f"<!doctype html><meta charset=utf-8><title>report</title><h1>report {len(str(payload))}</h1>"
-    return digest(made), {"report.html": html.encode(), "report.json": b"{}"}
+    meta = digest(made) | ({"pid": os.getpid()} if mode == "pid" else {})
+    return meta, {"report.html": html.encode(), "report.json": b"{}"}
 
 
 def job(name: str, margin: float = 10.0, **more: Any) -> Job:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from nightly_fakes import BUILD, CODE, Calendar, job, study
 from site_checks import check_whole
 
+from analyses.engine import Engine
+from reports.nightly.apart import Done, Limits, Task, build_each
+from reports.nightly.cache import Cache
 from reports.nightly.night import Settings, run_night
-from reports.nightly.pool import Pool, Task
 
 
 @pytest.fixture(scope="module")
@@ -62,18 +66,49 @@ def test_progress_counts_to_the_end(troubled) -> None:
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
 
 
-def test_no_worker_stays_behind(troubled) -> None:
-    import multiprocessing
+def workers_left() -> list[list[str]]:
+    import psutil
 
-    assert multiprocessing.active_children() == []
+    lines = [child.cmdline() for child in psutil.Process().children()]
+    return [line for line in lines if "nightly.worker" in str(line)]
+
+
+def test_no_worker_stays_behind(troubled) -> None:
+    assert workers_left() == []
+
+
+def ends_of(build: str, tasks: list[Task], folder: Path) -> list[Done]:
+    ends: list[Done] = []
+    limits = Limits(build=build, time_limit_s=5.0, memory_bytes=10**10)
+    build_each(tasks, limits, Engine(threads=2), Cache(folder), ends.append)
+    return ends
 
 
 def test_a_build_that_cannot_be_imported_fails_every_task_and_ends(tmp_path) -> None:
-    pool = Pool("no_such_module:build", tmp_path, workers=1, time_limit_s=5.0)
-    ends = list(pool.run([Task(key=f"k{k}", payload={}) for k in range(2)]))
-    assert [d.status for d in ends] == ["crash", "crash"]
-    assert all("could not start" in d.message for d in ends)
+    ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)], tmp_path)
+    assert [d.status for d in ends] == ["crash"] * 3
+    assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends)
 
 
 def test_nothing_to_do_starts_no_process(tmp_path) -> None:
-    assert list(Pool("no_such_module:build", tmp_path, workers=2, time_limit_s=1.0).run([])) == []
+    assert ends_of("no_such_module:build", [], tmp_path) == []
+
+
+def test_a_process_goes_from_job_to_job(tmp_path) -> None:
+    tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode="pid").payload) for k in range(6)]
+    assert {d.status for d in ends_of(BUILD, tasks, tmp_path)} == {"done"}
+    entries = [Cache(tmp_path).read(task.key) for task in tasks]
+    assert 1 <= len({entry.meta["pid"] for entry in entries if entry is not None}) <= 2
+
+
+def test_an_interrupted_night_ends_the_jobs_under_way(tmp_path) -> None:
+    """Ctrl-C beside a job that never ends: no wait for its time limit, no process left."""
+
+    def interrupt(_done: Done) -> None:
+        raise KeyboardInterrupt
+
+    tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode=m).payload) for k, m in enumerate(["hang", ""])]
+    limits = Limits(build=BUILD, time_limit_s=500.0, memory_bytes=10**10)
+    with pytest.raises(KeyboardInterrupt):
+        build_each(tasks, limits, Engine(threads=2), Cache(tmp_path), interrupt)
+    assert workers_left() == []

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from actuator_lti import load_design
-from actuator_lti.design import with_values
+from actuator_lti.design import with_overrides, with_values
+from actuator_lti.drive.steady import motor_torque_Nm
+from analyses.drive_figures import drive_figures
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
 from analyses.specification.manoeuvres import thermal_duty
+from analyses.specification.plane import torque_speed_plane
+from analyses.validation.bench import on_the_bench
+from nonlinear import commands, simulate
 from reports import document as doc
 from reports.figures.registry import draw_svg
 from reports.sections import friction_effects as friction_section
@@ -125,3 +132,31 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
     assert any(item["passed"] is False and "refuted" in item["reason"] for item in items)
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [
+        ("fin", {"load.moment_damping": "2 N*m*s/rad"}),
+        ("ilr33-amber", {"load.moment_damping": "300 N*m*s/rad", "load.path": "back-drivable"}),
+        (
+            "ilr33-amber-compliant",
+            {
+                "load.path": "back-drivable",
+                "load.friction.dry_torque": "2 N*m",
+                "load.friction.viscous": "3 N*m*s/rad",
+            },
+        ),
+    ],
+)
+def test_the_demand_of_the_plane_is_what_steady_motion_takes(name: str, more: dict[str, str]) -> None:
+    """Friction behind the coupling and damping of the load too: the torque of a ramp, simulated."""
+    design = with_overrides(load_design(name), {**more, "load.moment_slope": "0 N*m/rad"})
+    top = 0.3 * drive_figures(design, 0.0).output_rate_rad_s * design.total_ratio
+    unloaded = replace(design, validation=replace(design.validation, loads_Nm=(0.0,)))
+    (curve,) = torque_speed_plane(unloaded, top).demands
+    wanted = float(np.interp(top, curve.speed_rad_s, curve.torque_Nm))
+    run = simulate(on_the_bench(design), commands.ramp(top / design.total_ratio), 1.5)
+    torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-len(run.time_s) // 10 :]
+    assert run.motor_speed_rad_s[-1] == pytest.approx(top, rel=1e-3)
+    assert float(torque.mean()) == pytest.approx(wanted, rel=2e-3)
