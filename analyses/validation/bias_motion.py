@@ -144,11 +144,17 @@ def may_stand(design: Design) -> bool:
     return has_to_stand(design) or not bent_about_rest(design)
 
 
-def on_its_stand(design: Design) -> Design:
-    """A drive that has to stand, without friction that would give it two slopes there; others as they are."""
-    if not has_to_stand(design):
-        return design
-    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+def on_its_stand(design: Design, like: Design | None = None) -> Design:
+    """A drive without friction that would give it two slopes where it is tested; others as they are.
+
+    One that has to stand knows no friction by direction; a rigid one whose load is damped none by load, which
+    grows with the speed and is no part of its loops.  ``like`` is the drive that is tested, if another.
+    """
+    tested, friction = like or design, design.friction
+    if has_to_stand(tested):
+        friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    elif tested.coupling is None and tested.load.moment_damping_Nms_rad:
+        friction = replace(friction, load_coefficient=0.0)
     return design if friction == design.friction else replace(design, friction=friction)
 
 
@@ -273,14 +279,15 @@ def steady_gain(design: Design, place: FilterPlace) -> float:
 
 def bias_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> BiasMotion:
     """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
-    friction = design.friction
+    friction, moment = design.friction, load_Nm
+    moment -= design.load.moment_damping_Nms_rad * speed_rad_s / design.total_ratio
     passed = 1.0 if design.load.path == "back-drivable" else 0.0
     twist = coupling_Nm = 0.0
     if design.coupling is None:
-        torque = friction.load_coefficient * abs(load_Nm) - passed * load_Nm / design.total_ratio
+        torque = friction.load_coefficient * abs(moment) - passed * moment / design.total_ratio
     else:
         coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
-        coupling_Nm -= load_Nm / design.ratio_behind_coupling
+        coupling_Nm -= moment / design.ratio_behind_coupling
         half = 0.5 * design.coupling.play_rad * (1.0 if coupling_Nm > 0.0 else -1.0)
         twist = coupling_Nm / design.coupling.stiffness_Nm_rad + half
         torque = passed * coupling_Nm / design.ratio_to_coupling

@@ -20,7 +20,7 @@ from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench import on_the_bench
-from analyses.validation.bias_motion import bias_motion, has_to_stand, may_stand, on_its_stand
+from analyses.validation.bias_motion import bias_motion, may_stand, on_its_stand
 from analyses.validation.breakaway import breakaway_entry
 from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.coherent import LEAST_SAMPLES
@@ -151,6 +151,10 @@ class _Work:
         self.budget = Budget(self.settings.seconds)
         if replace(self.linear, command=self.design.command) != self.design:
             self.notes.append("small signals are measured with ideal instruments: without counts and noise")
+        if self.linear.friction != self.design.friction:
+            self.notes.append(
+                "small signals are measured without friction of two slopes: by load, by direction, a map"
+            )
 
     def _warm_up(self) -> None:
         """Have the simulator compiled, and libraries loaded, before the clock starts."""
@@ -264,8 +268,7 @@ class _Work:
             self.linear
         )  # a drive without steady motion cannot be tested
         at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
-        model = on_the_bench(self.model)
-        model = on_its_stand(model) if has_to_stand(self.linear) else model
+        model = on_its_stand(on_the_bench(self.model), self.design)
         self.at = at
         loops = assemble_loops(replace(model, command=self.model.command), **at)  # type: ignore[arg-type]
         self.held = None
@@ -477,8 +480,7 @@ class _Work:
     @cached_property
     def _model_steered(self) -> Design:
         filtered = replace(self.model.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
-        bench = on_the_bench(self.model)
-        bench = on_its_stand(bench) if has_to_stand(self.linear) else bench
+        bench = on_its_stand(on_the_bench(self.model), self.design)
         return replace(bench, command=filtered)
 
     def _answered(self, sweep: Sweep | None) -> list[Entry]:

@@ -57,6 +57,7 @@ TRIAL = Settings(
     friction_effects=False,
     specification=False,
 )
+DAMPED = 80_000  # seeds from here on have damping of the load as well
 T = TypeVar("T")
 
 
@@ -278,7 +279,17 @@ def full_drive(seed: int) -> Design:
         _outermost,
     ):
         design = change(dice, design)
-    return design
+    return _damped(Dice(2 * 10**6 + seed), design) if seed >= DAMPED else design
+
+
+def _damped(dice: Dice, design: Design) -> Design:
+    """A load in air or water."""
+    if not dice.chance(0.2):
+        return design
+    own = design.inertia_kgm2 * design.total_ratio**2  # refused above J/Ts
+    damping = dice.decades(1e-5, 1e-2) * own / design.controller.period_s
+    path = "back-drivable" if dice.chance(0.7) else design.load.path
+    return replace(design, load=replace(design.load, moment_damping_Nms_rad=damping, path=path))
 
 
 def _elastic(dice: Dice, design: Design) -> Design:

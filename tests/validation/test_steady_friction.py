@@ -7,9 +7,11 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import load_design
+from analyses.validation import validate
 from analyses.validation.bench import on_the_bench
 from analyses.validation.bias_motion import bias_motion
 from analyses.validation.steady import level, steady_entry
+from tests.validation.small_settings import SMALL
 
 SETTLE = 20_000  # ticks
 
@@ -44,3 +46,28 @@ def test_a_heavy_drive_with_short_ticks_is_judged_by_what_a_tick_can_add() -> No
     )
     light, slow = (steady_entry(one, one, SETTLE) for one in (amber, heavy))
     assert slow.tolerance > light.tolerance
+
+
+def test_damping_of_the_load_is_part_of_a_constant_speed() -> None:
+    """kM i = Tc + b w + D w/N^2 + CM D w/N, rigid; the last by friction of the load's moment."""
+    amber = on_the_bench(load_design("ilr33-amber"))
+    D, CM, N = 0.05, amber.friction.load_coefficient, amber.total_ratio
+    design = replace(amber, load=replace(amber.load, path="back-drivable", moment_damping_Nms_rad=D))
+    row = steady_entry(design, design, SETTLE)
+    w = bias_motion(design).speed_rad_s
+    friction, motor = design.friction, design.motor
+    torque = friction.dry_torque_Nm + friction.viscous_Nms_rad * w + D * w / N**2 + CM * D * w / N
+    assert CM > 0.0
+    assert row.passed
+    assert row.measured == pytest.approx(torque / motor.torque_constant_Nm_A, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "fin"])
+def test_a_damped_load_fails_no_check(name: str) -> None:
+    """15 rows of ilr33-amber disagreed: its motion was begun without what the damping takes."""
+    design = load_design(name)
+    damped = replace(design.load, path="back-drivable", moment_damping_Nms_rad=0.05)
+    result = validate(replace(design, load=damped), SMALL)
+    assert not result.failed
+    if name == "ilr33-amber":
+        assert any("by load" in note for note in result.notes)
