@@ -4,7 +4,17 @@ Light to import; python-control is loaded when loops are assembled.
 """
 
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.periodic import ExactMargins, exact_margins
+from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
-__all__ = ["ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "assemble_loops", "exact_margins"]
+__all__ = [
+    "ExactMargins",
+    "Form",
+    "InnerLoops",
+    "Loop",
+    "Loops",
+    "PeriodicLoop",
+    "assemble_loops",
+    "exact_margins",
+    "periodic_loop",
+]

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
@@ -98,6 +99,58 @@ class ExactMargins:
     spectral_radius: float
 
 
+@dataclass(frozen=True)
+class PeriodicLoop:
+    """A loop cut at a break point over one period of the drive: M updates, each with its own matrices.
+
+    As many states as the drive has, where the time-invariant system of the fundamental has M times as many.
+
+    Attributes
+    ----------
+    systems : sequence of (A, B, C)
+        One an update: y = C x seen at its start, e held over it.
+    dt : float
+        Time between two updates, s.
+    """
+
+    systems: Sequence[System]
+    dt: float
+
+    def modes(self, gain: float = 1.0) -> np.ndarray:
+        """Eigenvalues over one period with the loop closed through a gain."""
+        over = np.eye(self.systems[0][0].shape[0])
+        for A, B, C in self.systems:
+            over = (A - gain * B @ C) @ over
+        return np.asarray(np.linalg.eigvals(over), dtype=complex)
+
+    def __call__(self, points: npt.ArrayLike) -> np.ndarray:
+        """L = T/(1 - T) of the fundamental at points z (see the module), of their shape.
+
+        T(z) is the mean over the updates m of ``C_m x_m z^-m`` for the input z^m at the closed loop, with
+        ``x_M = z^M x_0``.
+        """
+        z = np.asarray(points, dtype=complex)
+        turn, n = z.reshape(-1, 1), self.systems[0][0].shape[0]
+        forced, over = np.zeros((turn.size, n), dtype=complex), np.eye(n)
+        closed = [(A - B @ C, B[:, 0], C[0]) for A, B, C in self.systems]
+        for m, (A, b, _) in enumerate(closed):
+            forced, over = forced @ A.T + turn**m * b, A @ over
+        M = len(closed)
+        x = np.linalg.solve(turn[:, :, None] ** M * np.eye(n) - over, forced[:, :, None])[:, :, 0]
+        total = np.zeros(turn.size, dtype=complex)
+        for m, (A, b, c) in enumerate(closed):
+            total += (x @ c) * turn[:, 0] ** -m / M
+            x = x @ A.T + turn**m * b
+        return np.asarray((total / (1.0 - total)).reshape(z.shape))
+
+
+def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:
+    """The loop at a break point of sampled loops, what no gain moves left out."""
+    wired = wire(loops.design, loops.operating)
+    moved, _ = _parts(point_blocks(wired, point))
+    return PeriodicLoop(moved, wired.interval[wired.producer(point)] * wired.tick_s)
+
+
 def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     """What the loop moves and sees, and the rest of the drive: its eigenvalues are those of both.
 
@@ -130,10 +183,7 @@ def _without_rest(systems: list[System]) -> list[System]:
 
 def _radius(systems: Sequence[System], gain: float) -> float:
     """Spectral radius over one period with the loop closed through a gain."""
-    over = np.eye(systems[0][0].shape[0])
-    for A, B, C in systems:
-        over = (A - gain * B @ C) @ over
-    return float(np.max(np.abs(np.linalg.eigvals(over)), initial=0.0))
+    return float(np.max(np.abs(PeriodicLoop(systems, 0.0).modes(gain)), initial=0.0))
 
 
 def _first_border(excess: Callable[[float], float], grid: Sequence[float], none: float) -> float:

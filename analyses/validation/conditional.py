@@ -236,7 +236,9 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:
     """The limit cycle at the lower gain margin; none where the drive drifts away there."""
     ratio = saturation_ratio(gain)
-    hertz = oscillation_hz(loops.break_points[point], gain=gain)
+    from actuator_lti.loops import periodic_loop
+
+    hertz = oscillation_hz(periodic_loop(loops, point), gain=gain)
     if hertz == 0.0:
         return None
     design, omega = loops.design, 2.0 * pi * hertz

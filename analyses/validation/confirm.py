@@ -20,7 +20,7 @@ from nonlinear import Rows
 from nonlinear.probe import fractional_delay
 
 if TYPE_CHECKING:
-    from actuator_lti.loops import ExactMargins, Loops
+    from actuator_lti.loops import ExactMargins, Loops, PeriodicLoop
     from actuator_lti.margins import StabilityMargins
 
 Floats = npt.NDArray[np.float64]
@@ -185,11 +185,12 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
     downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
     up, down = min(ups, default=None), max(downs, default=None)
     ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, setup.design.name, EVER_TICKS)
+    own = time_invariant(loop.plain_open)
     result = [
         replace(asked, settles_ticks=max(ever, asked.settles_ticks))
         for asked in (
-            _gain(setup, "gain up", up, settle_ticks, loop),
-            _gain(setup, "gain down", down, settle_ticks, loop),
+            _gain(setup, "gain up", up, settle_ticks, own),
+            _gain(setup, "gain down", down, settle_ticks, own),
         )
     ]
     delay = margins.delay_margin
@@ -212,11 +213,11 @@ def point_questions(
     Predicted by the eigenvalues of the whole loop over a position period (`exact_margins`), so also where it
     is periodically time-varying; ``margins`` holds those already known.
     """
-    from actuator_lti.loops import exact_margins
+    from actuator_lti.loops import exact_margins, periodic_loop
 
     result = []
     for point, setup in setups.items():
-        exact, loop = (margins or {}).get(point) or exact_margins(loops, point), loops.break_points[point]
+        exact, loop = (margins or {}).get(point) or exact_margins(loops, point), periodic_loop(loops, point)
         if not exact.stable:
             continue
         radius = exact.spectral_radius
@@ -234,49 +235,56 @@ def point_questions(
     return result
 
 
-def oscillation_hz(loop: Any, gain: float = 1.0, delay_s: float = 0.0) -> float:
+def time_invariant(system: Any) -> PeriodicLoop:
+    """A loop of one update a period."""
+    from actuator_lti.loops import PeriodicLoop
+
+    return PeriodicLoop([(system.A, system.B, system.C)], system.dt)
+
+
+def oscillation_hz(loop: PeriodicLoop, gain: float = 1.0, delay_s: float = 0.0) -> float:
     """About where a loop oscillates at its border: the angle of the pole that leaves the unit circle there.
 
-    0, and half the sampling frequency, where a real pole leaves it at 1 or -1.  With a delay, or where no
-    pole does (a periodically time-varying loop is one at one rate only about), the frequency at which
-    ``gain L exp(-jwd)`` comes nearest to -1.
+    0, and half the sampling frequency, where a real pole leaves it at 1 or -1.  A pole over M updates is that
+    of M frequencies: the one at which ``gain L`` comes nearest to -1 is meant.  With a delay, or where no
+    pole leaves, that of all frequencies.
     """
-    pole = None if delay_s else _leaving(loop.plain_open, gain)
+    pole = None if delay_s else _leaving(loop, gain)
     if pole is None:
         return _nearest_hz(loop, gain, delay_s)
-    return float(abs(np.angle(pole))) / (2.0 * pi * loop.period_s)
+    count, angle = len(loop.systems), float(abs(np.angle(pole)))
+    turns = 2.0 * pi * np.arange(count)
+    angles = np.concatenate([turns + angle, turns[1:] - angle]) / count  # of an update
+    angles = angles[angles <= pi * (1.0 + AT_NYQUIST)]
+    if angles.size > 1:
+        angles = angles[np.argsort(np.abs(1.0 + gain * loop(np.exp(1j * angles))))]
+    return float(angles[0]) / (2.0 * pi * loop.dt)
 
 
-def _leaving(open_loop: Any, gain: float) -> complex | None:
-    """The pole of the closed loop that crosses the unit circle at a gain."""
-    beside = [closed_poles(open_loop, gain * factor) for factor in BESIDE]
-    out = max(beside, key=lambda poles: float(np.abs(poles).max(initial=0.0)))
+def _leaving(loop: PeriodicLoop, gain: float) -> complex | None:
+    """The pole of the closed loop over a period that crosses the unit circle at a gain."""
+    beside = [loop.modes(gain * factor) for factor in BESIDE]
     sizes = [float(np.abs(poles).max(initial=0.0)) for poles in beside]
     if not min(sizes) <= 1.0 + DRIFTING < max(sizes):
         return None
-    leaves = out[int(np.argmax(np.abs(out)))]
-    there = closed_poles(open_loop, gain)
+    out = beside[int(np.argmax(sizes))]
+    leaves, there = out[int(np.argmax(np.abs(out)))], loop.modes(gain)
     return complex(there[int(np.argmin(np.abs(there - leaves)))])
 
 
-def closed_poles(open_loop: Any, gain: float) -> npt.NDArray[np.complex128]:
-    """Poles of the loop closed with a gain."""
-    A, B, C, D = (np.asarray(x) for x in (open_loop.A, open_loop.B, open_loop.C, open_loop.D))
-    return np.asarray(np.linalg.eigvals(A - gain / (1.0 + gain * D[0, 0]) * B @ C), dtype=complex)
-
-
-def _nearest_hz(loop: Any, gain: float, delay_s: float) -> float:
+def _nearest_hz(loop: PeriodicLoop, gain: float, delay_s: float) -> float:
     """Where ``gain L exp(-jwd)`` comes nearest to -1."""
     from scipy.optimize import minimize_scalar
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
         omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
-        return np.abs(1.0 + gain * response_at(loop.plain_open, omega) * np.exp(-1j * omega * delay_s))
+        L = response_at(loop, omega)
+        return np.asarray(np.abs(1.0 + gain * L * np.exp(-1j * omega * delay_s)), dtype=float)
 
-    poles = closed_poles(loop.plain_open, 1.0)
-    moving = np.abs(np.log(np.where(poles == 0.0, 1e-300, poles)))
+    poles = loop.modes()
+    moving = np.abs(np.log(np.where(poles == 0.0, 1e-300, poles))) / len(loop.systems)
     slowest = min(SLOWEST, 0.1 * float(moving[moving > DRIFTING].min(initial=pi)) / pi)
-    grid = np.log(np.geomspace(slowest, 0.999, GRID) * 0.5 / loop.period_s)
+    grid = np.log(np.geomspace(slowest, 0.999, GRID) * 0.5 / loop.dt)
     values = distance(grid)
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
@@ -285,7 +293,7 @@ def _nearest_hz(loop: Any, gain: float, delay_s: float) -> float:
         ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
         result.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
     best = min(result, key=lambda item: float(item.fun))
-    nyquist = 0.5 / loop.period_s
+    nyquist = 0.5 / loop.dt
     at_minus_one = float(distance(np.log(nyquist))[0])
     if values[0] <= min(best.fun, at_minus_one):
         return 0.0
@@ -293,7 +301,7 @@ def _nearest_hz(loop: Any, gain: float, delay_s: float) -> float:
 
 
 def _gain(
-    setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int, loop: Any
+    setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int, loop: PeriodicLoop
 ) -> Question:
     """A gain margin; where none is predicted within the search range the search looks all the same."""
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
@@ -311,7 +319,7 @@ def _gain(
     return Question(_expecting(setup, kind, hertz, settle_ticks, ratio), kind, ratio, hertz)
 
 
-def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
+def _on_the_way(loop: PeriodicLoop, ratio: float, hold_ticks: int) -> int:
     """Ticks in which every other mode dies down between the nominal gain and a border where the drive drifts.
 
     On its way there a loop may swing more slowly than it ever does at its nominal gain, and a window shorter
@@ -319,10 +327,10 @@ def _on_the_way(loop: Any, ratio: float, hold_ticks: int) -> int:
     """
     slowest = 0.0
     for gain in np.geomspace(1.0, ratio, WAY)[1:-1]:
-        sizes = np.abs(closed_poles(loop.plain_open, gain))
+        sizes = np.abs(loop.modes(gain))
         slowest = max(slowest, float(sizes[sizes < 1.0 - DRIFTING].max(initial=0.0)))
-    samples = DIED_DOWN / -log(slowest) if slowest > 0.0 else 0.0
-    return min(ceil(samples) * hold_ticks, LONGEST_DRIFT_TICKS)
+    periods = DIED_DOWN / -log(slowest) if slowest > 0.0 else 0.0
+    return min(ceil(periods * len(loop.systems)) * hold_ticks, LONGEST_DRIFT_TICKS)
 
 
 def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:

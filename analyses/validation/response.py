@@ -120,8 +120,12 @@ def sweep_errors(sweep: Any, loop: Any, response: str = "open_loop") -> SweepErr
     ----------
     response : {"open_loop", "closed_loop", "sensitivity"}
     """
-    expected = linear_response(getattr(loop, PLAIN[response]), sweep.frequency_hz)
-    ratio = getattr(sweep, response) / expected
+    return errors_beside(sweep, getattr(loop, PLAIN[response]), response)
+
+
+def errors_beside(sweep: Any, system: Any, response: str = "open_loop") -> SweepErrors:
+    """Compare a response of a sweep with that of a linear system."""
+    ratio = getattr(sweep, response) / linear_response(system, sweep.frequency_hz)
     return SweepErrors(20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio)))
 
 

@@ -44,7 +44,7 @@ from analyses.validation.ledger import (
     point_entries,
 )
 from analyses.validation.release import AmplitudeMargin, release_margins
-from analyses.validation.response import Sweep, linear_response, sweep_errors
+from analyses.validation.response import Sweep, errors_beside, linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
 from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
@@ -404,6 +404,8 @@ class _Work:
 
     def _points(self, confirmed: tuple[Confirmation, ...]) -> dict[str, PointValidation]:
         """Sweeps at the break points with all other loops closed."""
+        from actuator_lti.loops import periodic_loop
+
         result = {}
         for point in self._inner_points():
             own = tuple(item for item in confirmed if item.loop == point)
@@ -414,7 +416,7 @@ class _Work:
                 outermost = stages_of(self.design)[-1]
                 asked = np.geomspace(self._lowest(outermost), top, self.settings.point_frequencies)
                 sweep = stepped_sine(rig(self.linear, point), asked, self.settle[outermost])
-                errors = sweep_errors(sweep, loop)
+                errors = errors_beside(sweep, periodic_loop(self.loops, point))
             result[point] = PointValidation(point, sweep, errors, own)
         return result
 

@@ -1,0 +1,52 @@
+"""A loop over one period of the drive: its response is what comes back at the frequency that goes in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design
+from actuator_lti.design import with_values
+from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
+from actuator_lti.resolvent import responses
+
+SYSTEMS = [  # of one state, by turns
+    (np.array([[0.9]]), np.array([[0.3]]), np.array([[1.0]])),
+    (np.array([[0.7]]), np.array([[0.1]]), np.array([[2.0]])),
+    (np.array([[1.1]]), np.array([[0.2]]), np.array([[0.5]])),
+]
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.4, 2.9])
+def test_the_fundamental_is_that_of_a_long_run(angle: float) -> None:
+    """e = d - y tick by tick, by hand, until it is steady; T is what y holds of ``exp(j angle k)``."""
+    x, turns, y = 0.0 + 0.0j, np.exp(1j * angle * np.arange(3 * 400)), []
+    for k, d in enumerate(turns):
+        A, B, C = (part.item() for part in SYSTEMS[k % 3])
+        y.append(C * x)
+        x = A * x + B * (d - C * x)
+    T = np.mean(np.array(y)[-300:] / turns[-300:])
+    L = PeriodicLoop(SYSTEMS, 1.0)(np.exp(1j * angle))
+    assert complex(L) == pytest.approx(T / (1.0 - T), rel=1e-12)
+
+
+def test_its_modes_are_those_of_a_product() -> None:
+    wanted = (0.9 - 2.0 * 0.3) * (0.7 - 2.0 * 0.2) * (1.1 - 2.0 * 0.1)
+    assert PeriodicLoop(SYSTEMS, 1.0).modes(2.0) == pytest.approx([wanted], rel=1e-14)
+
+
+@pytest.mark.parametrize("point", ["u", "i_ref", "w_ref"])
+def test_the_time_invariant_system_of_the_fundamental_says_the_same(point: str) -> None:
+    loops = assemble_loops(load_design("ilr33-amber-multirate"))
+    z = np.exp(1j * np.geomspace(1e-4, 3.1, 40))
+    whole = responses(loops.break_points[point].plain_open, z)
+    np.testing.assert_allclose(periodic_loop(loops, point)(z), whole, rtol=1e-8)
+
+
+def test_a_slow_filter_of_the_command_moves_no_margin() -> None:
+    """The border of the current loop is not moved by what stands in front of it."""
+    design = load_design("ilr33-amber")
+    slow = with_values(design, {"command.filter_time": 1000.0, "command.filter_order": 2}, check=False)
+    plain, filtered = (exact_margins(assemble_loops(one), "u") for one in (design, slow))
+    assert filtered.gain_upper == pytest.approx(plain.gain_upper, rel=1e-9)
+    assert filtered.delay_s == pytest.approx(plain.delay_s, rel=1e-9)
