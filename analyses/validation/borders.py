@@ -175,6 +175,9 @@ class Search:
         gone = (last <= nothing * self.kick) | ~np.isfinite(rate)
         limited = np.any([result.limit_fraction(name) > 0.0 for name in LIMITERS], axis=0)
         burst = ~result.ok | limited | ((result.events > 0) & self.setup.bias.delicate)
+        if self.setup.bias.friction_on:  # so far only friction has one slope; a smooth law has no event
+            low, high = result.span("motor_speed_rad_s")
+            burst |= high - low > self.setup.bias.room_rad_s
         if self.setup.design.load.gravity is not None:  # a motion that has grown large is bounded by it
             burst |= last > GROWN * self.kick
         return np.where(burst, inf, np.where(gone, -inf, rate))

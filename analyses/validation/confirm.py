@@ -289,15 +289,16 @@ def _nearest_hz(loop: PeriodicLoop, gain: float, delay_s: float) -> float:
     dips = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] <= values[2:])) + 1
     dips = dips[np.argsort(values[dips])][:DIPS] if dips.size else np.array([int(np.argmin(values))])
     result = []
-    for k in dips:  # a narrow one is deeper than the grid shows
-        ends = (grid[max(k - 1, 0)], grid[min(k + 1, grid.size - 1)])
-        result.append(minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded"))
-    best = min(result, key=lambda item: float(item.fun))
+    for k in map(int, dips):  # a narrow one is deeper than the grid shows
+        ends = (float(grid[max(k - 1, 0)]), float(grid[min(k + 1, grid.size - 1)]))
+        found = minimize_scalar(lambda x: float(distance(x)[0]), bounds=ends, method="bounded")
+        result.append((float(found.fun), float(found.x)))
+    nearest, best = min(result)
     nyquist = 0.5 / loop.dt
     at_minus_one = float(distance(np.log(nyquist))[0])
-    if values[0] <= min(best.fun, at_minus_one):
+    if values[0] <= min(nearest, at_minus_one):
         return 0.0
-    return nyquist if at_minus_one <= best.fun else float(np.exp(best.x))
+    return nyquist if at_minus_one <= nearest else float(np.exp(best))
 
 
 def _gain(
