@@ -72,11 +72,11 @@ class BorderCheck:
 
     @property
     def same_limiter(self) -> tuple[bool, ...]:
-        """Whether the limiter that acts is one foreseen; two may be, within what the bisection resolves."""
+        """Whether the limiter that acts is the first foreseen, or foreseen within `TOLERANCE` of there."""
         result = []
         for k, (name, acting) in enumerate(zip(self.predicted_limiter, self.simulated_limiter, strict=True)):
             foreseen = self.each_rad.get(acting)
-            near = foreseen is not None and foreseen[k] <= self.predicted_rad[k] * (1.0 + self.resolution)
+            near = foreseen is not None and abs(foreseen[k] / self.simulated_rad[k] - 1.0) <= TOLERANCE
             result.append(name == acting or bool(near))
         return tuple(result)
 

@@ -476,11 +476,12 @@ def _control(hunts: list[_Hunt], threads: int | None) -> None:
     result = Rows.join(parts).run(threads=threads)
     for k, hunt in enumerate(ones):
         own = result.part(slice(k, k + 1))
+        reversed_ = bool(own.events[0]) and hunt.search.setup.bias.delicate
         met = [f"{name} limit" for name in LIMITERS if own.limit_fraction(name)[0] > 0.0]
-        met += ["reversal of the speed"] if own.events[0] and hunt.search.setup.bias.delicate else []
+        met += ["reversal of the speed"] if reversed_ else []
         if not met and not hunt.search.smooth and 0.0 <= float(hunt.search.growth(own)[0]) < inf:
             hunt.spoiled = "the drive as it is has not come to rest within the time given"
-        if met and bool(own.ok[0]):
+        if met and (bool(own.ok[0]) or reversed_):  # behind a reversal, or in the gap, it is another drive
             hunt.spoiled = f"the drive as it is meets a {met[0]} after the faintest kick"
 
 

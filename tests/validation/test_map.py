@@ -255,9 +255,9 @@ def test_a_start_up_that_reaches_a_limit_moves_no_border(seed: int, frequency: i
     assert border.ratio[frequency] == pytest.approx(1.0, abs=1e-3)
 
 
-@pytest.mark.parametrize(("apart", "passed"), [(1e-4, True), (3e-4, False)])
+@pytest.mark.parametrize(("apart", "passed"), [(4e-3, True), (2e-2, False)])
 def test_two_limiters_reached_together_are_both_foreseen(apart: float, passed: bool) -> None:
-    """Seed 3086: the bisection ends in an interval of 2.3e-4, and cannot tell which was first in it."""
+    """Seeds 3086, 70063: the border itself is judged to 1 %, so which of two was first in it is not known."""
     border = BorderCheck(
         friction_on=False,
         frequency_hz=np.array([1.0]),
