@@ -12,6 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
+from analyses.validation.bias_motion import has_to_stand
 from analyses.validation.conditional import step_rows
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.own_error import carried_on
@@ -21,6 +22,7 @@ from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 STEP_PERCENT = 5e-3  # of a step: its end may be so far from the target, as the run is as long as it settles
+SAME_END = 1e-4  # relative: so near, two steps end at the same share of their commands
 AT_TARGET = 1e-6  # of a step: so near its end is the target
 
 
@@ -124,10 +126,7 @@ def rest_entries(
     design: Design, figures: LoopFigures, steps: RestSteps, sweep: RestSweep | None
 ) -> list[Entry]:
     """Ledger entries from rest: judged only where neither a limit nor friction takes part."""
-    dc = float(steps.final_ratio[0])
-    dc = dc if not steps.reasons[0] and np.isfinite(dc) and dc > 0.0 else 1.0
-    off = float(steps.error[0]) if dc != 1.0 else 0.0
-    rows = [] if sweep is None else _sweep_entries(design, figures, sweep, dc, off)
+    rows = [] if sweep is None else _sweep_entries(design, figures, sweep, _dc(design, steps))
     if figures.step is None:
         return rows
     sample = figures.step.period_s or 0.0  # both are read at samples
@@ -159,6 +158,21 @@ def rest_entries(
     return rows
 
 
+def _dc(design: Design, steps: RestSteps) -> Reading:
+    """Response to the command at zero frequency: where steps end, whether or not a limit acted on the way.
+
+    1 where the load does not change with the angle; else no value where the steps end differently: a limit or
+    friction holds them.
+    """
+    if not has_to_stand(design):
+        return Reading(1.0)
+    ends = steps.final_ratio[:2]
+    alike = np.isfinite(ends).all() and float(np.ptp(ends)) <= SAME_END * float(ends[0])
+    if not alike or nonlinear_parts(design) or not steps.error[0] <= UNSETTLED:
+        return Reading(None)
+    return Reading(float(ends[0]), float(steps.error[0] + np.ptp(ends) / ends[0]))
+
+
 def _judge(
     quantity: str,
     unit: str,
@@ -174,26 +188,26 @@ def _judge(
     return entry("position", quantity, unit, predicted, reading, condition, least)
 
 
-def _sweep_entries(
-    design: Design, figures: LoopFigures, sweep: RestSweep, dc: float, dc_error: float
-) -> list[Entry]:
+def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep, dc: Reading) -> list[Entry]:
     """Bandwidths without bias motion, of the response over its value at zero frequency."""
     band = figures.bandwidth
     if band is None:
         return []
-    gain, phase = np.abs(sweep.measured) / dc, np.degrees(np.unwrap(np.angle(sweep.measured)))
+    gain, phase = np.abs(sweep.measured) / (dc.value or 1.0), np.degrees(np.unwrap(np.angle(sweep.measured)))
     acting = next((LIMITERS[name].words for name in sweep.limiter if name), "")
     parts = nonlinear_parts(design)
     if not np.isfinite(sweep.described).any() and bool((sweep.stick_fraction > 0.0).any()):
         parts = ["dry friction holds the rotor"]
     if design.controller.position_loop.every > 1:
         parts.append("seen between the samples of the position loop as well")
+    if dc.value is None:
+        parts.append("the steps from rest end differently: the value at zero frequency is not known")
     reason = ", ".join([*parts, acting] if acting else parts)
     condition = "response to the command (with feed-forward), from rest, sine clear of every limit"
     spread = float(sweep.unsteadiness.max())
     rows = []
     for quantity, predicted, values, level, error in (
-        ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5), spread + dc_error),
+        ("bandwidth", band.minus3db_hz, gain, np.sqrt(0.5), spread + dc.error),
         ("bandwidth_90deg", band.minus90deg_hz, phase, -90.0, float(np.degrees(spread))),
     ):
         result = first_fall(sweep.frequency_hz, values, level, error)

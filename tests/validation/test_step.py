@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,3 +77,17 @@ def test_a_step_from_rest_that_creeps_on_says_by_how_much() -> None:
     assert (off <= 3.0 * steps.settling_error_s).all()
     assert (np.abs(steps.final_ratio - 1.0) <= 1.05 * steps.error).all()
     assert {row.passed for row in rest_entries(design, figures, steps, None)} == {True}
+
+
+def test_a_limit_on_the_way_does_not_change_where_steps_end() -> None:
+    """Seed 70070 ends at 0.807 against its load, and voltage limits the way: 1.82 Hz were read for 2.22."""
+    design = full_drive(70070)
+    work = _Work(design, replace(TRIAL, rest_frequencies=20), None, design)
+    work.loops = work._assemble()
+    work.settle["position"] = 2000
+    sweep, steps = work._rest()
+    assert sweep is not None
+    assert "voltage limit" in steps.reasons[0]
+    rows = rest_entries(design, work._commanded, steps, sweep)
+    bandwidth = next(row for row in rows if row.quantity == "bandwidth")
+    assert bandwidth.passed
