@@ -13,6 +13,7 @@ from nonlinear.watch import watched
 T = TypeVar("T")
 U = TypeVar("U")
 SECONDS = 20.0
+RESERVED = 0.07  # of it, for what runs outside: the start of the command, its output
 
 
 class OutOfTime(Exception):
@@ -45,7 +46,7 @@ class Budget:
     def __post_init__(self) -> None:
         """Start the clock."""
         self.began = self.clock()
-        self.until = self.began + self.seconds
+        self.until = self.began + (1.0 - RESERVED) * self.seconds
 
     @property
     def left(self) -> float:

@@ -29,6 +29,8 @@ SMALL = "feedback loop, small signal"
 NO_DC_DB = 100.0  # so far above its value at zero frequency: that is none
 NEIGHBOURS = 3  # points on either side of a figure's frequency that it is read from
 DECIBEL = 20.0 / log(10.0)  # dB per unit of a small relative change
+COARSE = {"%": 20.0, "dB": 3.0, "deg": 10.0}  # a measurement that is off by more judges nothing
+COARSE_SHARE = 0.2  # of the prediction, in any other unit
 ROUND = 1e-9  # of a tolerance: the rounding of its own sum
 
 
@@ -87,6 +89,10 @@ def entry(
     """
     known = [None if x is None or not isfinite(x) else float(x) for x in (predicted, reading.value)]
     reason = ""
+    own = allowed(reading.error, 0.0)
+    if not own <= COARSE.get(unit, COARSE_SHARE * abs(known[0] or inf)):
+        why = f"the measurement's own error, {own:.2g} {unit}, is too large to judge by"
+        return not_judged(loop, quantity, unit, known[0], known[1], why, condition)
     tolerance = float(least + allowed(reading.error, known[0] or 0.0))
     if known[0] is None and known[1] is None:
         passed, reason = True, "predicted and measured: there is none"
@@ -138,12 +144,17 @@ def response_entries(
     rows = []
     valid = measured.sweep.valid
     for (quantity, response), error in zip(RESPONSES.items(), errors, strict=False):
-        off = np.hypot(error.gain_db / DECIBEL, np.radians(error.phase_deg))[valid]
-        may = allowed(measured.point_error[response][valid], 1.0)
-        if not off.size:
+        off = np.hypot(error.gain_db / DECIBEL, np.radians(error.phase_deg))
+        may = allowed(measured.point_error[response], 1.0)
+        fine = valid & (may < COARSE["%"] / 100.0)
+        if not fine.any():
+            if valid.any():
+                why = "no point is measured better than to its own rounding"
+                rows.append(not_judged(name, quantity, "%", 0.0, None, why, condition))
             continue
+        off, may = off[fine], may[fine]
         k = int(np.argmax(off / may))
-        hertz = measured.sweep.frequency_hz[valid][k]
+        hertz = measured.sweep.frequency_hz[fine][k]
         passed = bool(off[k] <= may[k])
         where = f"worst at {hertz:.3g} Hz, of {off.size} frequencies"
         rows.append(Entry(name, quantity, "%", condition, 0.0, 100.0 * off[k], 100.0 * may[k], passed, where))

@@ -66,10 +66,7 @@ def step_response(
     steady : Course, optional
         What `without_step` gives for as many ticks.
     """
-    signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
-    room = setup.room[signal]
-    if size is None:
-        size = STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
+    size = first_size(setup) if size is None else size
     steady = without_step(setup, settle_ticks) if steady is None else steady
     for _ in range(3):
         time_s, response, reason, turned = _step(setup, size, settle_ticks, steady)
@@ -100,6 +97,13 @@ def _figures(
         return figures
     rounding = 0.5 * memory * float(speed_bit(setup, time_s[-1] / tick_s)) / size
     return step_figures_of(time_s, response, slowest_s, reason, rounding)
+
+
+def first_size(setup: Rig) -> float:
+    """A small part of the way to the nearest limit, in the unit of the point."""
+    signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
+    room = setup.room[signal]
+    return STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
 
 
 def without_step(setup: Rig, settle_ticks: int) -> Course:

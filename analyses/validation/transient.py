@@ -18,9 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.coherent import coherent
+from analyses.validation.own_error import speed_bit
 from analyses.validation.response import Sweep
 from analyses.validation.rig import Rig
-from analyses.validation.step import StepMeasured, step_response, without_step
+from analyses.validation.step import StepMeasured, first_size, step_response, without_step
 from analyses.validation.sweep import LONGEST_SETTLE_TICKS
 
 Floats = npt.NDArray[np.float64]
@@ -30,6 +31,7 @@ LEAST_CONSTANTS = 14.0  # of a run that would be too long else; its own error sa
 LONGEST_ROWS, LONGEST_TICKS = 4_000_000, 8_000_000
 SINE_TICKS = 8_000_000  # a sweep of so many is not too slow
 BLOCK = 2048  # samples in one sum
+FINE = 1e-7
 BESIDE = 2  # points on either side whose error counts as well
 
 
@@ -102,6 +104,14 @@ def long_enough(slowest_ticks: float, hold_ticks: int) -> int | None:
     longest = min(LONGEST_ROWS * hold_ticks, LONGEST_TICKS)
     least, ticks = (int(n * slowest_ticks) + 40 * hold_ticks for n in (LEAST_CONSTANTS, TIME_CONSTANTS))
     return min(ticks, longest) if least <= longest else None
+
+
+def coarse(setup: Rig, slowest_ticks: float) -> bool:
+    """Whether rounding of a speed made of a long way is more than `FINE` of the step that is measured."""
+    ticks = long_enough(slowest_ticks, setup.hold_ticks)
+    if ticks is None:
+        return False
+    return float(speed_bit(setup, ticks)) > FINE * first_size(setup)
 
 
 def transient_of(setup: Rig, slowest_ticks: float) -> Transient | None:

@@ -56,7 +56,7 @@ from analyses.validation.sweep import (
     stepped_sine,
 )
 from analyses.validation.tones import tone_sweep
-from analyses.validation.transient import is_slow, transient_of
+from analyses.validation.transient import coarse, is_slow, transient_of
 from nonlinear import Rows
 
 if TYPE_CHECKING:
@@ -139,6 +139,7 @@ class _Work:
     figures: dict[str, LoopFigures] = field(default_factory=dict)
     settle: dict[str, int] = field(default_factory=dict)
     held: Loop | None = None
+    rigs: dict[str, Rig] = field(default_factory=dict)
     answer_loops: Any = None
     at: dict[str, Any] = field(default_factory=dict)
     done: int = 0
@@ -308,6 +309,9 @@ class _Work:
         ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, EVER_TICKS)
         slowest, asked = ever / SETTLE_TIME_CONSTANTS, self._frequencies(name, loop)
         slow = is_slow(asked, self.design.controller.period_s, setup.base_ticks, ever)
+        if slow and coarse(setup, slowest):
+            setup = small_rig(self.linear, name, held=name == "current")
+        self.rigs[name] = setup
         transient = transient_of(setup, slowest) if slow else None
         if transient is not None and transient.settled:
             sweep = transient.sweep(self._frequencies(name, loop, LOWEST_OF_A_STEP))
@@ -569,7 +573,7 @@ class _Work:
                 rows += point_entries(name, loop.confirmed)
             else:
                 errors = [x for x in (loop.open_errors, loop.closed_errors) if x is not None]
-                words = rig(self.linear, name, held=name == "current").condition
+                words = self.rigs[name].condition
                 rows += loop_entries(name, loop.figures, loop.measured, loop.confirmed, errors, words)
         for name, point in points.items():
             rows += point_entries(name, point.confirmed)

@@ -186,3 +186,25 @@ def test_runs_that_would_take_too_long_are_not_judged_and_say_so() -> None:
 
     assert work._within(0.5, "motion from rest", endless, "nothing") == "nothing"
     assert "motion from rest: not judged: 3e+11 ticks to simulate" in work.notes
+
+
+@pytest.mark.parametrize(
+    ("unit", "predicted", "error", "judged"),
+    [
+        ("dB", 6.0, 0.9, True),
+        ("dB", 6.0, 1.1, False),
+        ("%", 0.0, 6.0, True),
+        ("%", 0.0, 7.0, False),
+        ("Hz", 100.0, 6.0, True),
+        ("Hz", 100.0, 7.0, False),
+        ("Hz", None, 7.0, True),
+    ],
+)
+def test_a_measurement_that_may_be_off_by_as_much_judges_nothing(
+    unit: str, predicted: float | None, error: float, judged: bool
+) -> None:
+    """A row that allowed 263 % agreed: 20 %, 3 dB, a fifth are the most; the tolerance is three errors."""
+    row = entry("velocity", "bandwidth", unit, predicted, Reading(predicted, error))
+    assert (row.passed is not None) is judged
+    if not judged:
+        assert "too large to judge" in row.reason

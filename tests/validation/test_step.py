@@ -84,7 +84,8 @@ def test_a_limit_on_the_way_does_not_change_where_steps_end() -> None:
     design = full_drive(70070)
     work = _Work(design, replace(TRIAL, rest_frequencies=20), None, design)
     work.loops = work._assemble()
-    work.settle["position"] = 2000
+    loop = work.loops.present["position"]
+    work.settle["position"] = settling_ticks_of(loop.closed_loop, design.controller.position_loop.every, "")
     sweep, steps = work._rest()
     assert sweep is not None
     assert "voltage limit" in steps.reasons[0]
