@@ -124,7 +124,13 @@ class PeriodicLoop:
         return np.asarray(np.linalg.eigvals(over), dtype=complex)
 
     def __call__(self, points: npt.ArrayLike) -> np.ndarray:
-        """L = T/(1 - T) of the fundamental at points z (see the module), of their shape.
+        """L = T/(1 - T) of the fundamental at points z (see the module), of their shape; inf where T is 1."""
+        T = self.closed(points)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(T == 1.0, np.inf, T / (1.0 - T)))
+
+    def closed(self, points: npt.ArrayLike) -> np.ndarray:
+        """T of the fundamental at points z, of their shape.
 
         T(z) is the mean over the updates m of ``C_m x_m z^-m`` for the input z^m at the closed loop, with
         ``x_M = z^M x_0``.
@@ -141,7 +147,7 @@ class PeriodicLoop:
         for m, (A, b, c) in enumerate(closed):
             total += (x @ c) * turn[:, 0] ** -m / M
             x = x @ A.T + turn**m * b
-        return np.asarray((total / (1.0 - total)).reshape(z.shape))
+        return total.reshape(z.shape)
 
 
 def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, isfinite, log, pi
+from math import ceil, inf, isfinite, log, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from analyses.responses import response_at
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.coherent import LEAST_SAMPLES
 from analyses.validation.rig import Rig
@@ -257,7 +256,7 @@ def oscillation_hz(loop: PeriodicLoop, gain: float = 1.0, delay_s: float = 0.0) 
     angles = np.concatenate([turns + angle, turns[1:] - angle]) / count  # of an update
     angles = angles[angles <= pi * (1.0 + AT_NYQUIST)]
     if angles.size > 1:
-        angles = angles[np.argsort(np.abs(1.0 + gain * loop(np.exp(1j * angles))))]
+        angles = angles[np.argsort(_distance(loop, angles, gain))]
     return float(angles[0]) / (2.0 * pi * loop.dt)
 
 
@@ -272,14 +271,20 @@ def _leaving(loop: PeriodicLoop, gain: float) -> complex | None:
     return complex(there[int(np.argmin(np.abs(there - leaves)))])
 
 
+def _distance(loop: PeriodicLoop, angles: Floats, factor: Any) -> Floats:
+    """``|1 + k L|`` at angles an update: that of ``(1 - T) + k T`` over S, inf where L is."""
+    T = loop.closed(np.exp(1j * angles))
+    far = np.full(T.shape, inf)
+    return np.divide(np.abs(1.0 - T + factor * T), np.abs(1.0 - T), out=far, where=T != 1.0)
+
+
 def _nearest_hz(loop: PeriodicLoop, gain: float, delay_s: float) -> float:
     """Where ``gain L exp(-jwd)`` comes nearest to -1."""
     from scipy.optimize import minimize_scalar
 
     def distance(log_hz: npt.ArrayLike) -> Floats:
         omega = 2.0 * pi * np.exp(np.atleast_1d(log_hz))
-        L = response_at(loop, omega)
-        return np.asarray(np.abs(1.0 + gain * L * np.exp(-1j * omega * delay_s)), dtype=float)
+        return _distance(loop, omega * loop.dt, gain * np.exp(-1j * omega * delay_s))
 
     poles = loop.modes()
     moving = np.abs(np.log(np.where(poles == 0.0, 1e-300, poles))) / len(loop.systems)
