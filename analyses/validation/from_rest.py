@@ -17,7 +17,7 @@ from analyses.validation.conditional import step_rows
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.own_error import carried_on
 from analyses.validation.reading import Reading, first_fall
-from analyses.validation.step import UNSETTLED
+from analyses.validation.step import SETTLED, UNSETTLED
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -77,11 +77,19 @@ def steps_from_rest(design: Design, settle_ticks: int, slowest_ticks: float) -> 
             reason or (f"not settled at the end of its run ({left:.1g} of it is to come)" if late else "")
             for reason, left, late in zip(reasons, error, error > UNSETTLED, strict=True)
         ]
+    goes_on = moved > SETTLED  # such a step has no settling time and no final value
+    reasons = [
+        f"does not settle: it still moves by {100.0 * by:.3g} % at the end"
+        + (f", {reason}" if reason else "")
+        if still
+        else reason
+        for reason, by, still in zip(reasons, moved, goes_on, strict=True)
+    ]
     return RestSteps(
         amplitude,
-        step.rise_time_s,
-        step.overshoot_percent,
-        step.settling_time_s,
+        np.where(goes_on, np.nan, step.rise_time_s),
+        np.where(goes_on, np.nan, step.overshoot_percent),
+        np.where(goes_on, np.nan, step.settling_time_s),
         final,
         error,
         spread[0],
@@ -93,7 +101,7 @@ def steps_from_rest(design: Design, settle_ticks: int, slowest_ticks: float) -> 
 def _reason(design: Design, result: BatchResult, k: int) -> str:
     """What took part in a run that the linear loop does not know of."""
     shares = {name: 100.0 * float(result.limit_fraction(name)[k]) for name in LIMITERS}
-    words = [f"{LIMITERS[name].words} {share:.2g} %" for name, share in shares.items() if share > 0.0]
+    words = [f"{LIMITERS[name].words} {share:.3g} %" for name, share in shares.items() if share > 0.0]
     if result.events[k] == 0 and result.stick_fraction[k] > 0.99:
         return "no motion: dry friction holds the rotor"
     return ", ".join([*words, *nonlinear_parts(design)])
