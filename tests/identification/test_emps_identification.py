@@ -9,8 +9,6 @@ import pytest
 
 from actuator_lti import load_design
 from analyses.identification.inverse import fit_records
-from analyses.identification.least_squares import solve
-from analyses.identification.rows import record_rows
 from analyses.records import open_record
 from analyses.records.record import Record, RowCounts
 
@@ -25,16 +23,12 @@ def test_every_row_of_the_record_is_accounted_for(emps: Record) -> None:
 
 
 def test_symmetric_friction_meets_the_published_digits(emps: Record) -> None:
-    """The published standard errors are those of white residuals; the model's own count their correlation."""
-    design = load_design("emps")
-    model = fit_records(design, [emps])
+    """Standard errors: those of white residuals, as published; `covariance` counts their correlation."""
+    model = fit_records(load_design("emps"), [emps])
     assert [f"{v:.4f}" for v in model.values] == ["95.1089", "203.5034", "20.3935", "-3.1648"]
     assert f"{100 * model.relative_residual:.4f}" == "4.0834"
-    rows = record_rows(design, emps, "symmetric", None)
-    told = rows.w[:, [rows.names.index(name) for name in model.names]]
-    white = np.sqrt(np.diag(solve(told, rows.y).white))
-    assert [f"{s:.4f}" for s in white] == ["0.1085", "1.1460", "0.1012", "0.0444"]
-    assert (model.standard_errors > white).all()
+    assert [f"{v:.4f}" for v in model.standard_errors] == ["0.1085", "1.1460", "0.1012", "0.0444"]
+    assert (np.diag(model.covariance) > model.standard_errors**2).all()
 
 
 def test_friction_per_direction_meets_the_published_digits(emps: Record) -> None:
