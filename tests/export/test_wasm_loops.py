@@ -229,6 +229,14 @@ def test_seeds_that_once_differed(tmp_path: Path) -> None:
     assert loops > 5
 
 
+def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path: Path) -> None:
+    """Seed 51345: 153 states at the voltage, their poles on circles; the search for them gave up."""
+    design = replace(random_drive(np.random.default_rng(51345)), instruments=Instruments())
+    (found,) = in_node([design], tmp_path)
+    assert found["u"]["n"] == len(assemble_loops(design).break_points["u"].plain_open.A) == 153
+    responses_agree(design, found)
+
+
 def test_random_elastic_drives_with_a_damped_load(tmp_path: Path) -> None:
     """Stiff springs and soft ones, with the two keys of the load that random drives leave out."""
     designs = []
