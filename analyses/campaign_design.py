@@ -12,7 +12,6 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.surface_fit import PATHS, SurfaceFit
-from analyses.records.campaign_file import Instruments
 
 FloatArray = NDArray[np.float64]
 
@@ -65,7 +64,6 @@ class CampaignSuggestion:
 def suggest_runs(
     design: Design,
     fit: SurfaceFit,
-    instruments: Instruments,
     *,
     count: int = 6,
     criterion: str = "margins",
@@ -80,8 +78,6 @@ def suggest_runs(
         slow motion (describing function), at no load and at the largest one.
     fit : SurfaceFit
         The present estimate.
-    instruments : Instruments
-        Of the campaign.
     count : int
         How many runs to suggest, in the range of the runs so far, in steps of an eighth.
     criterion : {"margins", "D"}

@@ -8,7 +8,8 @@ from math import isfinite, pi
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.facts import resonance_rad_s
+from actuator_lti.drive.facts import circuit_resistance_ohm, resonance_rad_s
+from actuator_lti.drive.steady import motor_torque_Nm, no_load_speed_rad_s, steady_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
 from analyses.virtual_bench_two_mass import TwoMassPlan
@@ -67,23 +68,20 @@ def _continuous(design: Design) -> float:
     for value in (limits.continuous_current_A, limits.peak_current_A):
         if isfinite(value):
             return value
-    return limits.voltage_V / (design.effective_motor.resistance_ohm or np.inf)
+    return float(limits.voltage_V / circuit_resistance_ohm(design))
 
 
 def _largest_speed(design: Design) -> float:
-    back = design.effective_motor.back_emf_constant_Vs_rad or 0.0
-    return min(design.limits.speed_rad_s, design.limits.voltage_V / back if back > 0.0 else np.inf)
+    return float(min(design.limits.speed_rad_s, no_load_speed_rad_s(design)))
 
 
 def _moment(design: Design, current_A: float, speed_rad_s: float) -> float:
     """Moment at the output that takes a current at a speed, friction and its growth with the load counted."""
-    constant = design.effective_motor.torque_constant_Nm_A or 0.0
-    friction = design.friction
-    own = friction.dry_Nm(0.0) + friction.viscous() * speed_rad_s + friction.offset_torque_Nm
-    left = constant * current_A - own
+    own, more = (steady_torque_Nm(design, load, speed_rad_s) for load in (0.0, 1.0))
+    left = motor_torque_Nm(design, current_A, 0.0) - own
     if not left > 0.0:
         raise InputError("friction alone takes the bench's current", design.name)
-    return float(left / (1.0 / design.total_ratio + friction.load_coefficient))
+    return float(left / (more - own))
 
 
 def _line(design: Design, plan: TwoMassPlan) -> float:

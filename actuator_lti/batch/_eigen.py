@@ -13,6 +13,7 @@ from ._compiled import kernel
 from ._linalg import balance, hessenberg
 
 EPS = 2.220446049250313e-16
+MOST_ROUNDS = 300  # for an eigenvalue: the roots of a periodic loop lie on circles, which takes more
 
 
 @kernel
@@ -125,7 +126,7 @@ def eigenvalues(n, a, lent, lent_too, wr, wi):
         lent_too[i] = 0.0
     balance(n, a, lent, lent)
     hessenberg(n, a, lent, lent, lent_too)
-    last, rounds = n - 1, 0
+    last, rounds, since = n - 1, 0, 0
     shift = 0.0
     while last >= 0:
         low = _split(n, a, last)
@@ -133,18 +134,19 @@ def eigenvalues(n, a, lent, lent_too, wr, wi):
             wr[last] = a[last * n + last] + shift
             wi[last] = 0.0
             last -= 1
-            rounds = 0
+            rounds, since = 0, 0
             continue
         if low == last - 1:
             _pair(n, a, last, shift, wr, wi)
             last -= 2
-            rounds = 0
+            rounds, since = 0, 0
             continue
-        if rounds >= 90:
+        if rounds >= MOST_ROUNDS:
             return 0
         x, y = a[last * n + last], a[(last - 1) * n + last - 1]
         w = a[last * n + last - 1] * a[(last - 1) * n + last]
-        if rounds > 0 and (rounds == 10 or rounds == 20 or rounds == 40):  # an exceptional shift
+        if since == 10:  # an exceptional shift
+            since = 0
             shift += x
             for i in range(last + 1):
                 a[i * n + i] -= x
@@ -153,5 +155,6 @@ def eigenvalues(n, a, lent, lent_too, wr, wi):
             y = x
             w = -0.4375 * s * s
         rounds += 1
+        since += 1
         _double_step(n, a, low, last, x, y, w)
     return 1

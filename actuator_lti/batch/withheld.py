@@ -3,7 +3,8 @@
 An unstable inner loop that runs many times within one update of the outer one leaves entries of 1e12 and more
 in the outer loop's matrices, which nearly cancel in its response. Every crossover of such a design, and the
 response at some angles between, must stand out from its own rounding errors; else the design has no figures.
-Nor has it any where the number of its gain crossovers does not fit the gain at both ends, because one lies
+Nor has it any where its largest pole lies on the unit circle but for rounding, which would decide about
+stability, or where the number of its gain crossovers does not fit the gain at both ends, because one lies
 below the angles that were scanned.
 """
 
@@ -18,10 +19,12 @@ from actuator_lti.batch._figures import (
     GAIN_CROSSOVERS,
     LISTED,
     PHASE_CROSSOVERS,
+    RADIUS,
     STABLE,
 )
 from actuator_lti.margins.trust import told_from_zero
 
+AT_BORDER = 1e-10  # distance of the largest pole from the unit circle within which rounding decides
 _GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
 _MOST_ERROR = 1e-10  # relative, of the response at a crossover: the margins are then good to 1e-8
 _BETWEEN = (0.03, 0.3, 1.0, 2.5)
@@ -45,6 +48,7 @@ def withhold(A: np.ndarray, B: np.ndarray, C: np.ndarray, poles: np.ndarray, row
     if chosen.size:
         lost = chosen[_lost(A[chosen], B[chosen], C[chosen], rows[chosen])]
         rows[lost] = np.nan
+    rows[np.abs(rows[:, RADIUS] - 1.0) < AT_BORDER] = np.nan
     rows[_odd_crossovers(A, B, C, rows)] = np.nan
     none = np.isnan(rows[:, STABLE])
     rows[np.ix_(none, [GAIN_CROSSOVERS, PHASE_CROSSOVERS])] = 0.0

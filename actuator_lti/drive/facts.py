@@ -189,9 +189,9 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     return speed, cause, against + _speed_torque(slopes, speed)
 
 
-def speed_torque_Nm(design: Design, speed_rad_s: Any, direction: int) -> Any:
-    """Torque at the motor of what grows with its speed: viscous friction or its map, behind too, damping."""
-    return _speed_torque(_speed_slopes(design, direction), speed_rad_s)
+def speed_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
+    """Torque forward of what grows with the speed: viscous friction or its map, behind too, damping."""
+    return _speed_torque(_speed_slopes(design, 1), speed_rad_s)
 
 
 def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:

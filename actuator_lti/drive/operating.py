@@ -145,7 +145,7 @@ def _described(design: Design, at: Operating, way: int) -> Any:
         return design.friction.viscous(way) + dry
     total, last = dry, 0.0
     for start, slope in segments(points):
-        total, last = total + (slope - last) * _dead_zone(start / W), slope
+        total, last = total + (slope - last) * dead_zone(start / W), slope
     return total
 
 
@@ -154,8 +154,14 @@ def described_dry(dry_Nm: Any, speed_amplitude_rad_s: Any) -> Any:
     return 4 * dry_Nm / (pi * speed_amplitude_rad_s)
 
 
-def _dead_zone(x: float) -> float:
-    """Describing function of a dead zone of half width x times the amplitude (model.md section 9)."""
+def dead_zone(x: float) -> float:
+    """Describing function of a dead zone of half width x times the amplitude (model.md section 9).
+
+    Examples
+    --------
+    >>> dead_zone(0.0), dead_zone(1.0), round(dead_zone(0.5), 6)
+    (1.0, 0.0, 0.391002)
+    """
     return 0.0 if x >= 1 else 1.0 - 2.0 / pi * float(np.arcsin(x) + x * np.sqrt(1 - x * x))
 
 

@@ -22,7 +22,7 @@ def motor_torque_Nm(design: Design, current_A: Any, voltage_V: Any) -> Any:
 
 def steady_torque_Nm(design: Design, load_Nm: float, speed_rad_s: Any) -> Any:
     """Motor torque for a steady motion forward against a load, friction and damping on the way."""
-    return resistance_Nm(design, load_Nm, 1) + speed_torque_Nm(design, speed_rad_s, 1)
+    return resistance_Nm(design, load_Nm, 1) + speed_torque_Nm(design, speed_rad_s)
 
 
 def steady_input(design: Design, torque_Nm: Any, speed_rad_s: Any) -> tuple[Any, Any]:

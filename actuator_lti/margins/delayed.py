@@ -40,7 +40,7 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     gain_x, gain_touch = crossings(form, intervals, GAIN, no_gain)
     phase_x, phase_touch = crossings(form, intervals, PHASE, no_phase)
     count = _nyquist(setting, intervals)
-    agreement = _agreement(setting, count, intervals, float(gain_x.max()) if gain_x.size else 0.0)
+    agreement = _agreement(setting, count, float(gain_x.max()) if gain_x.size else 0.0)
     distances = [smallest_distance(setting, intervals, criterion) for criterion in (MODULUS, DISK)]
     return _assembled(setting, band_rad_s, agreement, (gain_x, gain_touch), (phase_x, phase_touch), distances)
 
@@ -84,7 +84,7 @@ def _nyquist(setting: Setting, intervals: Intervals) -> int | None:
     return setting.open_poles.unstable - round(angle / np.pi)
 
 
-def _agreement(setting: Setting, count: int | None, intervals: Intervals, crossover: float) -> Agreement:
+def _agreement(setting: Setting, count: int | None, crossover: float) -> Agreement:
     form = setting.form
     if form.sampled:
         return Agreement(None, count)

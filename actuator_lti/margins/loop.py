@@ -176,26 +176,27 @@ class RationalLoop:
         return matrix
 
 
-def rational_loop(system: Any, warp: bool = False) -> RationalLoop:
+def rational_loop(system: Any) -> RationalLoop:
     """Bring a SISO python-control state space or transfer function into the form of the engine.
 
     Parameters
     ----------
     system : StateSpace or TransferFunction
         One input, one output.
-    warp : bool
-        Hold a sampled transfer function in the s-plane of s = (z - 1)/(z + 1), unless it has a pole at -1.
 
     Raises
     ------
     InputError
         More than one input or output, an improper transfer function, or a value that is not finite.
     """
-    return loop_of(given_of(system), warp)
+    return loop_of(given_of(system))
 
 
 def loop_of(given: Given, warp: bool = False) -> RationalLoop:
-    """The same from the given doubles."""
+    """The same from the given doubles.
+
+    ``warp`` holds a sampled transfer function in the plane of (z - 1)/(z + 1), unless it has a pole at -1.
+    """
     if given.A is None:
         loop = from_coefficients(given.numerator, given.denominator, given.period_s, warp)
     else:

@@ -66,7 +66,7 @@ class MeasuredResponse:
             A negative or infinite standard deviation, or a confidence outside (0, 1).
         """
         omega, L, dt = _read(data)
-        sigma = _per_point(standard_deviation, L.size, "standard_deviation", 0.0, math.inf)
+        sigma = _per_point(standard_deviation, L.size, "standard_deviation", math.inf)
         radius = sigma * math.sqrt(-math.log(1.0 - _checked(confidence)))
         return cls(omega, L, radius, dt, "noise as given")
 
@@ -95,7 +95,7 @@ class MeasuredResponse:
             A coherence outside (0, 1], fewer than 2 averages.
         """
         omega, L, dt = _read(data)
-        g2 = _per_point(coherence, L.size, "coherence", 0.0, 1.0)
+        g2 = _per_point(coherence, L.size, "coherence", 1.0)
         if not (g2 > 0.0).all():
             raise InputError("coherence: every value must lie in (0, 1]")
         if averages < 2:
@@ -161,12 +161,12 @@ def _read(data: Any) -> tuple[Real, Complex, float | None]:
     return np.asarray(data.omega, dtype=float), L, dt
 
 
-def _per_point(values: ArrayLike, count: int, name: str, low: float, high: float) -> Real:
+def _per_point(values: ArrayLike, count: int, name: str, high: float) -> Real:
     array = np.asarray(values, dtype=float)
     if array.shape not in ((), (count,)):
         raise InputError(f"{name}: one number, or one for each of the {count} frequencies")
-    if not (np.isfinite(array) & (array >= low) & (array <= high)).all():
-        raise InputError(f"{name}: every value must be finite and lie in [{low:g}, {high:g}]")
+    if not (np.isfinite(array) & (array >= 0.0) & (array <= high)).all():
+        raise InputError(f"{name}: every value must be finite and lie in [0, {high:g}]")
     return np.broadcast_to(array, (count,)).astype(float)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.identification.least_squares import by_record, correlated_covariance
-from analyses.records.csv_stream import read_csv_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 
@@ -62,11 +60,6 @@ class VoltageMotor:
         denominator = np.polymul(plant, [1.0, 2.0 * b, b * b])
         numerator, discrete, _ = cont2discrete(([self.gain_rad_sV * b * b], denominator), period)
         return np.asarray(lfilter(numerator.ravel(), discrete, voltage_V))
-
-
-def read_odrive(path: str | Path) -> Record:
-    """Read a record of the ODrive recorder; rows of NaN and the zeros at its end are dropped and counted."""
-    return read_csv_record(path, ODRIVE_SPEC)
 
 
 def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S) -> VoltageMotor:

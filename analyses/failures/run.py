@@ -115,17 +115,17 @@ def _judged(
         current_A=current,
         moment_Nm=moment,
         to_deflection_s=_first(
-            t, size >= asked.deflection_rad, lambda k: _between(t, size, k, asked.deflection_rad)
+            size >= asked.deflection_rad, lambda k: _between(t, size, k, asked.deflection_rad)
         ),
-        to_stop_s=_first(t, size >= asked.stop_rad, lambda k: _between(t, size, k, asked.stop_rad)),
+        to_stop_s=_first(size >= asked.stop_rad, lambda k: _between(t, size, k, asked.stop_rad)),
         at_detection_rad=float(size[t <= asked.detection_s * (1.0 + 1e-12)].max()),
         peak_current_A=float(np.abs(current).max()),
         peak_moment_Nm=float(np.abs(moment).max()),
-        protected_s=_first(t, overloaded > 0.0, lambda k: float(t[k])),
+        protected_s=_first(overloaded > 0.0, lambda k: float(t[k])),
     )
 
 
-def _first(t: Floats, true: np.ndarray, when: Callable[[int], float]) -> float | None:
+def _first(true: np.ndarray, when: Callable[[int], float]) -> float | None:
     return when(int(np.argmax(true))) if true.any() else None
 
 

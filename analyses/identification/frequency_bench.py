@@ -124,7 +124,7 @@ def identify_frequency(
     held = _held(design, dict(fixed or {}))
     fit = _fitted(lines, reduction, names, held, _reaction(design, with_torque))
     play = None if play_record is None else _play_of(design, play_record, fit)
-    made = _made(design, fit, play, held, record.name, behind)
+    made = _made(design, fit, play, record.name, behind)
     text = write_design(made)
     records = [record] if play_record is None else [record, play_record]
     findings = {one.name: check_record(design, one) for one in records}
@@ -351,9 +351,7 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
     return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")
 
 
-def _made(
-    design: Design, fit: TwoMass, play: Play | None, held: Mapping[str, float], record: str, behind: float
-) -> Design:
+def _made(design: Design, fit: TwoMass, play: Play | None, record: str, behind: float) -> Design:
     """The design with the identified values, their errors and correlations."""
     old = design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
     coupling = replace(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,7 @@ def fit_map(
     top = float(np.max(np.abs(speed)))
     n = len(rest) / correlation_time(plain.residual)
     best: tuple[float, JointModel, tuple[float, ...] | None] = (_bic(plain, n), plain, None)
-    laws = [_law("plain, C0 + Cv |w|", None, plain, 0.0, taken=False)]
+    laws = [_law("plain, C0 + Cv |w|", None, plain, 0.0)]
     result: tuple[float, ...] = ()
     for count in range(1, MOST_BREAKS + 1):
         result = _one_more(speed, rest, top, result)
@@ -85,24 +85,22 @@ def fit_map(
         model = fitted(knots)
         own = _bic(model, n)
         gain = own - _bic(plain, n)
-        laws.append(_law(f"map, {count} break points", result, model, gain, taken=False))
+        laws.append(_law(f"map, {count} break points", result, model, gain))
         if own < best[0] - (CLEARLY_BETTER if best[2] is None else 0.0):
             best = (own, model, knots)
     chosen = 0 if best[2] is None else len(best[2]) - 2
-    marked = tuple(LawChoice(**{**vars(law), "taken": k == chosen}) for k, law in enumerate(laws))
+    marked = tuple(replace(law, taken=k == chosen) for k, law in enumerate(laws))
     return MapResult(laws=marked, model=best[1], knots_rad_s=best[2])
 
 
-def _law(
-    name: str, breaks: tuple[float, ...] | None, model: JointModel, gain: float, *, taken: bool
-) -> LawChoice:
+def _law(name: str, breaks: tuple[float, ...] | None, model: JointModel, gain: float) -> LawChoice:
     return LawChoice(
         name=name,
         breaks_rad_s=breaks or (),
         parameters=len(model.names) + len(breaks or ()),
         relative_residual=model.relative_residual,
         criterion=gain,
-        taken=taken,
+        taken=False,
     )
 
 

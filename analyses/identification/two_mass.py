@@ -135,7 +135,7 @@ def fit_two_mass(
 
     held = dict(fixed or {})
     names = tuple(name for name in NAMES if name not in held)
-    scale = _scales(start, names, reduction)
+    scale = _scales(start, names)
     outputs = [(motor, 0)] + ([(load, 1)] if load is not None else [])
 
     def unpacked(q: FloatArray) -> dict[str, float]:
@@ -183,7 +183,7 @@ def _weighed(freedom: int, outputs: int) -> tuple[float, float]:
     return freedom / rest, freedom * rest / max(rest**2 - 1.0, 1.0)
 
 
-def _scales(start: Mapping[str, float], names: tuple[str, ...], n: float) -> FloatArray:
+def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
     """What each parameter is measured by: its start, or a small part of what the others make critical."""
     for name in ("motor_inertia", "load_inertia", "stiffness"):
         if not start.get(name, 0.0) > 0.0:

@@ -117,7 +117,7 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     lag = np.arccos(np.pi / (2.0 * x[which]))
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit
-    current, voltage = steady_input(design, speed_torque_Nm(design, limit, 1), limit)
+    current, voltage = steady_input(design, speed_torque_Nm(design, limit), limit)
     cascaded = design.controller.current is not None
     rows["current_start"][which] = current
     rows["voltage_start"][which] = voltage

@@ -17,13 +17,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import asin, exp, log, pi, sqrt
+from math import exp, log, pi
 
 import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
-from actuator_lti.drive.operating import Operating, described_dry, slope_at
+from actuator_lti.drive.operating import Operating, dead_zone, described_dry, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
@@ -43,17 +43,6 @@ class _Mode:
     radius: float
     frequency_hz: float
     shape: dict[str, complex]  # for a twist of 1
-
-
-def dead_zone(x: float) -> float:
-    """Share of the stiffness that a dead zone of half width x times the amplitude leaves.
-
-    Examples
-    --------
-    >>> dead_zone(0.0), dead_zone(1.0), round(dead_zone(0.5), 6)
-    (1.0, 0.0, 0.391002)
-    """
-    return 0.0 if x >= 1.0 else 1.0 - 2.0 / pi * (asin(x) + x * sqrt(1.0 - x * x))
 
 
 def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:

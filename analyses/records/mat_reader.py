@@ -15,7 +15,7 @@ from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.table_record import record_of_columns
 
 
-def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = None) -> Record:
+def read_mat_record(path: str | Path, spec: RecordSpec) -> Record:
     """Read vectors of a MATLAB file into a record; its scalars become ``constants``.
 
     The columns of the spec are variable names (``group.field`` for those of a structure), or columns of
@@ -30,7 +30,7 @@ def read_mat_record(path: str | Path, spec: RecordSpec, *, name: str | None = No
     content, digest = load_mat(path)
     vectors = columns_of(content, spec.format, path)
     constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
-    return record_of_columns(vectors, spec, path, digest, name=name, constants=constants)
+    return record_of_columns(vectors, spec, path, digest, constants=constants)
 
 
 def load_mat(path: Path) -> tuple[MatContent, str]:

@@ -25,7 +25,6 @@ def record_of_columns(
     path: Path,
     digest: str,
     *,
-    name: str | None = None,
     constants: Mapping[str, float] | None = None,
 ) -> Record:
     """Read the columns that a spec names; NaN and disorder in time are treated as in a CSV file, and counted.
@@ -52,7 +51,7 @@ def record_of_columns(
     }
     signals, notes = filled(time, signals, spec.resample_tolerance, str(path))
     return Record(
-        name=name or shown_path(path.name),
+        name=shown_path(path.name),
         time_s=time,
         signals=MappingProxyType(signals),
         units=MappingProxyType({s.name: c.si_unit for s, c in zip(spec.signals, converters, strict=True)}),

@@ -62,9 +62,7 @@ def _nothing(name: str) -> tuple[float | None, str]:
     return None, f"{name}: not a figure of a loop"
 
 
-def nonlinear_checks(
-    tuned: Design, problem: Problem, gains: np.ndarray, result: np.ndarray
-) -> tuple[NonlinearCheck, ...]:
+def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
     from analyses.variant_figures import LargeSignal
 

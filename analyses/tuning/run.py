@@ -110,7 +110,7 @@ def tune(
     requirements = _binding(problem, gains, result, settings.aim)
     confirmed = confirm(tuned, wanted, requirements)
     tell(len(choices) + 2, stages)
-    checks = nonlinear_checks(tuned, problem, gains, result) if settings.check else ()
+    checks = nonlinear_checks(tuned, problem, result) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)

@@ -181,7 +181,7 @@ class Statements:
         name = c_name(index.id.lstrip("_") or "round")
         end = bare(last)
         if not end.isdigit():
-            end = f"{name}_end_{self._count(name)}"
+            end = f"{name}_end_{self._count()}"
             self._put(f"const int {end} = {bare(last)};")
         self.function.variables[index.id] = "int"
         self.loops[index.id] = self.loops.get(index.id, 0) + 1
@@ -192,7 +192,7 @@ class Statements:
         if not self.loops[index.id]:
             del self.loops[index.id], self.function.variables[index.id]
 
-    def _count(self, name: str) -> int:
+    def _count(self) -> int:
         self.temporaries += 1
         return self.temporaries
 

@@ -9,6 +9,7 @@ from actuator_lti.batch._eigen import eigenvalues
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
 from nonlinear.export.entries import emitted
+from nonlinear.export.linear import LOST
 
 
 @emitted
@@ -49,11 +50,11 @@ def figures(
     real,
     imaginary,
 ):
-    """Figures of a loop that was assembled (see ``one_loop``); the points scanned, 0 without poles."""
+    """Figures of a loop that was assembled (see ``one_loop``); the points scanned, `LOST` without poles."""
     fed_back = 0.0 if math.isnan(lead) else 1.0
     result = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
     if result == 0:
-        return 0
+        return LOST
     return one_loop(
         n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged
     )

@@ -15,12 +15,12 @@ from actuator_lti.batch._figures import (
     PHASE_CROSSOVERS,
     RADIUS,
 )
+from actuator_lti.batch.withheld import AT_BORDER
 from nonlinear.export.entries import emitted
 from nonlinear.export.linear_limiters import states_at
 
 GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
 MOST_ERROR = 1e-10  # relative, of the response at a crossover
-AT_BORDER = 1e-10  # distance of the largest pole from the unit circle within which rounding decides
 BETWEEN = np.array([0.03, 0.3, 1.0, 2.5])
 EPS = 2.220446049250313e-16
 

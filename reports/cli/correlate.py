@@ -105,7 +105,7 @@ def correlate(
     over a chirp.
     """
     if predict is not None:
-        _predict(records, predict, out, as_json, quiet)
+        _predict(records, predict, out, as_json)
         return
     from analyses.correlation import correlate_record
     from analyses.records import open_record
@@ -178,7 +178,7 @@ def _plain(result: CorrelationResult) -> Tree:
     }
 
 
-def _predict(steps: list[Path], chirp: Path, out: Path | None, as_json: bool, quiet: bool) -> None:
+def _predict(steps: list[Path], chirp: Path, out: Path | None, as_json: bool) -> None:
     from dataclasses import asdict
 
     from actuator_lti.errors import InputError

@@ -54,9 +54,7 @@ def run(path: Path, common: Common, count: int, criterion: str) -> None:
     suggestion = None
     if count and not result.fit.held:
         with progress("slopes of the margins", quiet=common.quiet) as bar:
-            suggestion = suggest_runs(
-                drive, result.fit, listed.instruments, count=count, criterion=criterion, progress=bar
-            )
+            suggestion = suggest_runs(drive, result.fit, count=count, criterion=criterion, progress=bar)
     source = f"identified from {len(result.fit.points)} runs, {listed.name}"
     made = design_with_estimate(with_fixed(drive, asked), surface_estimate(result.fit, source))
     text = write_design(made)
@@ -68,7 +66,7 @@ def run(path: Path, common: Common, count: int, criterion: str) -> None:
     if common.as_json:
         print_json(campaign_json(result, shares, suggestion, at, items, written))
     else:
-        say(common, section, written, items)
+        say(section, written, items)
     leave_with(passed(items))
 
 

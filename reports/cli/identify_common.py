@@ -89,7 +89,7 @@ def finish(
     return path
 
 
-def say(common: Common, section: Section, written: Path | None, items: Sequence[Item]) -> None:
+def say(section: Section, written: Path | None, items: Sequence[Item]) -> None:
     """Print the verdict, the section, and what was written or why nothing was."""
     from analyses.identification.verdict import passed
     from reports.cli.output import print_line

@@ -40,7 +40,7 @@ def run(paths: Sequence[Path], play: Path | None, period_s: float | None, common
     if common.as_json:
         print_json(as_data(result, written))
     else:
-        say(common, made, written, result.items)
+        say(made, written, result.items)
     leave_with(result.passed)
 
 

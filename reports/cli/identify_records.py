@@ -37,7 +37,7 @@ def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: 
     if common.as_json:
         print_json(as_data(result, written))
     else:
-        say(common, made, written, result.items)
+        say(made, written, result.items)
     leave_with(result.passed)
 
 

@@ -26,6 +26,7 @@ from reports.nightly import worker
 from reports.nightly.cache import Cache, CorruptEntry
 
 START_LIMIT_S = 180.0
+END_S = 10.0
 _CHILD = "import sys; from reports.nightly.worker import main; main(sys.argv[1], int(sys.argv[2]))"
 # One thread a process: the jobs themselves are what runs in parallel.
 _ONE_THREAD = dict.fromkeys(
@@ -150,10 +151,13 @@ class _Child:
                 ask.flush()
             return pickle.load(listen)
         except (EOFError, OSError, pickle.UnpicklingError, ValueError):
-            self._process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_S)  # it ends by itself, and its status says why
+            self.end()
             return None
         finally:
             clock.cancel()
+            clock.join()  # from here on it ends nobody
 
     def _too_late(self) -> None:
         self._late = True
@@ -173,7 +177,8 @@ class _Child:
 
     @property
     def alive(self) -> bool:
-        return self._process.poll() is None
+        """Whether it can take another task."""
+        return not self._late and self._process.poll() is None
 
     def end(self) -> None:
         """End the process, whatever it does."""
@@ -204,7 +209,11 @@ class _Warm:
         with self._lock:
             if self._closed:
                 raise RuntimeError("no task after the end")
-            child = self._idle.pop() if self._idle else _Child(self._limits)
+            child = next((one for one in self._idle if one.alive), None)
+            if child is None:
+                child = _Child(self._limits)
+            else:
+                self._idle.remove(child)
             self._busy.append(child)
         try:
             return child.build(task)

@@ -51,9 +51,7 @@ def index(night: Overview, folder: str) -> str:
     )
 
 
-def of_night(
-    night: Overview, history: History, folder: str, available: set[str]
-) -> Iterator[tuple[str, str]]:
+def of_night(night: Overview, history: History, available: set[str]) -> Iterator[tuple[str, str]]:
     """Return the pages and tables of a night one after the other: file name and text."""
     for design in night.designs:
         yield f"{design.slug}.html", design_page(night, design, history, available)

@@ -76,7 +76,7 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
         for design in night.designs:
             _lay_out_report(site, design, cache, batch)
         available = {path for path in kept if (site / path / "report.html").exists()}
-        for name, text in pages.of_night(night, history, folder, available):
+        for name, text in pages.of_night(night, history, available):
             batch.write(site / folder / name, text)
         batch.flush()
         write_text(site / "index.html", pages.index(night, folder))

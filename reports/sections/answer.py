@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from actuator_lti.quantities import AT_A_GLANCE
 from analyses.loop_figures import LoopFigures
 from analyses.responses import frequency_grid
 from reports import document as doc
-from reports.document_schema import Block, GlanceBlock, GlanceFigure, GlanceLoop, Section, Weakest
+from reports.document_schema import (
+    Block,
+    GlanceBlock,
+    GlanceFigure,
+    GlanceLoop,
+    Section,
+    VerdictItem,
+    Weakest,
+)
 from reports.findings import Finding, gathered, plain
 from reports.numbers import short
 from reports.sections import loop as loop_section
@@ -21,8 +28,8 @@ SHOWN = 5
 
 def section(
     figures: Mapping[str, LoopFigures],
-    items: Sequence[Mapping[str, Any]],
-    sections: Sequence[Mapping[str, Any]],
+    items: Sequence[VerdictItem],
+    sections: Sequence[Section],
 ) -> Section:
     """Make the first screen from the loops, the verdicts on the requirements and all other sections."""
     result = gathered(sections)
@@ -39,7 +46,7 @@ def section(
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
 
 
-def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -> GlanceLoop:
+def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> GlanceLoop:
     """Give the chosen figures of a loop, each with the requirement that is nearest to it."""
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
@@ -61,21 +68,24 @@ def _loop(name: str, figures: LoopFigures, items: Sequence[Mapping[str, Any]]) -
     return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": stable, "figures": cells}
 
 
-def weakest(items: Sequence[Mapping[str, Any]]) -> Weakest | None:
+def weakest(items: Sequence[VerdictItem]) -> Weakest | None:
     """Give the requirement that is nearest to its limit, or furthest beyond it, as part of the limit."""
     ranked = [item for item in items if item.get("distance") is not None and item.get("limit")]
     item = min(ranked, key=_nearness, default=None)
     if item is None:
         return None
+    distance, found, bound, unit = item["distance"], item["value"], item["limit"], item["unit"]
+    assert distance is not None
+    assert found is not None
+    assert bound is not None
     share = 100.0 * abs(_nearness(item))
-    side = "inside" if item["distance"] >= 0.0 else "beyond"
-    value, unit = short(item["value"], 4), item["unit"]
-    limit = f"{item['comparison']} {short(item['limit'], 6)}".strip()
+    side, value = "inside" if distance >= 0.0 else "beyond", short(found, 4)
+    limit = f"{item['comparison']} {short(bound, 6)}".strip()
     words = f"{value} {unit}, limit {limit} {unit}: {share:.0f} % {side} its limit"
     return {"label": item["label"], "words": " ".join(words.split()), "passed": item["passed"]}
 
 
-def _nearness(item: Mapping[str, Any]) -> float:
+def _nearness(item: VerdictItem) -> float:
     """Distance to the limit over the limit; without a distance the requirement is as good as far away."""
     if item["distance"] is None or not item["limit"]:
         return 1e9

@@ -76,9 +76,9 @@ def verdicts(comparison: Comparison) -> Section:
     return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
 
 
-def batches(comparison: Comparison, designs: Sequence[Compared] | None = None) -> list[list[Compared]]:
+def batches(comparison: Comparison) -> list[list[Compared]]:
     """Divide the designs into tables that fit a page, each with the base first."""
-    others = [one for one in (comparison.all if designs is None else designs) if one is not comparison.base]
+    others = [one for one in comparison.all if one is not comparison.base]
     stretches = [others[k : k + COLUMNS] for k in range(0, len(others), COLUMNS)] or [[]]
     return [[comparison.base, *stretch] for stretch in stretches]
 

@@ -11,7 +11,6 @@ from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.sections.margins import finite
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
     from reports.figures import distribution as distribution_figure
 
@@ -44,14 +43,12 @@ FIGURE_COLUMNS = [
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
 
-def section(result: MonteCarloResult, design: Design | None = None, at_least: float | None = None) -> Section:
+def section(result: MonteCarloResult, at_least: float | None = None) -> Section:
     """Make the section.
 
     Parameters
     ----------
     result : MonteCarloResult
-    design : Design, optional
-        For the limits in the figures.
     at_least : float, optional
         Probability to be met with 95 % confidence; without it every sample and the worst case must pass.
     """

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from analyses.requirements import RequirementVerdict, all_pass
 from reports import document as doc
@@ -28,7 +27,7 @@ def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> S
     )
 
 
-def result(items: Sequence[Mapping[str, Any]]) -> str:
+def result(items: Sequence[VerdictItem]) -> str:
     """Say how many requirements are met, and which are not."""
     failed = [item["label"] for item in items if item["passed"] is False]
     unjudged = sum(item["passed"] is None for item in items)

@@ -11,7 +11,7 @@ from actuator_lti.design import load_design
 from actuator_lti.errors import InputError
 from analyses.correlation import CorrelationResult, compare_signals, correlate_record
 from analyses.correlation.chirp import find_chirp, predict_chirp
-from analyses.correlation.voltage_motor import fit_step, read_odrive
+from analyses.correlation.voltage_motor import fit_step
 from analyses.records import open_record
 
 
@@ -135,15 +135,15 @@ def test_an_unknown_layout_is_refused_with_advice(tmp_path: Path) -> None:
 
 
 def test_the_odrive_step_settles_at_its_published_speed(odrive_files: dict[str, Path]) -> None:
-    motor = fit_step([read_odrive(odrive_files["step1"])])
+    motor = fit_step([open_record(odrive_files["step1"])])
     assert motor.steady_speeds_rad_s[0] / (2.0 * np.pi) == pytest.approx(4.52, abs=0.005)
     assert motor.time_constant_std_s < 0.1 * motor.time_constant_s
 
 
 def test_a_motor_fitted_on_the_step_predicts_the_chirp(odrive_files: dict[str, Path]) -> None:
     """How well: 1.9 % of the speed from 1 to 48 Hz, no band worse than 3 %."""
-    motor = fit_step([read_odrive(odrive_files["step1"])])
-    result = predict_chirp(motor, read_odrive(odrive_files["chirp1"]))
+    motor = fit_step([open_record(odrive_files["step1"])])
+    result = predict_chirp(motor, open_record(odrive_files["chirp1"]))
     assert result.law.amplitude == pytest.approx(0.25, rel=2e-3)
     assert result.law.start_hz == pytest.approx(1.0, rel=5e-3)
     assert result.law.frequency_hz(result.law.end_s) > 45.0

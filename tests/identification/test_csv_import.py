@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from actuator_lti.errors import InputError
-from analyses.records import CsvFormat, RecordSpec, SignalColumn, TimeColumn, read_csv_record, stream_csv
+from analyses.records import (
+    CsvFormat,
+    RecordSpec,
+    SignalColumn,
+    TimeColumn,
+    open_record,
+    read_csv_record,
+    stream_csv,
+)
 from analyses.records import csv_stream as module
 
 SPEED = SignalColumn(name="speed", column="n", unit="rpm")
@@ -145,9 +153,7 @@ def test_careful_and_fast_reading_agree(tmp_path: Path) -> None:
 
 
 def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:
-    from analyses.correlation.voltage_motor import read_odrive
-
-    record = read_odrive(odrive_files["step1"])
+    record = open_record(odrive_files["step1"])
     assert record.counts.rows_in == 1309
     assert record.counts.dropped == {"with a missing value": 8, "time below 1": 11}
     assert record.counts.rows_out == len(record) == 1290

@@ -10,8 +10,9 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
-from analyses.correlation.voltage_motor import fit_step, read_odrive
+from analyses.correlation.voltage_motor import fit_step
 from analyses.identification.least_squares import between_records, correlated_covariance, solve
+from analyses.records import open_record
 from reports.cli.main import main
 from tests.identification.bench_records import columns_of, motion, staircase, write
 
@@ -179,7 +180,7 @@ def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.Cap
 
 def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:
     """ODrive, measured: two steps 0.35 ms apart cannot be pooled to 0.04 ms."""
-    steps = [read_odrive(odrive_files[name]) for name in ("step1", "step2")]
+    steps = [open_record(odrive_files[name]) for name in ("step1", "step2")]
     alone = [fit_step([step]) for step in steps]
     together = fit_step(steps)
     apart = abs(alone[0].time_constant_s - alone[1].time_constant_s)

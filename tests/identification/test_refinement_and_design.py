@@ -14,7 +14,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.bench import BenchSettings, identify_bench
-from analyses.identification.dynamic import Recipe, identify_dynamics
+from analyses.identification.dynamic import Recipe
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
@@ -25,6 +25,7 @@ from analyses.identification.systematic import effects_of, shared_errors
 from analyses.identification.to_design import Estimate, design_with_estimate, joint_estimate
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
+from analyses.records.record import Record, RowCounts
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
@@ -112,7 +113,7 @@ def _as_point(like: SteadyPoint, run: SuggestedRun, fit: SurfaceFit) -> SteadyPo
 
 def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceFit) -> None:
     design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, BOUNDS, count=3)
+    result = suggest_runs(design, fit, count=3)
     left = [run.remaining for run in result.runs]
     assert left == sorted(left, reverse=True)
     assert left[0] < 1.0
@@ -130,7 +131,7 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
     from actuator_lti import assemble_loops, stability_margins
 
     design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, BOUNDS, count=1)
+    result = suggest_runs(design, fit, count=1)
     spread = next(m for m in result.margins if m.label == "position phase margin, 0 N m")
     base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
     base["friction.load_coefficient"] = float(fit.values[2])
@@ -150,15 +151,15 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
 
 
 def test_the_determinant_is_served_by_extreme_points(fit: SurfaceFit) -> None:
-    result = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=4, criterion="D")
+    result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
     assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
     assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
     with pytest.raises(InputError, match="criterion"):
-        suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, criterion="E")
+        suggest_runs(load_design("ilr33-amber"), fit, criterion="E")
 
 
 def test_what_no_run_reduces_is_named(fit: SurfaceFit) -> None:
-    result = suggest_runs(load_design("ilr33-amber"), fit, BOUNDS, count=1)
+    result = suggest_runs(load_design("ilr33-amber"), fit, count=1)
     assert 0.5 < result.shared_part <= 1.0
     assert result.largest_shared in fit.shared_shifts
 
@@ -213,8 +214,11 @@ def test_a_rotary_drive_is_identified_from_its_own_simulation() -> None:
 
     design = load_design("ilr33-amber")
     run = simulate(design, commands.multisine(0.005, [0.7, 1.9, 4.3], 6.0, 1e-4, seed=2), 6.0)
-    drive = 5.9e-3 * run.current_A
-    model = identify_dynamics(run.motor_angle_rad, drive, 1e-4, recipe=Recipe(cutoff_hz=1000.0))
+    signals = {"angle": run.motor_angle_rad, "current": run.current_A}
+    counts = RowCounts(rows_in=len(run.time_s), rows_out=len(run.time_s))
+    units = {"angle": "rad", "current": "A"}
+    record = Record(name="run", time_s=run.time_s, signals=signals, units=units, counts=counts)
+    model = fit_records(design, [record], recipe=Recipe(cutoff_hz=1000.0))
     assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=0.01)
     assert model["dry"] == pytest.approx(2.25e-3, rel=0.01)
     assert model["viscous"] == pytest.approx(5.25e-6, rel=0.02)

@@ -108,7 +108,8 @@ def run(design: Design, command: np.ndarray, moment_Nm: float, contact: float) -
     outer = n_p if position else n_v if velocity else 1
     A, B = plant(design, contact)
     q = int(np.floor(d / Ts + 1e-9))
-    f = max(d / Ts - q, 0.0)
+    f = d / Ts - q
+    f = f if f > 1e-9 else 0.0  # the rule of `split_delay`: an unstable drive would show the difference
     pieces = []
     for h in (f * Ts, (1 - f) * Ts):
         E = expm(np.block([[A * h, B * h], [np.zeros((3, 8))]]))

@@ -101,6 +101,23 @@ def test_a_process_goes_from_job_to_job(tmp_path) -> None:
     assert 1 <= len({entry.meta["pid"] for entry in entries if entry is not None}) <= 2
 
 
+def test_a_process_that_died_while_it_waited_is_replaced(tmp_path) -> None:
+    """By the system, short of memory, say: the next job does not pay for it."""
+    from reports.nightly.apart import _Warm
+
+    warm = _Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))
+    try:
+        first, _ = warm.build(Task(key="0" * 64, payload=job("a", mode="pid").payload))
+        (waiting,) = warm._idle
+        waiting._process.kill()
+        waiting._process.wait()
+        second, _ = warm.build(Task(key="1" * 64, payload=job("b", mode="pid").payload))
+    finally:
+        warm.close()
+    assert (first.status, second.status) == ("done", "done")
+    assert workers_left() == []
+
+
 def test_an_interrupted_night_ends_the_jobs_under_way(tmp_path) -> None:
     """Ctrl-C beside a job that never ends: no wait for its time limit, no process left."""
 

@@ -12,13 +12,13 @@ from scipy.integrate import quad
 
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import dead_zone
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.limit_cycles import limit_cycles
 from analyses.limit_cycles.foreseen import (
     cycles_of_play,
     cycles_of_quantisation,
-    dead_zone,
     without_nonlinearities,
 )
 from analyses.limit_cycles.run import confirm

@@ -152,9 +152,10 @@ static int one(int stage, double lead, int timed)
     }
     it->lead = lead;
     it->period = drive_interval(q, stage) * q[DRIVE_PERIOD];
-    if (drive_figures(n, it->a, it->b, it->c, lead, timed, it->row, poles, points, stack, xs, rs, ss, work, state,
-            exchanged, real, imaginary) == 0) {
-        return 0;
+    const int scanned = drive_figures(n, it->a, it->b, it->c, lead, timed, it->row, poles, points, stack, xs, rs, ss,
+        work, state, exchanged, real, imaginary);
+    if (scanned <= 0) {
+        return scanned;
     }
     if (timed != 0) {
         for (int k = 0; k < n; k += 1) {
