@@ -227,6 +227,8 @@ def _why_not(design: Design, motion: BiasMotion, run: Trajectory, since: int) ->
         return f"{acting[0]} limit"
     if motion.friction_on and run.motor_speed_rad_s[since:].min() <= 0.0:
         return "speed reversal"
+    if np.abs(run.motor_speed_rad_s[since:] - motion.speed_rad_s).max() > motion.room_rad_s:
+        return "friction has another slope there"
     if design.load.gravity is not None and np.ptp(run.output_angle_rad) > SMALL_ANGLE_RAD:
         return "gravity is not proportional to the angle"
     if motion.coupling_Nm and _parted(run, since):
