@@ -126,8 +126,16 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     L = loop.response(x)
     x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
     at_dc = any(pole.x == 0.0 for pole in poles.border)
-    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else loop.response(np.zeros(1)))
+    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else _at_rest(loop, around))
     return smallest(loop, LevelCrossings(loop, poles.values), criterion, x, L, end_x)
+
+
+def _at_rest(loop: RationalLoop, sizes: Real) -> Complex:
+    """L at zero frequency; just beside it where a pole there, perhaps a hidden one, leaves no value."""
+    try:
+        return loop.response(np.zeros(1))
+    except np.linalg.LinAlgError:
+        return loop.response(1e-6 * sizes.min(initial=1.0, keepdims=True))
 
 
 def _gain_margins(

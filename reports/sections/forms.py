@@ -34,7 +34,7 @@ COLUMNS = [
 def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> Section:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
-        _row(name, form, result[name], forms["ideal"].get(name))
+        _row(name, form, result[name], forms.get("ideal", {}).get(name))
         for name in forms["sampled"]
         for form, result in forms.items()
         if name in result
