@@ -118,7 +118,7 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     """Smallest value of a criterion over the whole axis, ends included, and where (x of `RationalLoop`)."""
     if not loop.order:
         return float(criterion.distance(np.array([loop.d + 0j]))[0]), 0.0
-    poles = sorted_poles(loop.A, loop.in_z)
+    poles = sorted_poles(loop.A, loop.in_z, gather=True)
     end_x = loop.end
     size = np.abs(np.angle(poles.values)) if loop.in_z else np.abs(poles.values)
     around = size[(size > 1e-9 * size.max()) & (size < end_x)] if size.size else size
@@ -126,16 +126,8 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     L = loop.response(x)
     x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
     at_dc = any(pole.x == 0.0 for pole in poles.border)
-    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else _at_rest(loop, around))
+    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else loop.response(np.zeros(1)))
     return smallest(loop, LevelCrossings(loop, poles.values), criterion, x, L, end_x)
-
-
-def _at_rest(loop: RationalLoop, sizes: Real) -> Complex:
-    """L at zero frequency; just beside it where a pole there, perhaps a hidden one, leaves no value."""
-    try:
-        return loop.response(np.zeros(1))
-    except np.linalg.LinAlgError:
-        return loop.response(1e-6 * sizes.min(initial=1.0, keepdims=True))
 
 
 def _gain_margins(
