@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actuator_lti.as_control import as_control
 from actuator_lti.drive.profile import profile_note
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.quantities import MOST_RESONANCE_DB
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -96,11 +97,23 @@ def loop_figures(
         loop=loop,
         plain_response=response,
         margins=margins,
-        bandwidth=_if_there_is(lambda: closed_loop_bandwidth(response), notes) if bandwidth else None,
+        bandwidth=_if_there_is(lambda: _measured(closed_loop_bandwidth(response)), notes)
+        if bandwidth
+        else None,
         peaks=peaks(loop.plain_open),
         step=_if_there_is(lambda: step_figures(response), notes) if step else None,
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _measured(band: Bandwidth) -> Bandwidth:
+    """The bandwidths, refused where a drive's gain at zero frequency is what rounding leaves of zero."""
+    if band.resonance_peak_db > MOST_RESONANCE_DB:
+        raise InputError(
+            "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to measure "
+            "the fall and the resonance from"
+        )
+    return band
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:

@@ -18,7 +18,7 @@ from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
+from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, MOST_RESONANCE_DB
 
 _CHUNK = 1024
 _MOST_ORDER = 80
@@ -147,14 +147,21 @@ class LinearFigures:
         return self._where_stable(loop, -20.0 * np.log10(self._modulus_margin(loop)))
 
     def _resonance_peak(self, loop: str) -> np.ndarray:
-        ratio = self._column(loop, 5) / np.abs(self._column(loop, 9))
-        return self._where_stable(loop, np.maximum(20.0 * np.log10(ratio), 0.0))
+        return self._where_measured(loop, np.maximum(self._peak_db(loop), 0.0))
 
     def _bandwidth(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))
+        return self._where_measured(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))
 
     def _bandwidth_90deg(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 8) / self._period(loop) / (2 * pi))
+        return self._where_measured(loop, self._column(loop, 8) / self._period(loop) / (2 * pi))
+
+    def _peak_db(self, loop: str) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(20.0 * np.log10(self._column(loop, 5) / np.abs(self._column(loop, 9))))
+
+    def _where_measured(self, loop: str, values: np.ndarray) -> np.ndarray:
+        """Where the loop is stable, and its gain at zero frequency is more than nothing."""
+        return self._where_stable(loop, np.where(self._peak_db(loop) > MOST_RESONANCE_DB, np.nan, values))
 
     def _rise_time(self, loop: str) -> np.ndarray:
         return self._where_stable(loop, self._column(loop, 10) * self._period(loop))
