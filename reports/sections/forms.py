@@ -75,7 +75,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
     row = {**cells(margins, response), "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
-    return row | ({"_status": "fail"} if figures.margins.stable is False else {})
+    return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
