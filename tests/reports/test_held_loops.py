@@ -57,9 +57,7 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     design = replace(design, controller=replace(design.controller, computing_delay_s=0.0))
     figures = all_loop_figures(assemble_loops(design))
     current = figures["current"]
-    assert (
-        current.margins.stable is False
-    )  # J s^2 + Cv s - k has a root on the right, and no current holds it
+    assert current.margins.stable is False  # J s^2 + Cv s - k has a root on the right
     assert current.sound is True
     assert figures["position"].stable
     expected = held_phase_margin_deg(design)
