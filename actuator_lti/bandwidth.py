@@ -217,7 +217,7 @@ def _by_response(loop: RationalLoop, delay_s: float, level: Level) -> Bandwidth:
     unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
     dc = _dc(form)
     falls = _rational_falls(loop, abs(dc) * math.sqrt(_SQUARES[level]))
-    return _assembled(form, falls, rational_extreme(loop, PEAK), dc, unit, level)
+    return _assembled(form, falls, rational_extreme(loop, PEAK, dc), dc, unit, level)
 
 
 def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:

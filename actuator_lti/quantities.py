@@ -201,6 +201,8 @@ CORNERED = {each.cornered: each for each in ANALYSIS_QUANTITIES.values() if each
 """Figures of loops whose worst over all corners is a figure of its own, with that figure."""
 LOOPS = ("current", "velocity", "position")
 """The loops that a requirement may name, innermost first."""
+MOST_RESONANCE_DB = 100.0
+"""Over more than that the value at zero frequency is nothing that a resonance or a fall is measured from."""
 
 
 def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:

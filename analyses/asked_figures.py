@@ -75,7 +75,7 @@ class AskedFigures:
 
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
-        loops = [one for corner in self._corners.corners for one in corner.figures.values()]
+        loops = [one.judged for corner in self._corners.corners for one in corner.figures.values()]
         if not all(one.stable for one in loops):
             return -quantity.better * inf
         found = (quantity.read(one) for one in loops)

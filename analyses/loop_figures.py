@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actuator_lti.as_control import as_control
 from actuator_lti.drive.profile import profile_note
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.quantities import MOST_RESONANCE_DB
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -37,6 +38,9 @@ class LoopFigures:
         ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why).
     notes : tuple of str
         Why a figure of a stable loop is missing.
+    held : LoopFigures or None
+        Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop
+        as `analyses.held_loops` holds it, which is stable.
     """
 
     loop: Loop
@@ -46,6 +50,17 @@ class LoopFigures:
     peaks: Peaks | None
     step: StepFigures | None
     notes: tuple[str, ...] = ()
+    held: LoopFigures | None = None
+
+    @property
+    def judged(self) -> LoopFigures:
+        """The figures that the drive is judged by: those of `held` where there are some."""
+        return self if self.held is None else self.held
+
+    @property
+    def sound(self) -> bool | None:
+        """Whether the loop, as it is judged, is stable; ``None`` where that is not known."""
+        return self.judged.margins.stable
 
     @cached_property
     def response(self) -> Any:
@@ -96,11 +111,23 @@ def loop_figures(
         loop=loop,
         plain_response=response,
         margins=margins,
-        bandwidth=_if_there_is(lambda: closed_loop_bandwidth(response), notes) if bandwidth else None,
+        bandwidth=_if_there_is(lambda: _measured(closed_loop_bandwidth(response)), notes)
+        if bandwidth
+        else None,
         peaks=peaks(loop.plain_open),
         step=_if_there_is(lambda: step_figures(response), notes) if step else None,
         notes=tuple(dict.fromkeys(notes)),
     )
+
+
+def _measured(band: Bandwidth) -> Bandwidth:
+    """The bandwidths, refused where a drive's gain at zero frequency is what rounding leaves of zero."""
+    if band.resonance_peak_db > MOST_RESONANCE_DB:
+        raise InputError(
+            "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
+            "measure the fall and the resonance from"
+        )
+    return band
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
@@ -144,4 +171,16 @@ def all_loop_figures(
             if refused is None:
                 raise
             refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
+    if result and (whole := result.get(loops.design.controller.outermost)) and whole.stable:
+        return {name: _with_held(one, loops, name, step, certify) for name, one in result.items()}
     return result
+
+
+def _with_held(figures: LoopFigures, loops: Loops, name: str, step: bool, certify: bool) -> LoopFigures:
+    """The same, with the figures of the loop held where it is unstable only by itself."""
+    from analyses.held_loops import held_loop
+
+    if figures.margins.stable is not False or (loop := held_loop(loops, name)) is None:
+        return figures
+    held = _if_there_is(lambda: loop_figures(loop, step=step, certify=certify), [])
+    return replace(figures, held=held) if held is not None and held.stable else figures

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 
@@ -21,9 +22,10 @@ if TYPE_CHECKING:
     from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.limiters import Onset
     from actuator_lti.loops import ExactMargins, Loops
+    from actuator_lti.loops.result import Form
 
 Progress = Callable[[int, int], None]
-FORMS: tuple[Literal["sampled", "continuous", "ideal"], ...] = ("sampled", "continuous", "ideal")
+FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)
 MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
@@ -184,8 +186,9 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     loops = assemble_loops(design)
     refused: list[str] = []
     forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops, certify=True)}
-    others = attempt("continuous and ideal forms", lambda: _other_forms(design, refused), {})
-    forms.update(others)
+    for form in FORMS[1:]:
+        other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
+        forms |= {} if other is None else {form: other}
     step(1)
     locked = attempt("current loop with the rotor locked", lambda: _locked(design, loops), None)
     step(2)
@@ -202,14 +205,11 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     )
 
 
-def _other_forms(design: Design, refused: list[str]) -> dict[str, Mapping[str, LoopFigures]]:
-    """Measure the loops in all forms but the sampled one."""
+def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
+    """Measure the loops in a form other than the sampled one."""
     from actuator_lti.loops import assemble_loops
 
-    return {
-        form: all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-        for form in FORMS[1:]
-    }
+    return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
 
 
 def _locked(design: Design, loops: Loops) -> LoopFigures | None:

@@ -142,7 +142,7 @@ def population_figures(
     population: Population, design: Design, *, time_figures: bool = False
 ) -> dict[str, np.ndarray]:
     """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads."""
-    linear = linear_figures(population, time_figures=time_figures)
+    linear = linear_figures(population, time_figures=time_figures, held=True)
     columns = {}
     for loop in linear.loops:
         for name, quantity in LOOP_QUANTITIES.items():

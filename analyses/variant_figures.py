@@ -44,7 +44,8 @@ class FigureName:
 def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str, float | None]:
     """Linear figures of every loop and static figures at every load of the design."""
     figures: dict[str, float | None] = {}
-    for loop, one in result.items():
+    for loop, found in result.items():
+        one = found.judged
         for name, quantity in LOOP_QUANTITIES.items():
             value = quantity.read(one) if one.stable or not quantity.closed else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)

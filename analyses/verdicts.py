@@ -10,6 +10,7 @@ from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
+from analyses.held_loops import by_itself
 from analyses.loop_figures import LoopFigures
 
 Asked = Callable[[str], tuple[float | None, str]]
@@ -90,7 +91,7 @@ def _judge_loop(
         )
     if name not in figures:
         return _verdict(requirement, id, name, None, f"the design has no {name} loop")
-    result = figures[name]
+    result = figures[name].judged
     if result.margins.stable is None:
         return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
     if not result.stable:
@@ -102,6 +103,8 @@ def _judge_loop(
     reason = which_response(requirement.quantity, name)
     if value is None:
         reason = "not found in the band of this loop"
+    if figures[name].held is not None:
+        reason = ", ".join(filter(None, (reason, by_itself(name))))
     return _verdict(requirement, id, name, value, reason)
 
 

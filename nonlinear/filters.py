@@ -96,12 +96,9 @@ def _below_nyquist(w0: Any, period_s: Any, kind: str, where: str) -> Any:
 
 
 def _biquad(item: Filter, where: str) -> Section:
-    b, a = (*item.b, 0.0, 0.0, 0.0)[:3], (*item.a, 0.0, 0.0, 0.0)[:3]
-    if not 1 <= len(item.b) <= 3 or not 1 <= len(item.a) <= 3 or a[0] == 0.0:
-        message = "control.velocity.filter: biquad: one to three numbers in b and in a, a[0] not zero"
-        raise InputError(message, where=where)
-    b0, b1, b2, a1, a2 = (x / a[0] for x in (*b, a[1], a[2]))
-    if not (abs(a2) < 1.0 and abs(a1) < 1.0 + a2):
-        message = f"control.velocity.filter: biquad: a = {item.a}: a pole is on or outside the unit circle"
-        raise InputError(message, where=where)
+    try:
+        b, a = item.polynomials
+    except InputError as error:
+        raise InputError(str(error), where=where) from error
+    (b0, b1, b2), (_, a1, a2) = (*b, 0.0, 0.0)[:3], (*a, 0.0, 0.0)[:3]
     return b0, b1, b2, a1, a2

@@ -84,10 +84,15 @@ def design_report(
         provenance=origin,
         sections=sections,
     )
-    live = attempt("sliders", lambda: live_model(design), None)
+    live = attempt("sliders", lambda: live_model(design, _held(figures)), None)
     if live and figures:
         made["live"] = live
     return made
+
+
+def _held(figures: Mapping[str, LoopFigures]) -> list[str]:
+    """Name the loops that are judged held, see `analyses.held_loops`."""
+    return [name for name, one in figures.items() if one.held is not None]
 
 
 def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, LoopFigures], list[doc.Section]]:

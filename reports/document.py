@@ -36,7 +36,7 @@ from reports.document_schema import (
 )  # fmt: skip
 from reports.findings import Finding
 from reports.findings import plain as plain_findings
-from reports.verdict_summary import summary
+from reports.verdict_summary import verdict_of, walk
 from reports.visible import visible
 
 __all__ = [
@@ -277,7 +277,7 @@ def document(
         "subtitle": visible(subtitle),
         "design": _seen(plain(design)),
         "provenance": _seen(plain(provenance)),
-        "verdict": summary(block for part in sections for block in walk(part)),
+        "verdict": verdict_of(sections, kind),
         "sections": [_seen(certain(part)) for part in sections],
     }
     check(made)
@@ -293,13 +293,6 @@ def _seen(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_seen(item) if isinstance(item, str | Mapping | list | tuple) else item for item in value]
     return value
-
-
-def walk(part: Mapping[str, Any]) -> Iterable[Block]:
-    """Give every block of a section or block, those inside details too."""
-    for block in part.get("blocks", ()):
-        yield block
-        yield from walk(block)
 
 
 def figures(made: Mapping[str, Any]) -> list[Block]:
@@ -337,7 +330,7 @@ def load(path: str | Path) -> Tree:
     """
     made = read_json(path)
     check(made, shown_path(path))
-    counted = summary(block for part in made["sections"] for block in walk(part))
+    counted = verdict_of(made["sections"], made["kind"])
     if made["verdict"] != counted:
         raise InputError("verdict: does not agree with the verdicts in its sections", where=shown_path(path))
     return dict(made)

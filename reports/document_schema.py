@@ -260,6 +260,7 @@ class Verdict(TypedDict):
     not_judged: int
     total: int
     parts: NotRequired[dict[str, Counts]]
+    failed_sections: NotRequired[list[str]]
 
 
 @_strict

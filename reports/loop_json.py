@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from actuator_lti.tree import Tree
+from analyses.held_loops import HELD
 from analyses.loop_figures import LoopFigures
 
 
@@ -39,4 +40,9 @@ def loop_json(figures: LoopFigures) -> Tree:
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],
+        **(
+            {}
+            if figures.held is None
+            else {"judged": {"how": HELD[figures.loop.name]} | loop_json(figures.held)}
+        ),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from reports.document_schema import Counts, Verdict
+from reports.document_schema import Block, Counts, Verdict
 
 WORDS = {
     "requirements": ("requirements", "met", "not met"),
@@ -32,6 +32,29 @@ def summary(blocks: Iterable[Mapping[str, Any]]) -> Verdict:
     }
 
 
+def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Verdict:
+    """Count the verdicts of a document; a report fails by a section that failed without one, too.
+
+    Such a section says that a loop is unstable, say, or that a part could not be computed.
+    """
+    made = summary(block for part in sections for block in walk(part))
+    parts = [part for part in sections if part["status"] == "fail" and not summary(walk(part))["failed"]]
+    first = [part["title"] for part in parts if part["id"] == "answer"]  # it gathers what the others say
+    failed = [part["title"] for part in parts if part["id"] != "answer"]
+    if not failed and made["passed"]:
+        failed = first
+    if kind != "report" or not failed:
+        return made
+    return {**made, "passed": False, "failed_sections": failed}
+
+
+def walk(part: Mapping[str, Any]) -> Iterable[Block]:
+    """Give every block of a section or block, those inside details too."""
+    for block in part.get("blocks", ()):
+        yield block
+        yield from walk(block)
+
+
 def _counts(outcomes: Sequence[bool | None]) -> Counts:
     return {
         "failed": sum(outcome is False for outcome in outcomes),
@@ -52,9 +75,17 @@ def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
 
 
 def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, bool]]:
-    """Say a document's verdict in words, with whether it is good, for each kind of verdict."""
+    """Say a document's verdict in words, with whether it is good: failed sections, then each kind of verdict.
+
+    Examples
+    --------
+    >>> verdict_lines({"parts": {}, "failed_sections": ["Missing parts"]})
+    [('failed: Missing parts', False)]
+    """
     parts = verdict.get("parts") or {"requirements": verdict}
-    return [(_words(what, n), not n["failed"]) for what, n in parts.items() if n["total"]]
+    failed = verdict.get("failed_sections")
+    first = [(f"failed: {'; '.join(failed)}", False)] if failed else []
+    return first + [(_words(what, n), not n["failed"]) for what, n in parts.items() if n["total"]]
 
 
 def _words(what: str, counts: Counts) -> str:

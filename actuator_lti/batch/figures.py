@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
 from typing import Any
 
@@ -18,7 +18,7 @@ from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
+from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, MOST_RESONANCE_DB
 
 _CHUNK = 1024
 _MOST_ORDER = 80
@@ -147,14 +147,21 @@ class LinearFigures:
         return self._where_stable(loop, -20.0 * np.log10(self._modulus_margin(loop)))
 
     def _resonance_peak(self, loop: str) -> np.ndarray:
-        ratio = self._column(loop, 5) / np.abs(self._column(loop, 9))
-        return self._where_stable(loop, np.maximum(20.0 * np.log10(ratio), 0.0))
+        return self._where_measured(loop, np.maximum(self._peak_db(loop), 0.0))
 
     def _bandwidth(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))
+        return self._where_measured(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))
 
     def _bandwidth_90deg(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 8) / self._period(loop) / (2 * pi))
+        return self._where_measured(loop, self._column(loop, 8) / self._period(loop) / (2 * pi))
+
+    def _peak_db(self, loop: str) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(20.0 * np.log10(self._column(loop, 5) / np.abs(self._column(loop, 9))))
+
+    def _where_measured(self, loop: str, values: np.ndarray) -> np.ndarray:
+        """Where the loop is stable, and its gain at zero frequency is more than nothing."""
+        return self._where_stable(loop, np.where(self._peak_db(loop) > MOST_RESONANCE_DB, np.nan, values))
 
     def _rise_time(self, loop: str) -> np.ndarray:
         return self._where_stable(loop, self._column(loop, 10) * self._period(loop))
@@ -182,6 +189,7 @@ def linear_figures(
     speed_amplitude_rad_s: float | None = None,
     direction: int = 1,
     time_figures: bool = True,
+    held: bool = False,
     threads: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> LinearFigures:
@@ -199,6 +207,9 @@ def linear_figures(
         As in `actuator_lti.assemble_loops`.
     time_figures : bool
         Whether to follow the step responses as well (most of the time).
+    held : bool
+        Give an inner loop that is unstable only by itself, in a drive that is stable as a whole, the figures
+        of the same loop with the rotor held (current) or the load's moment held (velocity), if stable so.
     threads : int
         Threads that share the designs.
     progress : callable, optional
@@ -235,6 +246,10 @@ def linear_figures(
             if progress is not None:
                 progress(done, population.count)
     wired = wire(population.stacked, at)
+    if held:
+        for loop in wired.stages:
+            if loop != wired.outermost and loop != "position":
+                _hold(population, at, loop, out, time_figures)
     periods = [
         np.broadcast_to(wired.period_s(loop) if loop in wired.stages else np.nan, population.count)
         for loop in LOOPS
@@ -242,9 +257,33 @@ def linear_figures(
     return LinearFigures(wired.stages, population.count, out, np.column_stack(periods))
 
 
-def _fill(wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray) -> None:
-    """Figures of every loop of stacked designs."""
-    for stage in wired.stages:
+def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
+    """Put the figures of a held loop in the place of one that is unstable only by itself."""
+    whole = out[:, LOOPS.index(population.design.controller.outermost), 0] == 1.0
+    chosen = np.flatnonzero(whole & (out[:, LOOPS.index(loop), 0] == 0.0))
+    if not chosen.size:
+        return
+    some, operating = population.part(chosen), at
+    if loop == "current":
+        operating = replace(at, rotor="locked")
+    else:
+        load = replace(population.design.load, moment_slope_Nm_rad=0.0, gravity=None)
+        gone = ("load.moment_slope", "load.gravity.")
+        values = {path: array for path, array in some.values.items() if not path.startswith(gone)}
+        some = Population(replace(population.design, load=load), values, some.count)
+    rows = np.full((some.count, *out.shape[1:]), np.nan)
+    for group in some.alike():
+        _fill(wire(some.part(group).stacked, operating), group, time_figures, rows, only=loop)
+    place = LOOPS.index(loop)
+    stable = rows[:, place, 0] == 1.0
+    out[chosen[stable], place] = rows[stable, place]
+
+
+def _fill(
+    wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray, only: str | None = None
+) -> None:
+    """Figures of every loop of stacked designs, or of one."""
+    for stage in wired.stages if only is None else (only,):
         rows = np.full((len(chosen), out.shape[2]), np.nan)
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         loop = fundamental(stage_blocks(wired, stage))

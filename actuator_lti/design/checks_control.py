@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import degrees, isfinite, pi
 
+from actuator_lti.design.control import stable_pair
 from actuator_lti.design.model import FILTER_KEYS, Design, Filter
 from actuator_lti.errors import InputError
 
@@ -72,9 +73,7 @@ def _biquad(item: Filter, path: str, refuse: Refuse) -> None:
         raise refuse(f"{path}.b", f"{len(item.b)} values", "allowed: 1 to 3, b0 b1 b2")
     if not 1 <= len(item.a) <= 2:
         raise refuse(f"{path}.a", f"{len(item.a)} values", "allowed: 1 or 2, a1 a2, after a leading 1")
-    a1, a2 = item.a[0], item.a[1] if len(item.a) > 1 else 0.0
-    # the triangle of stability of z^2 + a1 z + a2
-    if not (abs(a2) < 1.0 and abs(a1) < 1.0 + a2):
+    if not stable_pair(*(*item.a, 0.0)[:2]):
         raise refuse(f"{path}.a", f"{list(item.a)}", "allowed: poles inside the unit circle")
 
 

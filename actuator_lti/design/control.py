@@ -97,6 +97,11 @@ class Instruments:
         )
 
 
+def stable_pair(a1: float, a2: float) -> bool:
+    """Whether the roots of z^2 + a1 z + a2 are inside the unit circle (the triangle of stability)."""
+    return abs(a2) < 1.0 and abs(a1) < 1.0 + a2
+
+
 @dataclass(frozen=True, kw_only=True)
 class Filter:
     """One filter of the velocity loop, at its period, discretised by Tustin, prewarped (model.md section 7).
@@ -127,7 +132,37 @@ class Filter:
     b: Annotated[tuple[float, ...], quantities(
         "b", "1", "numerator of a biquad in z^-1, b0 b1 b2", low=-BIG, high=BIG)] = ()
     a: Annotated[tuple[float, ...], quantities(
-        "a", "1", "denominator of a biquad in z^-1 after the leading 1, a1 a2", low=-BIG, high=BIG)] = ()
+        "a", "1", "denominator of a biquad in z^-1 after the leading 1, a1 a2 (a = [0] for none)", low=-BIG,
+        high=BIG)] = ()
+
+    @property
+    def polynomials(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Numerator and denominator of a biquad in falling powers of z, of equal length; the 1 leads.
+
+        ``(b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2)``, where ``a`` is a1 a2, without the 1.  Roots at
+        z = 0 of both are left out, and so are the poles of a filter that is a mere gain.
+
+        Raises
+        ------
+        InputError
+            For other than one to three numbers in ``b``, more than two in ``a``, or a pole on or outside
+            the unit circle.
+
+        Examples
+        --------
+        >>> Filter(kind="biquad", b=(0.5,), a=(-0.5, 0.0)).polynomials
+        ((0.5, 0.0), (1.0, -0.5))
+        """
+        given = f"control.velocity.filter: biquad: b = {list(self.b)}, a = {list(self.a)}"
+        if not 1 <= len(self.b) <= 3 or len(self.a) > 2:
+            raise InputError(f"{given}: allowed: b0 b1 b2 and, after a leading 1, a1 a2")
+        b, a = (*self.b, 0.0, 0.0)[:3], (1.0, *self.a, 0.0, 0.0)[:3]
+        if not stable_pair(a[1], a[2]):
+            raise InputError(f"{given}: allowed: poles inside the unit circle")
+        if b == tuple(b[0] * value for value in a):
+            return b[:1], a[:1]
+        size = max(n for n in (2, 3) if n == 2 or b[2] != 0.0 or a[2] != 0.0)
+        return b[:size], a[:size]
 
 
 @dataclass(frozen=True, kw_only=True)

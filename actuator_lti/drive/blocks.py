@@ -233,11 +233,8 @@ def _back(p: Polynomial, h: Any) -> Polynomial:
 
 def _given(item: Filter, period_s: Any) -> Block:
     """A biquad by its sampled coefficients; its continuous face by the inverse of Tustin's rule."""
-    size = max(len(item.b), len(item.a))
-    b, a = (tuple(p) + (0.0,) * (size - len(p)) for p in (item.b, item.a))
-    if size == 1:
-        return Block(Face(D=b[0] / a[0]), Face(D=b[0] / a[0]), (), period_s)
+    b, a = item.polynomials
+    if len(a) == 1:
+        return Block(Face(D=b[0]), Face(D=b[0]), (), period_s)
     num, den = (_back(p, period_s / 2) for p in (b, a))
-    if not abs(den[0]) > 0:
-        raise InputError("biquad: a pole at z = -1 has no continuous form")
-    return Block(_canonical(b, a), _canonical(num, den), ("1", "2")[: size - 1], period_s)
+    return Block(_canonical(b, a), _canonical(num, den), ("1", "2")[: len(a) - 1], period_s)

@@ -106,7 +106,10 @@ def resonance_rad_s(design: Design) -> Any:
 
 def steady_gain(item: Any) -> Any:
     """Gain of a filter at DC: 1 but for a sampled biquad."""
-    return sum(item.b) / sum(item.a) if item.kind == "biquad" else 1.0
+    if item.kind != "biquad":
+        return 1.0
+    b, a = item.polynomials
+    return sum(b) / sum(a)
 
 
 def passed_moment_Nm(design: Design, load_Nm: float) -> Any:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 OperatingPoint = Literal["sliding", "rest", "describing-function", "driving", "driven", "gap"]
 RotorState = Literal["free", "locked"]
+ROUNDED = 1e-15  # a slope of so small a part of its terms, and of the angle's own rounding, is none
 CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the load-dependent friction
 
 
@@ -166,8 +167,14 @@ def dead_zone(x: float) -> float:
 
 
 def moment_slope(design: Design, at: Operating) -> Any:
-    """dM_ext/d(output angle) in N m/rad: the load's slope and gravity's at the operating angle."""
+    """dM_ext/d(output angle) in N m/rad: the load's slope and gravity's at the operating angle.
+
+    ``k + m g l cos(angle)``; 0 where that is no more than rounding leaves of it, as at a quarter turn.
+    """
     load = design.load
     if load.gravity is None:
         return load.moment_slope_Nm_rad
-    return load.moment_slope_Nm_rad + load.gravity.peak_Nm * np.cos(at.angle_rad + load.gravity.offset_rad)
+    peak, angle = load.gravity.peak_Nm, at.angle_rad + load.gravity.offset_rad
+    slope = load.moment_slope_Nm_rad + peak * np.cos(angle)
+    size = abs(load.moment_slope_Nm_rad) + peak * (abs(np.cos(angle)) + abs(angle))
+    return slope * (abs(slope) > ROUNDED * size)

@@ -114,11 +114,16 @@ def _trust_crossings(loop: RationalLoop, crossings: Crossings, dc: complex, end:
         raise Doubtful("the loop is too badly conditioned")
 
 
-def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, float]:
-    """Smallest value of a criterion over the whole axis, ends included, and where (x of `RationalLoop`)."""
+def rational_extreme(
+    loop: RationalLoop, criterion: Criterion, at_rest: complex | None = None
+) -> tuple[float, float]:
+    """Smallest value of a criterion over the whole axis, ends included, and where (x of `RationalLoop`).
+
+    ``at_rest`` is the response at zero frequency where a mode there, that it does not show, hides it.
+    """
     if not loop.order:
         return float(criterion.distance(np.array([loop.d + 0j]))[0]), 0.0
-    poles = sorted_poles(loop.A, loop.in_z)
+    poles = sorted_poles(loop.A, loop.in_z, gather=True)
     end_x = loop.end
     size = np.abs(np.angle(poles.values)) if loop.in_z else np.abs(poles.values)
     around = size[(size > 1e-9 * size.max()) & (size < end_x)] if size.size else size
@@ -126,7 +131,8 @@ def rational_extreme(loop: RationalLoop, criterion: Criterion) -> tuple[float, f
     L = loop.response(x)
     x, L = np.append(x, end_x), np.append(L, loop.response(np.array([math.pi])) if loop.in_z else loop.d)
     at_dc = any(pole.x == 0.0 for pole in poles.border)
-    x, L = np.append(x, 0.0), np.append(L, FAR if at_dc else loop.response(np.zeros(1)))
+    start = at_rest if at_rest is not None else FAR if at_dc else loop.response(np.zeros(1))
+    x, L = np.append(x, 0.0), np.append(L, start)
     return smallest(loop, LevelCrossings(loop, poles.values), criterion, x, L, end_x)
 
 

@@ -78,7 +78,7 @@ class Corner:
     @property
     def passed(self) -> bool:
         """Whether no requirement fails and every loop is stable."""
-        return all_pass(self.verdicts) and all(one.stable for one in self.figures.values())
+        return all_pass(self.verdicts) and all(one.sound for one in self.figures.values())
 
 
 @dataclass(frozen=True)

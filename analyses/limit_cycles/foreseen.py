@@ -233,7 +233,7 @@ def _border_of_speed(free: Design) -> tuple[float, _Mode] | None:
     def mode(log_gain: float) -> _Mode | None:
         velocity = free.controller.velocity
         assert velocity is not None
-        gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(1.0,))
+        gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(0.0,))
         louder = replace(velocity, filters=(*velocity.filters, gain))
         design = replace(free, controller=replace(free.controller, velocity=louder))
         program = TickProgram(wire(design, Operating()), "position")

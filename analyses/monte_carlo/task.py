@@ -74,6 +74,7 @@ class SampleTask:
             operating_point=self.operating_point,
             load_Nm=self.load_Nm,
             time_figures=self.time_figures,
+            held=True,
         )
         columns: Arrays = {}
         for loop in linear.loops:

@@ -165,7 +165,7 @@ class Problem:
         population = Population(self.design, values, count * many)
         self.evaluations += population.count
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
-        linear = linear_figures(population, time_figures=timed, threads=os.cpu_count() or 1)
+        linear = linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
         columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in LOOP_QUANTITIES}
         columns |= {f"{loop}.stable": linear.stable(loop).astype(float) for loop in linear.loops}
         out = np.empty((population.count, len(self.requirements)))
@@ -183,7 +183,7 @@ class Problem:
         population = Population(self.design, values, count * many)
         self.evaluations += population.count
         timed = QUANTITIES[quantity].timed
-        linear = linear_figures(population, time_figures=timed, threads=os.cpu_count() or 1)
+        linear = linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
         return linear.quantity(quantity, loop).reshape(count, many)
 
 

@@ -32,6 +32,9 @@ UNLIMITED = np.array([
 ])  # fmt: skip
 
 
+ROUNDED = 1e-15  # as in the linear loops: what rounding leaves of a slope
+
+
 @emitted
 def map_slope(p):
     """Slope of the friction map's first piece for w > 0; the viscous friction without a map."""
@@ -48,7 +51,11 @@ def linear_row(p, q):
     """Copy the parameters of a run, without anything that is not linear; gravity becomes its slope."""
     for k in range(layout.SIZE):
         q[k] = p[k]
-    q[layout.LOAD_SLOPE] += p[layout.GRAVITY] * math.cos(p[layout.GRAVITY_ANGLE])
+    turned = p[layout.GRAVITY] * math.cos(p[layout.GRAVITY_ANGLE])
+    size = abs(q[layout.LOAD_SLOPE]) + abs(turned) + p[layout.GRAVITY] * abs(p[layout.GRAVITY_ANGLE])
+    q[layout.LOAD_SLOPE] += turned
+    if abs(q[layout.LOAD_SLOPE]) <= ROUNDED * size:  # a quarter turn has none
+        q[layout.LOAD_SLOPE] = 0.0
     q[layout.VISCOUS] = map_slope(p)
     for k in range(CLEARED.shape[0]):
         q[CLEARED[k]] = 0.0

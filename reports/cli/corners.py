@@ -66,6 +66,8 @@ def corners(
 def _json(result: Corners) -> Tree:
     from dataclasses import asdict
 
+    from analyses.held_loops import HELD
+
     return {
         "design": result.design.name,
         "asked": asdict(result.asked),
@@ -78,11 +80,12 @@ def _json(result: Corners) -> Tree:
                 "loops": {
                     name: {
                         "stable": one.margins.stable,
-                        "gain_margin_db": one.margins.gain_margin_db,
-                        "phase_margin_deg": one.margins.phase_margin_deg,
-                        "bandwidth_hz": one.bandwidth.minus3db_hz if one.bandwidth else None,
+                        **({"judged": HELD[name]} if one.held else {}),
+                        "gain_margin_db": shown.margins.gain_margin_db,
+                        "phase_margin_deg": shown.margins.phase_margin_deg,
+                        "bandwidth_hz": shown.bandwidth.minus3db_hz if shown.bandwidth else None,
                     }
-                    for name, one in corner.figures.items()
+                    for name, one, shown in ((n, f, f.judged) for n, f in corner.figures.items())
                 },
                 "requirements": [
                     {"id": one.id, "value": one.value, "passed": one.passed} for one in corner.verdicts

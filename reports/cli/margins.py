@@ -85,7 +85,7 @@ def margins(
     else:
         _print_tables(where, figures, verdicts, outer)
     every = [*figures.values(), *outer.values()]
-    leave_with(all_pass(verdicts) and all(result.margins.stable for result in every))
+    leave_with(all_pass(verdicts) and all(result.sound for result in every))
 
 
 def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str, LoopFigures]:
@@ -114,7 +114,7 @@ def _print_json(
 
     loops = {name: loop_json(result) for name, result in figures.items()}
     passed = all_pass(tuple(verdicts)) and all(
-        result.margins.stable for result in (*figures.values(), *outer.values())
+        result.sound for result in (*figures.values(), *outer.values())
     )
     around = {"around": {name: loop_json(result) for name, result in outer.items()}} if outer else {}
     print_json(
@@ -136,16 +136,23 @@ def _print_tables(
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
     from analyses.requirements import all_pass
-    from reports.sections.margins import crossing_table, evidence_notes, margin_table, response_table
+    from reports.sections.margins import (
+        by_itself_notes,
+        crossing_table,
+        evidence_notes,
+        margin_table,
+        response_table,
+        with_held,
+    )
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
     from reports.terminal import print_blocks, print_verdict, side_by_side
 
     made = section(verdicts, where["load_unit"])
     named = {**{LOOPS[name]: result for name, result in figures.items()}, **outer}
-    unstable = [name for name, result in named.items() if result.margins.stable is False]
-    unknown = [name for name, result in named.items() if result.margins.stable is None]
-    loops = f"not stable: {', '.join(unstable)}" if unstable else "every loop is stable"
+    unstable = [name for name, result in named.items() if result.sound is False]
+    unknown = [name for name, result in named.items() if result.sound is None]
+    loops = f"not stable: {', '.join(unstable)}" if unstable else _stable_words(named)
     loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
     good = all_pass(tuple(verdicts)) and not unstable
     print_verdict(
@@ -155,12 +162,30 @@ def _print_tables(
     )
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
+    said = by_itself_notes(named)
+    named = with_held(named)
     blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
     counts = [
         len(result.margins.gain_margins) + len(result.margins.phase_margins) for result in named.values()
     ]
     if max(counts, default=0) > 2:
         blocks.append(crossing_table(named))
-    notes = [*evidence_notes(named), *(n for f in named.values() for n in (*f.margins.notes, *f.notes))]
+    notes = [
+        *said,
+        *evidence_notes(named),
+        *(n for f in named.values() for n in (*f.margins.notes, *f.notes)),
+    ]
     notes += [f"{name}: broken at the command of the drive" for name in outer]
     print_blocks([*blocks, *made["blocks"]], notes)
+
+
+def _stable_words(named: Mapping[str, LoopFigures]) -> str:
+    """Say that every loop is stable, and which only with the rotor or the load's moment held."""
+    from analyses.held_loops import HELD, OPEN
+
+    held = [
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, the load drives it away)"
+        for label, one in named.items()
+        if one.held is not None
+    ]
+    return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"

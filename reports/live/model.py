@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
@@ -42,8 +42,12 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design) -> LiveData | Refused:
-    """Give the page's data, or why there is none under ``refused``."""
+def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused:
+    """Give the page's data, or why there is none under ``refused``.
+
+    Requirements on the loops of ``held``, which the report judges held (`analyses.held_loops`), are named
+    apart: the page has the loops as they are by themselves.
+    """
     if not design.controller.stages:
         return {"refused": OPEN}
     try:
@@ -66,13 +70,13 @@ def live_model(design: Design) -> LiveData | Refused:
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
-        "point": _point(design),
+        "point": _point(design, held),
         "multiples": [list(pair) for pair in _multiples(design)],
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
-        "requirements": [*_on_loops(design), *_on_drive(design, result.figures)],
-        "apart": _apart(design, result.figures),
+        "requirements": [*_on_loops(design, held), *_on_drive(design, result.figures)],
+        "apart": _apart(design, result.figures, held),
         "step": _step(design),
         "limits": [list(limit) for limit in page.limits_seen(design)],
         "borders": list(BORDERS),
@@ -95,10 +99,12 @@ def _followed(quantity: Quantity) -> FollowedFigure:
     }
 
 
-def _point(design: Design) -> str:
+def _point(design: Design, held: Collection[str]) -> str:
     """Say at which operating point the loops of the page are linear, where there is a choice."""
     words = [CONTACT] if design.coupling is not None else []
-    return " ".join([*words, MAP] if design.friction.points else words)
+    words += [MAP] if design.friction.points else []
+    words += [f"The load drives the {name} loop away by itself; the report judges it held." for name in held]
+    return " ".join(words)
 
 
 def _multiples(design: Design) -> list[tuple[str, str]]:
@@ -125,7 +131,7 @@ def _limit(item: Requirement) -> FollowedLimit:
     }
 
 
-def _on_loops(design: Design) -> list[FollowedLimit]:
+def _on_loops(design: Design, held: Collection[str]) -> list[FollowedLimit]:
     """Give the requirements on loops, one for each loop that it holds for."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
     return [
@@ -133,7 +139,7 @@ def _on_loops(design: Design) -> list[FollowedLimit]:
         for item in design.requirements
         if item.quantity in LOOP_QUANTITIES
         for loop in judged_loops(item.loop, stages)
-        if loop in stages
+        if loop in stages and loop not in held
     ]
 
 
@@ -155,9 +161,16 @@ def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[Follo
     ]
 
 
-def _apart(design: Design, figures: Mapping[Figure, list[str]]) -> list[NotFollowed]:
+def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection[str]) -> list[NotFollowed]:
     """Give the requirements that do not follow, with what they limit."""
+    stages = tuple(name for name in LOOPS if name in design.controller.stages)
     return [
+        {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {loop} loop held"}
+        for item in design.requirements
+        if item.quantity in LOOP_QUANTITIES
+        for loop in judged_loops(item.loop, stages)
+        if loop in held
+    ] + [
         {"id": item.id, "words": QUANTITIES[item.quantity].words}
         for item in design.requirements
         if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from actuator_lti.quantities import AT_A_GLANCE
+from analyses.held_loops import HELD
 from analyses.loop_figures import LoopFigures
 from analyses.responses import frequency_grid
 from reports import document as doc
@@ -40,7 +41,7 @@ def section(
         "findings": plain(result[:SHOWN]),
         "more": max(len(result) - SHOWN, 0),
     }
-    status = worst_status([one.margins.stable for one in figures.values()])
+    status = worst_status([one.sound for one in figures.values()])
     if any(item["passed"] is False for item in items) or any(item.severity == "fail" for item in result):
         status = "fail"
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
@@ -55,7 +56,7 @@ def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> Glan
         cells.append(
             {
                 "label": quantity.label,
-                "value": shown(quantity, figures),
+                "value": shown(quantity, figures.judged),
                 "unit": quantity.shown[0],
                 "format": quantity.at_a_glance,
                 "limit": nearest["limit"] if nearest else None,
@@ -64,7 +65,9 @@ def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> Glan
                 "passed": nearest["passed"] if nearest else None,
             }
         )
-    stable = margin_row(figures)["stable"]
+    stable = margin_row(figures.judged)["stable"]
+    if figures.held is not None:
+        stable = {**stable, "text": f"{stable['text']}, {HELD[name]}"}
     return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": stable, "figures": cells}
 
 

@@ -55,7 +55,7 @@ def summary(result: Corners) -> str:
 
 def unmet(corner: Corner) -> str:
     """Name what a corner fails."""
-    doubts = {name: one.margins.stable for name, one in corner.figures.items() if not one.stable}
+    doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
     return ", ".join([*loops, *(one.id for one in corner.verdicts if one.passed is False)])
@@ -66,7 +66,7 @@ def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
     found = [
         (value, name)
         for name, one in corner.figures.items()
-        if one.stable and (value := quantity.read(one)) is not None
+        if one.sound and (value := quantity.read(one.judged)) is not None
     ]
     return min(found, key=lambda each: quantity.better * each[0], default=None)
 
@@ -110,6 +110,6 @@ def _row(corner: Corner, name: str, one: LoopFigures) -> Row:
     return {
         "corner": corner.name,
         "loop": LOOPS[name],
-        "stable": one.stable,
-        **{each.name: shown(each, one) for each in PER_LOOP},
+        "stable": one.sound is True,
+        **{each.name: shown(each, one.judged) for each in PER_LOOP},
     }

@@ -34,7 +34,7 @@ COLUMNS = [
 def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> Section:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
-        _row(name, form, result[name], forms["ideal"].get(name))
+        _row(name, form, result[name], forms.get("ideal", {}).get(name))
         for name in forms["sampled"]
         for form, result in forms.items()
         if name in result
@@ -75,7 +75,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
     row = {**cells(margins, response), "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
-    return row | ({"_status": "fail"} if figures.margins.stable is False else {})
+    return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:

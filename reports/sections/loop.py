@@ -19,6 +19,7 @@ from reports.numbers import fixed, seconds, to_minus
 from reports.numbers import hertz as hertz_words
 from reports.sections.margins import (
     MEANING,
+    by_itself_notes,
     evidence_notes,
     finite,
     margin_row,
@@ -43,7 +44,7 @@ STEP_POINTS = 300
 def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures | None = None) -> Section:
     """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
     grid = frequency_grid(figures)
-    title, status = LOOPS[name], worst_status([figures.margins.stable])
+    title, status = LOOPS[name], worst_status([figures.sound])
     blocks = [_facts(figures), open_bode(title, figures, grid, name=name)]
     if figures.stable:
         blocks.append(closed_bode(title, figures, grid, locked, name=name))
@@ -53,7 +54,12 @@ def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures
     if figures.step is not None:
         blocks.append(step(title, figures, locked, name=name))
     blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
-    notes = [*evidence_notes({title: figures}), *figures.margins.notes, *figures.notes]
+    notes = [
+        *by_itself_notes({title: figures}),
+        *evidence_notes({title: figures}),
+        *figures.margins.notes,
+        *figures.notes,
+    ]
     blocks += [doc.remark(note) for note in notes]
     return doc.section(
         f"loop-{name}", title, blocks, result=result(figures), intro=_intro(name, figures), status=status

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TypedDict, cast
 
 from actuator_lti.quantities import Quantity
+from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
@@ -64,9 +65,12 @@ CROSSING_COLUMNS = [
 def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> Section:
     """Make the section from the figures of the sampled, sliding loops."""
     named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
-    if locked is not None:
-        named["Current loop, rotor locked"] = locked
+    notes = by_itself_notes(named)
+    named = with_held(named)
+    if locked is not None and "Current loop, rotor held" not in named:
+        named["Current loop, rotor held"] = locked
     blocks = [
+        *(doc.text(note) for note in notes),
         margin_table(named),
         response_table(named),
         doc.details("Every crossing of every loop", [crossing_table(named)]),
@@ -76,7 +80,7 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
         "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
     ) + evidence_meaning(named)
-    status = worst_status([loop_figures.margins.stable for loop_figures in figures.values()])
+    status = worst_status([loop_figures.sound for loop_figures in figures.values()])
     return doc.section(
         "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status
     )
@@ -85,13 +89,11 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
 def result(figures: Mapping[str, LoopFigures]) -> str:
     """Say whether all loops are stable, and which has the smallest margins."""
     unstable = [
-        LOOPS[name].lower()
-        for name, loop_figures in figures.items()
-        if loop_figures.margins.stable is not True
+        LOOPS[name].lower() for name, loop_figures in figures.items() if loop_figures.sound is not True
     ]
     if unstable:
         return f"Not known to be stable: {', '.join(unstable)}."
-    rows = {LOOPS[name].lower(): margin_row(loop_figures) for name, loop_figures in figures.items()}
+    rows = {LOOPS[name].lower(): margin_row(loop_figures.judged) for name, loop_figures in figures.items()}
     words = []
     for margins, what, unit in (
         ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
@@ -103,6 +105,8 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
             words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
     count = {1: "The loop is", 2: "Both loops are"}.get(len(rows), f"All {len(rows)} loops are")
     count = f"{count} stable, {evidence_words(figures)}"
+    held = [f"{LOOPS[name].lower()} with the {HELD[name]}" for name, one in figures.items() if one.held]
+    count += f" ({', '.join(held)})" if held else ""
     return to_minus(f"{count}; {' and '.join(words)}." if words else f"{count}.")
 
 
@@ -206,7 +210,7 @@ def _stable_row(figures: LoopFigures) -> MarginRow:
     m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
     return {
-        "stable": {"text": m.verdict, "status": STATUS[m.stable]},
+        "stable": _state(figures),
         "evidence": {"text": m.evidence, "status": EVIDENCE_STATUS[m.evidence]},
         "gain_margin_db": finite(m.gain_margin_db),
         "gain_margin_hz": hertz(gain.frequency_rad_s) if gain else None,
@@ -219,6 +223,33 @@ def _stable_row(figures: LoopFigures) -> MarginRow:
         "s_peak_db": finite(m.sensitivity_peak_db),
         "disk_margin": disk.alpha if disk else None,
     }
+
+
+def _state(figures: LoopFigures) -> State:
+    """Say whether a loop is stable, or unstable only by itself."""
+    if figures.held is not None:
+        return {"text": "unstable by itself", "status": "warn"}
+    return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
+
+
+def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
+    """Put the held loop behind each that is unstable only by itself, under a name that says so."""
+    every: dict[str, LoopFigures] = {}
+    for label, figures in named.items():
+        every[label] = figures
+        if figures.held is not None:
+            every[f"{label}, {HELD[figures.loop.name]}"] = figures.held
+    return every
+
+
+def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
+    """Say of each loop that is unstable only by itself which case it is, and how it is judged."""
+    return [
+        f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as the load drives it away. With all loops "
+        f"closed the drive is stable. The loop is judged with the {HELD[figures.loop.name]}: stable."
+        for label, figures in named.items()
+        if figures.held is not None
+    ]
 
 
 def response_row(figures: LoopFigures) -> ResponseRow:

@@ -51,14 +51,10 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
 
 def _result(points: Sequence[OperatingPointFigures]) -> str:
     """Say the smallest phase margin over all operating points."""
-    unstable = [
-        point.label for point in points if any(f.margins.stable is False for f in point.figures.values())
-    ]
+    unstable = [point.label for point in points if any(f.sound is False for f in point.figures.values())]
     if unstable:
         return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
-    unknown = [
-        point.label for point in points if any(f.margins.stable is None for f in point.figures.values())
-    ]
+    unknown = [point.label for point in points if any(f.sound is None for f in point.figures.values())]
     if unknown:
         count = f"{len(unknown)} of {len(points)} operating points"
         return f"Stability is not known at {count}: {'; '.join(unknown)}."
@@ -85,6 +81,6 @@ def _row(point: OperatingPointFigures, scale: float) -> Row:
         row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
         row[f"{name}_band"] = response["minus3db_hz"]
-    if any(result.margins.stable is False for result in point.figures.values()):
+    if any(result.sound is False for result in point.figures.values()):
         row["_status"] = "fail"
     return row

@@ -45,7 +45,7 @@ def plant(design: Design, contact: float) -> tuple[np.ndarray, np.ndarray]:
 def coefficients(item: Filter, T: float) -> tuple[list[float], list[float]]:
     """b and a by substituting s = w0/tan(w0 T/2) (z - 1)/(z + 1)."""
     if item.kind == "biquad":
-        return list(item.b), list(item.a)
+        return list(item.b), [1.0, *item.a]
     w0 = item.frequency_rad_s
     if item.kind == "lowpass":
         top, bottom = [w0], [1.0, w0]

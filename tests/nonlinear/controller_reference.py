@@ -34,7 +34,7 @@ class Digital:
 def digital(item: Filter, T: float, x0: float) -> Digital:
     """A filter by scipy's bilinear transform, prewarped at its own frequency."""
     if item.kind == "biquad":
-        return Digital(np.array(item.b), np.array(item.a), x0)
+        return Digital(np.array(item.b), np.array([1.0, *item.a]), x0)
     if item.kind == "leadlag":
         w0 = sqrt(item.zero_rad_s * item.pole_rad_s)
         b, a = [1 / item.zero_rad_s, 1], [1 / item.pole_rad_s, 1]

@@ -41,8 +41,8 @@ def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
         lambda on: Filter(
             kind="skewed-notch", on=on, zero_rad_s=w(), pole_rad_s=w(), width_rad_s=w(), depth=0.2
         ),
-        lambda on: Filter(kind="biquad", on=on, b=(0.3, 0.1, 0.05), a=(2.0, -0.8, 0.3)),
-        lambda on: Filter(kind="biquad", on=on, b=(0.5,), a=(1.0, -0.5)),
+        lambda on: Filter(kind="biquad", on=on, b=(0.3, 0.1, 0.05), a=(-0.4, 0.15)),
+        lambda on: Filter(kind="biquad", on=on, b=(0.5,), a=(-0.5,)),
     ]
     count = int(rng.integers(0, 5))
     return tuple(kinds[rng.integers(len(kinds))](("torque", "speed")[rng.integers(2)]) for _ in range(count))

@@ -364,7 +364,7 @@ def test_any_stage_may_be_the_outermost() -> None:
         (
             changed(
                 velocity=replace(
-                    AMBER.controller.velocity, filters=(Filter(kind="biquad", b=(1.0,), a=(1.0, -1.0)),)
+                    AMBER.controller.velocity, filters=(Filter(kind="biquad", b=(1.0,), a=(-1.0,)),)
                 )
             ),
             "unit circle",

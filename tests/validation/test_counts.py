@@ -70,7 +70,7 @@ def test_a_counted_speed_has_its_cycle_at_the_border(encoder: dict[str, object])
     (cycle,) = cycles_of_quantisation(design)
     gain = 2.0 * design.angle_quantum_rad / (pi * cycle.inner_rad)
     free = without_nonlinearities(design)
-    louder = Filter(kind="biquad", on="speed", b=(gain,), a=(1.0,))
+    louder = Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,))
     velocity = replace(free.controller.velocity, filters=(louder,))
     loop = assemble_loops(replace(free, controller=replace(free.controller, velocity=velocity))).position
     poles = loop.closed_loop.poles()

@@ -1,0 +1,99 @@
+"""A pendulum that stands out level has no slope: cos of a quarter turn is 0, whatever its rounding leaves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, pi, radians
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design.model import Design, Gravity
+from actuator_lti.drive.operating import Operating, moment_slope
+from analyses.loop_figures import all_loop_figures
+
+QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
+
+
+def hung(name: str, gravity: Gravity | None, slope_Nm_rad: float = 0.0) -> Design:
+    design = load_design(name)
+    load = replace(design.load, path="back-drivable", gravity=gravity, moment_slope_Nm_rad=slope_Nm_rad)
+    return replace(design, load=load)
+
+
+def level(offset_rad: float) -> Gravity:
+    return Gravity(mass_kg=3.5, arm_m=0.28, offset_rad=offset_rad)
+
+
+@pytest.mark.parametrize("offset", QUARTERS)
+@pytest.mark.parametrize("name", ["ilr33-amber", "joint"])
+def test_level_is_without_slope(name: str, offset: float) -> None:
+    """Every loop is that of a drive without gravity, to the bit."""
+    with_it, without = hung(name, level(offset)), hung(name, None)
+    for form in ("sampled", "continuous", "ideal"):
+        ours, theirs = (assemble_loops(each, form=form).present for each in (with_it, without))
+        for loop in theirs:
+            a, b = ours[loop].plain_open, theirs[loop].plain_open
+            np.testing.assert_array_equal(a.A, b.A)
+    sampled = assemble_loops(with_it)
+    for loop in sampled.present.values():
+        m = stability_margins(loop.open_loop)
+        assert m.stable is True
+        assert all(abs(g.db) < 200.0 for g in m.gain_margins)
+        assert closed_loop_bandwidth(loop.closed_loop).resonance_peak_db < 10.0
+    many = linear_figures(Population(with_it, {}, 1))
+    assert all(many.stable(loop)[0] for loop in many.loops)
+
+
+def test_a_slope_beside_it_stays() -> None:
+    """k + m g l cos(angle), by hand; a hundredth of a degree off level is a slope."""
+    peak = 3.5 * 9.80665 * 0.28
+    for degrees in (0.0, 89.99, 90.01, 180.0, 269.9999, 360.0):
+        design = hung("joint", level(radians(degrees)))
+        expected = peak * cos(radians(degrees))
+        assert moment_slope(design, Operating()) == pytest.approx(expected, rel=1e-9)
+    assert moment_slope(hung("joint", level(pi / 2), -1e-9), Operating()) == pytest.approx(-1e-9, rel=1e-5)
+    assert moment_slope(hung("joint", None, -1e-14), Operating()) == -1e-14
+    balanced = hung("joint", level(0.0), -peak)  # a spring that takes the pendulum's slope
+    assert moment_slope(balanced, Operating()) == 0.0
+    turned = moment_slope(hung("joint", level(radians(60))), Operating(angle_rad=radians(30)))
+    assert turned == 0.0
+
+
+def test_stacked_designs_are_each_of_them_alone() -> None:
+    offsets = np.array([0.0, pi / 2, 2.0, 3 * pi / 2])
+    gravity = replace(level(0.0), offset_rad=offsets)
+    many = moment_slope(hung("joint", gravity), Operating())
+    alone = [moment_slope(hung("joint", level(each)), Operating()) for each in offsets]
+    assert many.tolist() == alone
+    assert (many == 0.0).tolist() == [False, True, False, True]
+
+
+SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
+
+
+@pytest.mark.parametrize("slope", SLOPES)
+def test_a_weak_spring_behind_a_pi(slope: float) -> None:
+    """T(0) = L0/(1 + L0) with L0 = Kp/Tn kM/k, however weak the spring."""
+    design = hung("ilr33-amber", None, slope)
+    law, N = design.controller.velocity, design.total_ratio
+    L0 = law.gain / law.integral_time_s * design.effective_motor.torque_constant_Nm_A * N**2 / -slope
+    band = closed_loop_bandwidth(assemble_loops(design).velocity.closed_loop)
+    assert 0.0 < band.resonance_peak_db < 2.0
+    assert band.dc_gain == pytest.approx(L0 / (1 + L0), rel=1e-9)
+
+
+@pytest.mark.parametrize("slope", SLOPES)
+def test_no_resonance_over_nothing(slope: float) -> None:
+    """A P velocity loop against a spring has T(0) = 0: what rounding leaves of it measures nothing."""
+    design = hung("joint", None, slope)
+    loops = assemble_loops(design)
+    refused: list[str] = []
+    figures = all_loop_figures(loops, refused=refused)
+    assert figures["velocity"].bandwidth is None
+    if figures["velocity"].stable:
+        assert any("at zero frequency" in note for note in figures["velocity"].notes)
+    many = linear_figures(Population(design, {}, 1))
+    assert not many.quantity("resonance_peak", "velocity")[0] > 20.0

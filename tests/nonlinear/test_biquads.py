@@ -1,0 +1,140 @@
+"""A biquad is (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2), a = [a1, a2], wherever a drive is written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design.model import Design, Filter, Limits
+from actuator_lti.drive.facts import torque_gain_Nm_rad
+from actuator_lti.errors import InputError
+from nonlinear import Drive, commands, simulate
+from nonlinear.filters import section
+
+IDENTITIES = [
+    ((1.0, 0.5, 0.2), (0.5, 0.2)),
+    ((1.0, 0.0, 0.1), (0.0, 0.1)),
+    ((1.0, -0.25), (-0.25,)),
+    ((1.0, 0.0, 0.0), (0.0, 0.0)),
+    ((1.0,), (0.0,)),
+]
+FILTERS = [
+    ((0.3, 0.1, 0.05), (-0.4, 0.15)),
+    ((0.9, 0.3), (0.0, 0.1)),  # no a1
+    ((0.2, 0.3, 0.5), (0.0, 0.0)),  # of finite length
+    ((0.0, 0.0, 1.0), (0.0,)),  # two periods of delay
+    ((0.5,), (-0.5,)),
+]
+
+
+def amber(*filters: Filter) -> Design:
+    design = load_design("ilr33-amber")
+    velocity = replace(design.controller.velocity, filters=filters, every=2)
+    position = replace(design.controller.position, every=4)
+    return replace(design, controller=replace(design.controller, velocity=velocity, position=position))
+
+
+def response(b: tuple[float, ...], a: tuple[float, ...], z: complex) -> complex:
+    """H(z) by its definition."""
+    return sum(c * z**-k for k, c in enumerate(b)) / (1 + sum(c * z**-k for k, c in enumerate(a, 1)))
+
+
+@pytest.mark.parametrize("place", ["torque", "speed"])
+@pytest.mark.parametrize(("b", "a"), IDENTITIES)
+def test_an_identity_is_no_filter(b: tuple[float, ...], a: tuple[float, ...], place: str) -> None:
+    plain, same = amber(), amber(Filter(kind="biquad", on=place, b=b, a=a))
+    z = np.exp(1j * np.array([0.01, 0.3, 2.0]))
+    for form in ("sampled", "continuous", "ideal"):
+        for name in ("velocity", "position"):
+            ours, theirs = (getattr(assemble_loops(each, form=form), name) for each in (same, plain))
+            at = z if form == "sampled" else np.log(z) / 1e-3
+            np.testing.assert_array_equal(ours.open_loop(at), theirs.open_loop(at))
+            assert stability_margins(ours.open_loop) == stability_margins(theirs.open_loop)
+    runs = [simulate(each, commands.step(0.05), duration_s=0.05, load_Nm=1.0) for each in (same, plain)]
+    np.testing.assert_array_equal(runs[0].output_angle_rad, runs[1].output_angle_rad)
+    np.testing.assert_array_equal(runs[0].current_A, runs[1].current_A)
+    assert section(same.controller.velocity.filters[0], 1e-4) == (1.0, 0.0, 0.0, 0.0, 0.0)
+    values = {"motor.rotor_inertia": plain.motor.rotor_inertia_kgm2 * np.array([0.5, 1.0, 2.0])}
+    ours, theirs = (linear_figures(Population(each, values, 3)) for each in (same, plain))
+    np.testing.assert_array_equal(ours.raw, theirs.raw)
+
+
+@pytest.mark.parametrize("place", ["torque", "speed"])
+@pytest.mark.parametrize(("b", "a"), FILTERS)
+def test_the_velocity_loop_has_the_filter_as_factor(
+    b: tuple[float, ...], a: tuple[float, ...], place: str
+) -> None:
+    """At the velocity period the loop is the loop without the filter times H(z), in every form."""
+    plain, filtered = (
+        assemble_loops(each).velocity for each in (amber(), amber(Filter(kind="biquad", on=place, b=b, a=a)))
+    )
+    for angle in (0.02, 0.4, 1.5):
+        z = np.exp(1j * angle)
+        ratio = filtered.open_loop(z) / plain.open_loop(z)
+        assert complex(ratio) == pytest.approx(response(b, a, z), rel=1e-9)
+    T = plain.period_s
+    item = Filter(kind="biquad", on=place, b=b, a=a)
+    loops = [assemble_loops(each, form="ideal").velocity for each in (amber(), amber(item))]
+    for angle in (0.02, 0.4, 1.5):  # the inverse of Tustin's rule: s = (2/T) j tan(angle/2)
+        s = 2j / T * np.tan(angle / 2)
+        ratio = loops[1].open_loop(s) / loops[0].open_loop(s)
+        assert complex(ratio) == pytest.approx(response(b, a, np.exp(1j * angle)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("b", "a"), FILTERS)
+def test_the_running_drive_and_the_facts_have_its_difference_equation(
+    b: tuple[float, ...], a: tuple[float, ...]
+) -> None:
+    """y_n = sum b_k x_(n-k) - sum a_k y_(n-k): the torque command of a P controller after a step of speed."""
+    design = amber(Filter(kind="biquad", b=b, a=a))
+    control = design.controller
+    velocity = replace(control.velocity, integral_time_s=None, every=1, gain=0.01)
+    control = replace(control, velocity=velocity, position=None, current=None)
+    drive = Drive(replace(design, controller=control, limits=Limits(voltage_V=1e9)))
+    expected: list[float] = []
+    got = []
+    for n in range(30):
+        past = sum(c for k, c in enumerate(b) if k <= n)
+        expected.append(past - sum(c * expected[n - k] for k, c in enumerate(a, 1) if k <= n))
+        got.append(drive.control(100.0, 0.0, 0.0, 0.0, 0.0))
+    scale = got[-1] / expected[-1]
+    np.testing.assert_allclose(got, scale * np.array(expected), rtol=1e-9, atol=1e-12)
+    assert scale == pytest.approx(0.01 * 100.0 * design.total_ratio, rel=1e-12)
+    ratio = torque_gain_Nm_rad(design) / torque_gain_Nm_rad(amber())
+    assert ratio == pytest.approx(sum(b) / (1 + sum(a)), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "allowed"),
+    [
+        ("a", "[1.0, 0.5, 0.2]", "1 or 2, a1 a2, after a leading 1"),
+        ("a", "[-2.1, 1.0]", "poles inside the unit circle"),
+        ("b", "[1, 2, 3, 4]", "1 to 3, b0 b1 b2"),
+    ],
+)
+def test_a_refusal_names_file_key_and_what_is_allowed(
+    tmp_path: Path, key: str, value: str, allowed: str
+) -> None:
+    lines = {"b": "[1.0]", "a": "[0.0]"} | {key: value}
+    shipped = files("actuator_lti.design").joinpath("shipped/ilr33-amber.toml").read_text()
+    table = "".join(f"{name} = {text}\n" for name, text in lines.items())
+    path = tmp_path / "mine.toml"
+    path.write_text(f'{shipped}\n[[control.velocity.filter]]\nkind = "biquad"\n{table}')
+    with pytest.raises(InputError) as refused:
+        load_design(path)
+    for word in (str(path), f"control.velocity.filter.1.{key}", allowed):
+        assert word in str(refused.value)
+
+
+def test_a_filter_made_in_python_is_refused_alike() -> None:
+    for b, a in (((1.0,), (1.0, 0.5, 0.2)), ((), (0.5,)), ((1.0,), (-2.1, 1.0))):
+        with pytest.raises(InputError, match="allowed: "):
+            section(Filter(kind="biquad", b=b, a=a), 1e-4)
+        with pytest.raises(InputError, match="allowed: "):
+            assemble_loops(amber(Filter(kind="biquad", b=b, a=a)))

@@ -1,0 +1,139 @@
+"""A load that pushes away: an inner loop alone is unstable, the drive is not, and is judged so everywhere."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from typer.testing import CliRunner
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design.model import Design, Requirement
+from analyses.held_loops import constant_load
+from analyses.loop_figures import all_loop_figures
+from analyses.requirements import all_pass, evaluate_requirements
+from analyses.tuning.problem import problem_of
+from reports.cli.app import build
+
+SET = ["--set", "load.path=back-drivable", "--set"]
+PUSHED = [*SET, "load.moment_slope=1 N*m/rad"]
+
+
+def pushed(slope_Nm_rad: float = 1.0) -> Design:
+    design = load_design("ilr33-amber")
+    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad)
+    return replace(design, load=load)
+
+
+def p_velocity(slope_Nm_rad: float) -> Design:
+    """Without the integral of the speed, which is the angle: the position loop alone holds the load."""
+    design = pushed(slope_Nm_rad)
+    velocity = replace(design.controller.velocity, integral_time_s=None)
+    return replace(design, controller=replace(design.controller, velocity=velocity))
+
+
+def held_phase_margin_deg(design: Design) -> float:
+    """PI(z) (1 - a)/(R (z - a)) behind the delay, a = exp(-R T/L): the winding alone, its voltage held."""
+    motor, law, T = design.effective_motor, design.controller.current, design.controller.period_s
+    R, a = motor.resistance_ohm, exp(-motor.resistance_ohm * T / motor.inductance_H)
+    assert design.controller.computing_delay_s == 0.0
+
+    def L(angle: float) -> complex:
+        z = np.exp(1j * angle)
+        pi = law.gain_V_A * (1 + T / law.integral_time_s * z / (z - 1))
+        return complex(pi * (1 - a) / (R * (z - a)))
+
+    crossover = brentq(lambda angle: abs(L(angle)) - 1.0, 1e-4, 3.1)
+    return float(np.degrees(np.angle(-L(crossover))))
+
+
+def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
+    design = pushed()
+    design = replace(design, controller=replace(design.controller, computing_delay_s=0.0))
+    figures = all_loop_figures(assemble_loops(design))
+    current = figures["current"]
+    assert current.margins.stable is False  # J s^2 + Cv s - k has a root on the right
+    assert current.sound is True
+    assert figures["position"].stable
+    expected = held_phase_margin_deg(design)
+    assert current.judged.margins.phase_margin_deg == pytest.approx(expected, abs=1e-6)
+    asked = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
+    verdicts = evaluate_requirements(replace(design, requirements=(asked,)), figures)
+    assert all_pass(verdicts)
+    found = {verdict.loop: verdict for verdict in verdicts}
+    assert found["current"].value == pytest.approx(expected, abs=1e-6)
+    assert "with the rotor held" in found["current"].reason
+    assert "held" not in found["velocity"].reason
+
+
+def test_a_p_velocity_loop_is_judged_under_a_constant_load() -> None:
+    """J s + Cv + kM Kp - k/s: unstable for every k > 0; with the position loop stable while kM Kp Kv > k."""
+    design = p_velocity(1.0)
+    figures = all_loop_figures(assemble_loops(design))
+    assert [figures[name].margins.stable for name in ("velocity", "position")] == [False, True]
+    free = replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0))
+    alone = stability_margins(assemble_loops(free).velocity.open_loop)
+    assert figures["velocity"].judged.margins == alone
+    assert constant_load(design) == free
+
+
+def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
+    """A slope beyond what the position loop holds, kM Kp Kv N^2 (P velocity): nothing is held."""
+    law, motor = p_velocity(1.0).controller, load_design("ilr33-amber").effective_motor
+    stiffness = motor.torque_constant_Nm_A * law.velocity.gain * law.position.gain
+    limit = stiffness * load_design("ilr33-amber").total_ratio ** 2
+    for share, stable in ((0.98, True), (1.02, False)):
+        figures = all_loop_figures(assemble_loops(p_velocity(share * limit)))
+        assert figures["position"].margins.stable is stable
+        assert figures["current"].sound is stable
+        assert figures["velocity"].sound is stable
+
+
+def test_many_designs_at_once_are_judged_alike() -> None:
+    slopes = np.array([-1.0, 0.0, 1.0, 100.0])
+    for make in (pushed, p_velocity):
+        many = linear_figures(Population(make(1.0), {"load.moment_slope": slopes}, 4), held=True)
+        for k, slope in enumerate(slopes):
+            single = all_loop_figures(assemble_loops(make(float(slope))))
+            for name, one in single.items():
+                assert many.stable(name)[k] == one.sound
+                for quantity, value in (("phase_margin", one.judged.margins.phase_margin_deg),
+                                        ("gain_margin", one.judged.margins.gain_margin_db)):  # fmt: skip
+                    expected = np.inf if value is None else value
+                    assert many.quantity(quantity, name)[k] == pytest.approx(expected, abs=1e-6)
+
+
+def test_tuning_starts_from_met_requirements() -> None:
+    design = pushed()
+    asked = tuple(
+        Requirement(id=q, quantity=q, unit=unit, loop="every", minimum=limit)
+        for q, unit, limit in (("phase_margin", "deg", 10.0), ("gain_margin", "dB", 3.0))
+    )
+    problem = problem_of(design, asked, {})
+    distances = problem.distances(problem.start[None, :], problem.all_corners[:1])
+    assert (distances > 0.0).all()
+
+
+def test_the_command_line_says_which_case_it_is() -> None:
+    run = CliRunner()
+    done = run.invoke(build(), ["margins", "ilr33-amber", *PUSHED])
+    assert done.exit_code == 0, done.output
+    first = " ".join(done.output.split())
+    assert first.startswith("PASS")
+    for words in ("all loops closed", "with the rotor held", "outer loops open and rotor free"):
+        assert words in first
+    done = run.invoke(build(), ["margins", "ilr33-amber", *PUSHED, "--json"])
+    made = json.loads(done.output)
+    assert (done.exit_code, made["passed"]) == (0, True)
+    assert made["loops"]["current"]["stable"] is False
+    assert made["loops"]["current"]["judged"]["how"] == "rotor held"
+    assert made["loops"]["current"]["judged"]["stable"] is True
+    gone = [*SET, "load.moment_slope=1e9 N*m/rad"]
+    done = run.invoke(build(), ["margins", "ilr33-amber", *gone])
+    assert done.exit_code == 1
+    assert "FAIL" in done.output
