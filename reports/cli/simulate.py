@@ -24,7 +24,11 @@ CommandOption = Annotated[
 ]
 AmplitudeOption = Annotated[
     float,
-    typer.Option("--amplitude", help="Peak at the output, deg (mm on a linear axis); a ramp: per second."),
+    typer.Option(
+        "--amplitude",
+        help="Peak, for the outermost loop: deg at the output (mm on a linear axis), deg/s (mm/s) of "
+        "a speed drive, A, V; a ramp: per second.",
+    ),
 ]
 FrequencyOption = Annotated[
     float, typer.Option("--frequency", metavar="HZ", help="Frequency; the first of a chirp or a set.")
@@ -41,7 +45,7 @@ DurationOption = Annotated[
     typer.Option("--duration", metavar="S", help="Duration; 1, or that of a stepped sine or a record."),
 ]
 BiasOption = Annotated[
-    float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
+    float, typer.Option("--bias-rate", help="Ramp added underneath: the amplitude's unit per second.")
 ]
 SlopeOption = Annotated[
     float,
@@ -56,7 +60,8 @@ LoadFileOption = Annotated[
     typer.Option("--load-file", metavar="CSV", help="Load torque over the time of the run: s, N m."),
 ]
 RecordOption = Annotated[
-    Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
+    Path | None,
+    typer.Option("--record", metavar="CSV", help="Recorded command: s, and the amplitude's unit."),
 ]
 HeldOption = Annotated[
     bool, typer.Option("--held", help="The record is a log of changes: each value holds until the next.")
@@ -119,7 +124,7 @@ def simulate(
         count=count,
         cycles=cycles,
     )
-    scale = unit_scale(drive)
+    scale = command_unit(drive)[1]
     with progress("simulating", quiet=quiet) as report:
         run = run_simulation(
             drive,
@@ -158,11 +163,12 @@ def run_time(command: Command, wanted_s: float | None) -> float:
     return wanted_s
 
 
-def unit_scale(drive: Design) -> float:
-    """Factor from the unit of the command line (deg, mm) to SI."""
-    from math import pi
+def command_unit(drive: Design) -> tuple[str, float]:
+    """The unit in which the command line takes the drive's command, and its factor to SI."""
+    from nonlinear.trajectory import COMMAND_UNITS
 
-    return 1e-3 if drive.axis == "linear" else pi / 180.0
+    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+    return unit, 1.0 / per_SI
 
 
 def build_command(
@@ -193,7 +199,8 @@ def build_command(
     from actuator_lti.errors import InputError
     from nonlinear import commands
 
-    peak = amplitude * unit_scale(drive)
+    unit, scale = command_unit(drive)
+    peak = amplitude * scale
     period = drive.controller.period_s
     last = to if to is not None else 10.0 * frequency
     if record is not None and kind not in (None, "recorded"):
@@ -203,7 +210,6 @@ def build_command(
     if start < 0.0 or not start < float("inf"):
         raise InputError(f"--start {start:g}: must be 0 or later")
     if record is not None:
-        unit = "mm" if drive.axis == "linear" else "deg"
         return commands.recorded(record, unit=unit, held=held).later(start)
     if kind == "recorded":
         raise InputError("--command recorded: needs --record CSV")
@@ -264,6 +270,7 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
     """Print the summary."""
     import math
 
+    from nonlinear.trajectory import COMMAND_UNITS
     from reports.cli.output import print_json, print_line
     from reports.sections.trajectory import summary
 
@@ -273,8 +280,12 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
         return
     detail = f" ({facts['status_detail']})" if facts["status_detail"] else ""
     print_line(f"{run.design_name}: {run.time_s.size} rows, status {facts['status']}{detail}")
+    unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
     for name, value in facts.items():
-        if isinstance(value, float):
+        if name.startswith(("largest_command", "largest_error")):
+            named = f"{name.split('_')[0]} {name.split('_')[1]}"
+            print_line(f"  {named:26} {value * per_SI:.6g} {unit}")
+        elif isinstance(value, float):
             print_line(f"  {_in_words(name, value)}")
     for name, use in run.limits.items():
         if math.isinf(use.limit):
