@@ -278,7 +278,7 @@ class Trajectory:
         if self.load_Nm is not None:
             names += ("load_Nm",)
         linear = self.axis == "linear"
-        out = {COMMANDED[self.stage]: self.reference_rad}
+        out: dict[str, np.ndarray] = {COMMANDED[self.stage]: self.reference_rad}
         out |= {name: getattr(self, name) for name in names if name != "reference_rad"}
         out = {"time_s": self.time_s} | out
         if linear:
