@@ -10,10 +10,12 @@ from actuator_lti.design.control import Stage
 from nonlinear.trajectory import COMMAND_UNITS, Floats, Trajectory
 
 STILL = 0.9  # of the span of the quarter before: a motion that has so much left does not die out
-SEEN = 2e-3  # of the size of the motion: smaller swings are not spoken of
+SEEN = 1e-4  # of the size of the motion: smaller swings are not spoken of
+PLAIN = 2e-3  # of the size of the motion: a smaller swing has to be regular, as noise is not
+REGULAR = 0.2  # of their mean: spread of the periods of a regular swing
 BAND = 0.02  # of the size of the motion: what moves less in the last quarter has settled
 HELD = 0.95  # of the last quarter: a limit that acts so long is sat on
-CROSSINGS = 4  # through the mean: two whole periods
+PERIODS = 2  # in the last half
 
 SETTLES: dict[Stage, Stage] = {
     "position": "position", "velocity": "velocity", "current": "current", "voltage": "velocity",
@@ -66,7 +68,8 @@ def conduct(run: Trajectory) -> Conduct:
     swing = float(np.ptp(output[last]))
     constant = np.ptp(reference[n - n // 2 :]) <= 1e-9 * max(float(np.abs(reference).max()), 1e-300)
     if constant and swing > SEEN * size and swing >= STILL * float(np.ptp(output[before])):
-        hertz = _frequency_hz(output[last], run.time_s[last])
+        half = slice(before.start, n)
+        hertz = _frequency_hz(output[half], run.time_s[half], regular=swing <= PLAIN * size)
         if hertz is not None:
             unit, factor = COMMAND_UNITS[run.axis, SETTLES[run.stage]]
             return Conduct("keeps oscillating", f"{0.5 * swing * factor:.3g} {unit} at {hertz:.3g} Hz")
@@ -87,10 +90,13 @@ def _judged(run: Trajectory) -> Floats:
     return run.motor_speed_rad_s / run.ratio if run.stage == "voltage" else run.followed
 
 
-def _frequency_hz(values: Floats, time: Floats) -> float | None:
-    """Frequency of a swing about its mean, by its crossings; ``None`` where it does not swing."""
-    middle = 0.5 * (values.max() + values.min())
-    crossings = np.flatnonzero(np.diff(np.signbit(values - middle)))
-    if crossings.size < CROSSINGS:
+def _frequency_hz(values: Floats, time: Floats, *, regular: bool) -> float | None:
+    """Frequency of a swing about its mean, by its rising crossings; ``None`` where it does not swing.
+
+    ``regular``: nor where its periods differ by more than `REGULAR`.
+    """
+    low = values < 0.5 * (values.max() + values.min())
+    periods = np.diff(time[np.flatnonzero(low[:-1] & ~low[1:])])
+    if periods.size < PERIODS or (regular and np.std(periods) > REGULAR * np.mean(periods)):
         return None
-    return float(0.5 * (crossings.size - 1) / (time[crossings[-1]] - time[crossings[0]]))
+    return float(1.0 / np.mean(periods))

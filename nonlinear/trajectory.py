@@ -247,8 +247,14 @@ class Trajectory:
         return ADVICE[self.status]
 
     def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
-        """Rows in which a limiter acts."""
-        return (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
+        """Rows in which a limiter acts; ``current`` not while the overload protection holds it down."""
+        rows = (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
+        overload, current = self.limits.get("overload"), self.limits.get("current")
+        if name != "current" or overload is None or current is None or overload.limit >= current.limit:
+            return rows
+        # a clamp that is noted once an update of its stage outlasts the protection by a few ticks
+        above = np.abs(self.current_command_A) > overload.limit * (1.0 + 1e-9)
+        return rows & ~self.limit_active("overload") & above
 
     @property
     def at_rest(self) -> npt.NDArray[np.bool_]:
