@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import exp, log
 from types import MappingProxyType
 
@@ -16,9 +16,11 @@ from analyses.friction_effects.cycles import LimitCycles, Settling
 from analyses.friction_effects.result import FrictionPoint
 from analyses.loop_figures import loop_figures
 from analyses.validation import QUICK, validate
-from analyses.validation.ledger import Entry
+from analyses.validation.at_rest import RestSweep
+from analyses.validation.ledger import Entry, to_the_command
 from analyses.validation.result import Validation
 from analyses.validation.unstable import growth_1_s, unstable_entry
+from reports.sections.sweep import _described_agreement
 from reports.sections.validation import summary
 
 EMPS = load_design("emps")
@@ -76,3 +78,23 @@ def test_a_hunting_drive_fails_by_name() -> None:
     hunts = replace(quiet, friction=FrictionEffects(EMPS, (point,), ""))
     assert hunts.verdict == "FAIL"
     assert "the drive hunts" in str(hunts)
+
+
+def test_words_of_the_command_name_only_what_is_there() -> None:
+    assert to_the_command(EMPS) == "the command"
+    control = EMPS.controller
+    assert control.position is not None
+    for key in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
+        fed = replace(control, position=replace(control.position, **{key: 0.5}))
+        assert to_the_command(replace(EMPS, controller=fed)) == "the command (with feed-forward)"
+
+
+def test_points_without_motion_are_left_out_without_a_warning() -> None:
+    """Half the size and a quarter turn late where both move: 6 dB and 90 deg; NaN and 0 elsewhere."""
+    described = np.array([1.0, np.nan, 1.0, complex(np.nan, np.nan)])
+    measured = np.array([-0.5j, 1.0, 0.0, 0.0])
+    nothing = np.zeros(4)
+    sweep = RestSweep(*([nothing] * len(fields(RestSweep))))
+    words = _described_agreement(replace(sweep, measured=measured, described=described))
+    assert words == "agrees with the simulation within 6 dB and 90 deg"
+    assert "not compared" in _described_agreement(replace(sweep, measured=nothing, described=described))
