@@ -240,7 +240,12 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     factor, unit = (1e3, "mm") if linear else (np.degrees(1.0), "deg")
     scale, time_unit = (1e3, "ms") if run.time_s[-1] < 1.0 else (1.0, "s")
     time = scale * run.time_s
-    angle.plot(time, factor * run.reference_rad, color=MUTED, linewidth=1.0, label="command")
+    panels = {"position": angle, "velocity": speed, "current": current, "voltage": voltage}
+    scales = {"position": factor, "velocity": run.ratio}
+    ordered = panels[run.stage]
+    ordered.plot(
+        time, scales.get(run.stage, 1.0) * run.reference_rad, color=MUTED, linewidth=1.0, label="command"
+    )
     angle.plot(time, factor * run.output_angle_rad, label="output")
     speed.plot(time, run.motor_speed_rad_s)
     current.plot(time, run.current_A)
@@ -252,7 +257,7 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     for panel in (angle, speed, current, voltage):
         _shade(panel, time, run.at_rest, MUTED)
         _shade(panel, time, run.limited, RED)
-    angle.legend()
+    ordered.legend()
     return [angle, speed, current, voltage]
 
 

@@ -22,8 +22,11 @@ class StaticThreshold:
         Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already
         does, ``inf`` where the drive is not strong enough.
     integral_time_s : float or None
-        Integral time of the velocity controller: with it any smaller command moves the output later, see
-        `waiting_time_s`; ``None`` where nothing integrates and the threshold is final.
+        Integral time of the velocity controller, else of the position controller: with one any smaller
+        command moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the
+        threshold is final.
+    outer_integral_time_s : float or None
+        That of the position controller, where the velocity controller integrates too.
     """
 
     load_Nm: float
@@ -31,6 +34,7 @@ class StaticThreshold:
     forward_rad: float
     backward_rad: float
     integral_time_s: float | None
+    outer_integral_time_s: float | None = None
 
     @property
     def smallest_rad(self) -> float:
@@ -38,12 +42,20 @@ class StaticThreshold:
         return min(self.forward_rad, self.backward_rad)
 
     def waiting_time_s(self, amplitude_rad: float) -> float:
-        """Time until a forward step moves the output: ``Tn (A0/A - 1)``; ``inf`` where it never does."""
+        """Time until a forward step moves the output: ``Tn (A0/A - 1)``; ``inf`` where it never does.
+
+        With a constant error the torque grows as ``1 + t/Tn``; two integrals one behind the other, of times T
+        and U, give ``1 + t/T + t/U + t^2/(2 T U)``.
+        """
         if amplitude_rad >= self.forward_rad:
             return 0.0
         if self.integral_time_s is None or amplitude_rad <= 0.0 or math.isinf(self.forward_rad):
             return math.inf
-        return self.integral_time_s * (self.forward_rad / amplitude_rad - 1.0)
+        more = self.forward_rad / amplitude_rad - 1.0
+        if self.outer_integral_time_s is None:
+            return self.integral_time_s * more
+        T, U = self.integral_time_s, self.outer_integral_time_s
+        return math.sqrt((T + U) ** 2 + 2.0 * T * U * more) - (T + U)
 
 
 def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
@@ -62,5 +74,9 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
         needed = breakaway_torque_Nm(design, load_Nm, direction)
         both[direction] = needed / gain if needed < strongest else math.inf
     velocity = design.controller.velocity
-    integral = velocity.integral_time_s if velocity is not None else None
-    return StaticThreshold(load_Nm, gain, both[1], both[-1], integral)
+    times = [
+        None if velocity is None else velocity.integral_time_s,
+        design.controller.position_loop.integral_time_s,
+    ]
+    integrals = [one for one in times if one is not None] + [None, None]
+    return StaticThreshold(load_Nm, gain, both[1], both[-1], integrals[0], integrals[1])

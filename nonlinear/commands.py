@@ -386,15 +386,20 @@ def recorded(
     path: str | PathLike[str], *, time_column: str | int = 0, angle_column: str | int = 1, unit: str = "deg",
     delimiter: str = ",", held: bool = False,
 ) -> Command:  # fmt: skip
-    """Recorded command from a CSV file with a header line: times in s, angles in deg, rad, mm or m.
+    """Recorded command from a CSV file with a header line: times in s, values in deg, rad, mm or m,
+    one of these per second, A or V: what the drive's outermost stage takes.
 
     ``held``: a log of changes, each value held until the next (`events`).
     """
     from nonlinear.records import read_columns
 
-    scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0}.get(unit)
+    scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0, "A": 1.0, "V": 1.0}.get(
+        unit.removesuffix("/s") if unit not in ("A/s", "V/s") else unit
+    )
     if scale is None:
-        raise InputError(f"unit = {unit!r}: must be deg, rad, mm or m", where=str(path))
+        raise InputError(
+            f"unit = {unit!r}: must be deg, rad, mm, m, these per second, A or V", where=str(path)
+        )
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
     make = events if held else sampled
     return make(times, angles * scale, where=str(path))

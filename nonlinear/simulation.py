@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from threading import Thread
@@ -31,7 +31,7 @@ from nonlinear.setup import (
     put_torque,
     ticks_of,
 )
-from nonlinear.trajectory import STATUS, State, Trajectory
+from nonlinear.trajectory import STATUS, LimitUse, State, Trajectory
 from nonlinear.watch import watch
 from nonlinear.wrap import wrap
 
@@ -175,7 +175,17 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
     run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
-    return replace(run, load_Nm=_load(row, history))
+    return replace(run, load_Nm=_load(row, history), limits=_named_limits(run))
+
+
+def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
+    """The uses of the limits; the clamp at the continuous current is the overload protection's alone."""
+    if "overload" not in run.limits or not run.limits["overload"].active or not run.limits["current"].active:
+        return run.limits
+    rows = np.flatnonzero(run.limit_active("current"))
+    first = float(run.time_s[rows[0]]) if rows.size else None
+    own = replace(run.limits["current"], fraction=rows.size / run.time_s.size, first_time_s=first)
+    return {**run.limits, "current": own}
 
 
 def _load(row: Floats, history: Floats) -> Floats | None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.control import Stage
+from actuator_lti.design.model import Axis
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -17,6 +19,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Floats = npt.NDArray[np.float64]
+COMMANDED: dict[Stage, str] = {
+    "position": "reference_rad",
+    "velocity": "output_speed_reference_rad_s",
+    "current": "current_reference_A",
+    "voltage": "voltage_reference_V",
+}
+"""The column of the command, by the stage that takes it."""
+COMMAND_UNITS: dict[tuple[Axis, Stage], tuple[str, float]] = {
+    ("rotary", "position"): ("deg", 180.0 / np.pi),
+    ("linear", "position"): ("mm", 1e3),
+    ("rotary", "velocity"): ("deg/s", 180.0 / np.pi),
+    ("linear", "velocity"): ("mm/s", 1e3),
+    ("rotary", "current"): ("A", 1.0),
+    ("linear", "current"): ("A", 1.0),
+    ("rotary", "voltage"): ("V", 1.0),
+    ("linear", "voltage"): ("V", 1.0),
+}
+"""The unit in which a command is given and shown, and what one SI unit is in it."""
 Status = Literal["ok", "too many events", "not finite", "cancelled"]
 STATUS: dict[int, Status] = {
     at.OK: "ok",
@@ -148,6 +168,11 @@ class Trajectory:
 
     Attributes
     ----------
+    stage : str
+        The outermost stage, which takes the command: ``reference_rad`` is in its unit (rad or rad/s at the
+        output, A, V).
+    ratio : float
+        Motor over output.
     limit_flags : ndarray of uint16
         Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32
         limit in front of the torque filters, 64 overload protection, 128 profile of the command.
@@ -171,7 +196,7 @@ class Trajectory:
     """
 
     design_name: str
-    axis: str
+    axis: Axis
     period_s: float
     time_s: Floats
     reference_rad: Floats
@@ -196,6 +221,15 @@ class Trajectory:
     coupling_torque_Nm: Floats | None = None
     load_Nm: Floats | None = None
     parameters_hash: str = ""
+    stage: Stage = "position"
+    ratio: float = 1.0
+
+    @property
+    def followed(self) -> Floats:
+        """What the command orders, in the command's unit: output angle or speed, current, voltage."""
+        if self.stage == "velocity":
+            return self.motor_speed_rad_s / self.ratio
+        return {"current": self.current_A, "voltage": self.voltage_V}.get(self.stage, self.output_angle_rad)
 
     @property
     def probe_before(self) -> Floats:
@@ -213,8 +247,14 @@ class Trajectory:
         return ADVICE[self.status]
 
     def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
-        """Rows in which a limiter acts."""
-        return (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
+        """Rows in which a limiter acts; ``current`` not while the overload protection holds it down."""
+        rows = (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
+        overload, current = self.limits.get("overload"), self.limits.get("current")
+        if name != "current" or overload is None or current is None or overload.limit >= current.limit:
+            return rows
+        # a clamp that is noted once an update of its stage outlasts the protection by a few ticks
+        above = np.abs(self.current_command_A) > overload.limit * (1.0 + 1e-9)
+        return rows & ~self.limit_active("overload") & above
 
     @property
     def at_rest(self) -> npt.NDArray[np.bool_]:
@@ -244,7 +284,11 @@ class Trajectory:
         if self.load_Nm is not None:
             names += ("load_Nm",)
         linear = self.axis == "linear"
-        out = {_on(name) if linear else name: getattr(self, name) for name in names}
+        out: dict[str, np.ndarray] = {COMMANDED[self.stage]: self.reference_rad}
+        out |= {name: getattr(self, name) for name in names if name != "reference_rad"}
+        out = {"time_s": self.time_s} | out
+        if linear:
+            out = {_on(name): values for name, values in out.items()}
         for name in self.limits:
             out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
         out["at_rest"] = self.at_rest
@@ -310,4 +354,5 @@ class Trajectory:
 
 def _on(name: str) -> str:
     """A column's name on a linear axis."""
+    name = name.replace("output_speed_reference_rad_s", "velocity_reference_m_s")
     return name.replace("load_Nm", "load_force_N").replace("_rad", "_m")

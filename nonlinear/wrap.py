@@ -52,6 +52,8 @@ def wrap(
         twist_rad=elastic[1],
         coupling_torque_Nm=elastic[2],
         parameters_hash=digest,
+        stage=design.controller.outermost,
+        ratio=float(row[at.RATIO]),
     )
 
 

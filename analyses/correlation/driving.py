@@ -28,7 +28,7 @@ STAGES = ("position", "velocity", "current", "voltage")
 COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("rotary", "position"): ("reference",),
     ("linear", "position"): ("position_reference",),
-    ("rotary", "velocity"): ("speed_reference",),
+    ("rotary", "velocity"): ("output_speed_reference", "speed_reference"),
     ("linear", "velocity"): ("velocity_reference",),
     ("rotary", "current"): ("current_reference", "torque_reference"),
     ("linear", "current"): ("current_reference", "force_reference"),

@@ -34,7 +34,7 @@ class Threshold:
     static : StaticThreshold
         What the gains foresee.
     waiting : tuple of Waiting
-        Steps below the threshold, where the speed controller integrates.
+        Steps below the threshold, where a controller integrates and none differentiates the step.
     simulated_rad : float or None
         Smallest forward step that ever moves the output, where nothing integrates.
     resolution : float
@@ -53,7 +53,8 @@ def threshold(design: Design, load_Nm: float, settling_ticks: int) -> Threshold 
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if static.integral_time_s is not None:
-        return Threshold(static, _waiting(design, static), None, 0.0)
+        kicks = design.controller.position_loop.derivative_time_s > 0.0  # a step's own kick moves it at once
+        return Threshold(static, () if kicks else _waiting(design, static), None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes, 4 * settling_ticks) < math.inf
     first = float(sizes[np.argmax(moved)]) if moved.any() else None

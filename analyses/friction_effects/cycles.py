@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Design, Instruments
+from actuator_lti.drive.operating import dry_torque
 from analyses.drive_figures import drive_figures
 from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
 from analyses.friction_effects.stick_slip import StickSlipCycle
@@ -152,9 +153,14 @@ def limit_cycles(
     return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
 
 
+def dry_Nm(design: Design, load_Nm: float) -> float:
+    """Dry friction at the motor, forward and backward together; of a friction map that at its first point."""
+    return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
+
+
 def described_cycles(design: Design, load_Nm: float) -> tuple[ForeseenCycle, ...]:
     """Limit cycles by describing function, up to the top speed of the drive."""
-    if design.friction.dry_Nm(load_Nm, 1) + design.friction.dry_Nm(load_Nm, -1) <= 0.0:
+    if dry_Nm(design, load_Nm) <= 0.0:
         return ()
     top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
     return foreseen_cycles(design, load_Nm, top if 0.0 < top < math.inf else 1e3)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, dry_torque
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 
@@ -78,7 +78,7 @@ def at_load(cycle: ForeseenCycle, design: Design, from_load_Nm: float, load_Nm: 
 
 
 def _mean_dry(design: Design, load_Nm: float) -> float:
-    return 0.5 * (design.friction.dry_Nm(load_Nm, 1) + design.friction.dry_Nm(load_Nm, -1))
+    return 0.5 * float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
 
 
 def _matrix(design: Design, load_Nm: float, speed: float) -> tuple[np.ndarray, tuple[str, ...], float]:

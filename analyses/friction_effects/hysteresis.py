@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import dry_torque
 from analyses.static_threshold import StaticThreshold
 from nonlinear import commands, simulate
 
@@ -23,7 +24,7 @@ class Hysteresis:
     Attributes
     ----------
     amplitude_rad, frequency_hz : float
-        Of the triangle; the width depends on its rate where the speed controller integrates.
+        Of the triangle; the width depends on its rate where a controller integrates.
     command_rad, output_rad : ndarray
         One period, thinned.
     width_rad : float
@@ -70,9 +71,8 @@ def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling
     shown = slice(-ticks, None, max(1, ticks // POINTS))
     predicted = None
     if static.integral_time_s is None:
-        friction = design.friction
-        both = friction.dry_Nm(load_Nm, 1) + friction.dry_Nm(load_Nm, -1)
-        predicted = both / static.torque_gain_Nm_rad
+        both = dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1)
+        predicted = float(both) / static.torque_gain_Nm_rad
     return Hysteresis(
         amplitude, 1.0 / period, run.reference_rad[shown], run.output_angle_rad[shown],
         widths[1], widths[0], float(np.max(np.abs(outputs[1] - outputs[0]))), predicted,

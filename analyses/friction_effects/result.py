@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
-from analyses.friction_effects.cycles import LimitCycles, described_cycles, limit_cycles
+from analyses.friction_effects.cycles import LimitCycles, described_cycles, dry_Nm, limit_cycles
 from analyses.friction_effects.describing import ForeseenCycle, at_load
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.friction_effects.stick_slip import stick_slip_cycle
@@ -52,15 +53,16 @@ class FrictionEffects:
     ----------
     design : Design
     points : tuple of FrictionPoint
-    integrates : bool
-        Whether the speed controller integrates: then friction leaves no lasting error by itself.
+    integrator : str
+        The controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no lasting error
+        by itself; empty where none does.
     reason : str
         Why there is nothing to show; then ``points`` is empty.
     """
 
     design: Design
     points: tuple[FrictionPoint, ...]
-    integrates: bool
+    integrator: str
     reason: str = ""
 
 
@@ -83,23 +85,33 @@ def friction_effects(
         As `assemble_loops` and `simulate`.
     """
 
-    velocity = design.controller.velocity
-    integrates = velocity is not None and velocity.integral_time_s is not None
+    integrator = _integrator(design)
     loads = design.validation.loads_Nm
-    if not any(design.friction.dry_Nm(load, way) > 0.0 for load in loads for way in (1, -1)):
-        return FrictionEffects(design, (), integrates, "the design has no dry friction")
+    if not any(dry_Nm(design, load) > 0.0 for load in loads):
+        return FrictionEffects(design, (), integrator, "the design has no dry friction")
     loops = assemble_loops(design) if loops is None else loops
     settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
     points: list[FrictionPoint] = []
-    most = max(loads, key=lambda load: design.friction.dry_Nm(load, 1) + design.friction.dry_Nm(load, -1))
+    most = max(loads, key=lambda load: dry_Nm(design, load))
     described = described_cycles(design, most)
     for load in loads:
-        dry = design.friction.dry_Nm(load, 1) + design.friction.dry_Nm(load, -1)
-        scaled = tuple(at_load(cycle, design, most, load) for cycle in described if dry > 0.0)
+        scaled = tuple(
+            at_load(cycle, design, most, load) for cycle in described if dry_Nm(design, load) > 0.0
+        )
+        if design.friction.points and load != most:  # a map does not grow in proportion to the load
+            scaled = described_cycles(design, load)
         points.append(_point(design, loops, load, settling, scaled))
         if progress is not None:
             progress(len(points), len(loads))
-    return FrictionEffects(design, tuple(points), integrates)
+    return FrictionEffects(design, tuple(points), integrator)
+
+
+def _integrator(design: Design) -> str:
+    """The controller whose integral overcomes dry friction: that of the speed, else of the position."""
+    control = design.controller
+    if control.velocity is not None and control.velocity.integral_time_s is not None:
+        return "speed"
+    return "" if control.position_loop.integral_time_s is None else "position"
 
 
 def _point(
@@ -108,7 +120,7 @@ def _point(
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
     result = threshold(design, load_Nm, settling_ticks)
     loop = None if result is None else hysteresis(design, load_Nm, result.static, settling_ticks)
-    dry = design.friction.dry_Nm(load_Nm, 1)
+    dry = float(dry_torque(design, load_Nm, 1))
     breakaway = None if result is None else result.static.forward_rad
     slips = None if result is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
     cycles = limit_cycles(design, load_Nm, step, breakaway, slips, described)

@@ -32,7 +32,11 @@ class AmplitudeBode:
         Every amplitude of the map.
     minus3db_hz, minus90deg_hz : ndarray, shape (a,)
         First crossing, interpolated on the logarithm of frequency; NaN where there is none in the range
-        (`lowest_hz`: already below at the lowest frequency).
+        (`below_from_start`: already below at the lowest frequency), and where it lies beside points that are
+        not steady: a missing point is no value.
+    minus3db_range_hz : ndarray, shape (a, 2)
+        Between which frequencies of the map the gain first falls through -3 dB, as far as steady points tell:
+        from 0 where the first of them is below already, to inf where none is.
     below_from_start : ndarray of bool, shape (a,)
         Whether the gain is below -3 dB at the lowest frequency already.
     linear_minus3db_hz, linear_minus90deg_hz : float or None
@@ -49,6 +53,7 @@ class AmplitudeBode:
     all_amplitude_rad: np.ndarray
     minus3db_hz: np.ndarray
     minus90deg_hz: np.ndarray
+    minus3db_range_hz: np.ndarray
     below_from_start: np.ndarray
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
@@ -78,6 +83,7 @@ def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode
         all_amplitude_rad=amplitude_map.amplitude_rad,
         minus3db_hz=first_3,
         minus90deg_hz=first_90,
+        minus3db_range_hz=np.array([crossing_range(hz, row, MINUS_3DB) for row in gain]),
         below_from_start=gain[:, 0] < MINUS_3DB,
         linear_minus3db_hz=_number(_crossing(hz, linear_db, MINUS_3DB)),
         linear_minus90deg_hz=_number(_crossing(hz, linear_deg, -90.0)),
@@ -85,14 +91,30 @@ def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:
-    """Give the first frequency at which the values fall through a level; NaN where they do not."""
-    above = values >= level
-    falls = np.flatnonzero(above[:-1] & ~above[1:] & np.isfinite(values[1:]))
-    if not falls.size:
+    """Give the first frequency at which the values fall through a level; NaN where it is not known."""
+    low, high = crossing_range(hz, values, level)
+    k = int(np.searchsorted(hz, low))
+    if low == 0.0 or not math.isfinite(high) or hz[k + 1] != high or not math.isfinite(values[k + 1]):
         return math.nan
-    k = int(falls[0])
     part = (values[k] - level) / (values[k] - values[k + 1])
     return float(hz[k] * (hz[k + 1] / hz[k]) ** part)
+
+
+def crossing_range(hz: np.ndarray, values: np.ndarray, level: float) -> tuple[float, float]:
+    """The frequencies between which the values first fall through a level; what is NaN tells nothing.
+
+    Examples
+    --------
+    >>> import math
+    >>> import numpy as np
+    >>> crossing_range(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.0, math.nan, -5.0, -9.0]), -3.0)
+    (1.0, 4.0)
+    """
+    known = np.flatnonzero(~np.isnan(values))
+    above = values[known] >= level
+    first = int(np.argmin(above)) if known.size and not above.all() else known.size
+    low = float(hz[known[first - 1]]) if first > 0 else 0.0
+    return low, float(hz[known[first]]) if first < known.size else math.inf
 
 
 def _number(value: float) -> float | None:

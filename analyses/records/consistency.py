@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from analyses.records.factors import explaining, named_factor
@@ -18,6 +19,7 @@ ALIKE = 0.9
 OVER = 1.2
 ELECTRICAL_FACTOR = 2.0
 SMOOTH_HZ = 20.0
+IN_MOTION = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +73,12 @@ def _smooth(record: Record, values: FloatArray) -> FloatArray:
     share = 2.0 * SMOOTH_HZ * record.period_s
     if share >= 0.5 or len(values) < 60:
         return values
-    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values), dtype=np.float64)
+    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"), dtype=np.float64)
+
+
+def _moving(*signals: FloatArray) -> NDArray[np.bool_]:
+    """Where one of some signals is not small: in a long rest there is nothing but noise."""
+    return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
 
 
 def _inner(values: FloatArray) -> FloatArray:
@@ -93,20 +100,26 @@ def _rate(design: Design, record: Record) -> Finding | None:
     name = "velocity" if design.axis == "linear" else "speed"
     if place is None or name not in record.signals:
         return None
-    rate = _inner(np.gradient(_smooth(record, place[1]), record.time_s))
+    # over each interval the same filter on both, the slope first: they agree up to the ends, and a motion
+    # that begins with the record counts; a speed that jumps inside an interval lies between its two samples
+    rate = _smooth(record, np.diff(place[1]) / np.diff(record.time_s))
     if not np.any(rate):
         return None
-    ratio, alike = _ratio(_inner(_smooth(record, record[name])), rate)
+    first, last = (_smooth(record, values) for values in (record[name][:-1], record[name][1:]))
+    speed = 0.5 * (first + last)
+    moves = _moving(rate, speed)
+    ratio, alike = _ratio(speed[moves], rate[moves])
+    between = 0.5 * abs(_ratio((last - first)[moves], rate[moves])[0])
     subject = f"{name} against the rate of the {place[0]}"
     if abs(alike) < ALIKE:
         return Finding(
             subject=subject,
             passed=False,
-            text=f"they are not alike (cosine {alike:.2f}){_other(record, name, rate)}",
+            text=f"they are not alike (cosine {alike:.2f}){_other(record, name, rate, moves)}",
         )
     off = abs(ratio - 1.0)
     said = f"the {name} is {ratio:.4g} times the rate of the {place[0]}"
-    if off <= RATE_TOLERANCE:
+    if off <= RATE_TOLERANCE + between:
         return Finding(subject=subject, passed=True, text=f"{said}: one clock, one scale")
     factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
     if factor is not None:
@@ -135,18 +148,20 @@ def _clock(design: Design, record: Record) -> Finding | None:
     return Finding(subject=subject, passed=None, text=text)
 
 
-def _other(record: Record, name: str, rate: FloatArray) -> str:
+def _other(record: Record, name: str, rate: FloatArray, moves: NDArray[np.bool_]) -> str:
     """The signal that is more like the rate, if there is one: two columns are swapped."""
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):
             continue
-        if abs(_ratio(_inner(_smooth(record, values)), rate)[1]) > 0.97:
+        if abs(_ratio(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
             return f"; {other} is: are the columns of {name} and {other} swapped?"
     return ""
 
 
 def _reduction(design: Design, record: Record) -> Finding | None:
     if not {"angle", "output_angle"} <= set(record.signals) or design.axis == "linear":
+        return None
+    if not any(np.ptp(record[name]) > 0.0 for name in ("angle", "output_angle")):
         return None
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
     ratio, alike = _ratio(a, design.total_ratio * b)
@@ -161,12 +176,17 @@ def _reduction(design: Design, record: Record) -> Finding | None:
 
 
 def _twist_share(design: Design, record: Record) -> float:
-    """What play and the largest moment twist the coupling by, as a share of the output's motion (rms)."""
+    """What play, the largest moment and the load's inertia (rms) twist the coupling by.
+
+    A share of the output's motion (rms).
+    """
     if design.coupling is None:
         return 0.0
     own = record["output_angle"]
     moment = float(np.max(np.abs(record["torque"]))) if "torque" in record.signals else 0.0
     moment = max(moment, float(np.max(np.abs(design.load.moment_Nm(own)))))
+    slope = np.gradient(np.gradient(_smooth(record, own), record.time_s), record.time_s)
+    moment += design.load.inertia_kgm2 * float(np.sqrt(np.mean(_inner(slope) ** 2)))
     behind = design.ratio_behind_coupling
     twist = 0.5 * design.coupling.play_rad + moment / behind / design.coupling.stiffness_Nm_rad
     return twist / behind / max(float(np.std(own)), 1e-300)
@@ -213,6 +233,7 @@ def _command(design: Design, record: Record) -> Finding | None:
         ("position_reference", "position"),
         ("reference", "output_angle"),
         ("reference", "angle"),
+        ("output_speed_reference", "speed"),
         ("speed_reference", "speed"),
         ("velocity_reference", "velocity"),
         ("current_reference", "current"),
@@ -222,9 +243,11 @@ def _command(design: Design, record: Record) -> Finding | None:
         if command not in record.signals or answer not in record.signals:
             continue
         values = record[answer]
-        if (command, answer) == ("reference", "angle"):
+        if (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed")):
             values = values / design.total_ratio
         a, b = (part - part[0] for part in (values, record[command]))
+        if not np.any(b):  # a step that begins with the record tells no ratio
+            continue
         ratio, alike = _ratio(a, b)
         if abs(alike) < 0.7:
             return Finding(

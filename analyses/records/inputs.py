@@ -53,7 +53,11 @@ def spec_of_names(
                 why[column] = f"the time is read from {time}"
             continue
         result = _signal(column, why)
-        if result is not None and result.name in signals:
+        if result is not None and result.name in signals and _at_the_output(column, result, signals):
+            before = signals[result.name].column
+            why[str(before)] = f"{MEANINGS[result.name]} is read from {column}"
+            signals[result.name] = result
+        elif result is not None and result.name in signals:
             why[column] = f"{MEANINGS[result.name]} is read from {signals[result.name].column}"
         elif result is not None:
             signals[result.name] = result
@@ -62,6 +66,14 @@ def spec_of_names(
     unit = taken_apart(time).unit or "s"
     read = TimeColumn(column=time, unit=unit)
     return RecordSpec(format=layout, time=read, signals=tuple(signals.values())), why
+
+
+def _at_the_output(column: str, result: SignalColumn, signals: Mapping[str, SignalColumn]) -> bool:
+    """Whether a column is the output's, where the motor's was taken: behind a coupling they differ."""
+    before = signals[result.name].column
+    if not isinstance(before, str):
+        return False
+    return taken_apart(column).base.startswith("output_") and taken_apart(before).base.startswith("motor_")
 
 
 def _signal(column: str, why: dict[str, str]) -> SignalColumn | None:

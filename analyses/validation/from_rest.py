@@ -14,7 +14,7 @@ from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.bias_motion import has_to_stand
 from analyses.validation.conditional import step_rows
-from analyses.validation.ledger import Entry, entry, not_judged
+from analyses.validation.ledger import Entry, entry, not_judged, to_the_command
 from analyses.validation.own_error import carried_on
 from analyses.validation.reading import Reading, first_fall
 from analyses.validation.step import SETTLED, UNSETTLED
@@ -104,7 +104,8 @@ def _reason(design: Design, result: BatchResult, k: int) -> str:
     words = [f"{LIMITERS[name].words} {share:.3g} %" for name, share in shares.items() if share > 0.0]
     if result.events[k] == 0 and result.stick_fraction[k] > 0.99:
         return "no motion: dry friction holds the rotor"
-    return ", ".join([*words, *nonlinear_parts(design)])
+    named = {LIMITERS[name].words for name, share in shares.items() if share > 0.0}
+    return ", ".join([*words, *(part for part in nonlinear_parts(design) if part not in named)])
 
 
 def nonlinear_parts(design: Design) -> list[str]:
@@ -140,7 +141,7 @@ def rest_entries(
     sample = figures.step.period_s or 0.0  # both are read at samples
     scale, unit = (1e3, "mm") if design.axis == "linear" else (degrees(1.0), "deg")
     for k, amplitude in enumerate(steps.amplitude_rad):
-        condition = f"from rest, step of {amplitude * scale:.3g} {unit} of the command (with feed-forward)"
+        condition = f"from rest, step of {amplitude * scale:.3g} {unit} of {to_the_command(design)}"
         over = 100.0 * steps.error[k]
         for quantity, of, wanted, seen, error, least in (
             ("rise_time", "s", figures.step.rise_time_s, steps.rise_time_s[k], steps.rise_error_s[k], sample),
@@ -210,8 +211,9 @@ def _sweep_entries(design: Design, figures: LoopFigures, sweep: RestSweep, dc: R
         parts.append("seen between the samples of the position loop as well")
     if dc.value is None:
         parts.append("the steps from rest end differently: the value at zero frequency is not known")
-    reason = ", ".join([*parts, acting] if acting else parts)
-    condition = "response to the command (with feed-forward), from rest, sine clear of every limit"
+    reason = ", ".join(dict.fromkeys([*parts, acting] if acting else parts))
+    sine = "sine that reaches a limit" if acting else "sine clear of every limit"
+    condition = f"response to {to_the_command(design)}, from rest, {sine}"
     spread = float(sweep.unsteadiness.max())
     rows = []
     for quantity, predicted, values, level, error in (

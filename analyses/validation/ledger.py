@@ -260,13 +260,24 @@ def _step_entries(name: str, figures: LoopFigures, measured: Measured) -> list[E
     ]
 
 
+def to_the_command(design: Design) -> str:
+    """What a response to the command holds beside the loop, in words."""
+    place = design.controller.position
+    shares = (
+        ()
+        if place is None
+        else (place.feedforward, place.acceleration_feedforward, place.friction_feedforward)
+    )
+    return "the command (with feed-forward)" if any(shares) else "the command"
+
+
 def command_entry(design: Design, sweep: Sweep, system: Any, slowest_ticks: float) -> Entry:
     """The response to the command, with feed-forward and filters, at its worst point.
 
     ``slowest_ticks`` is the time constant of the slowest mode: what the last window still holds of it.
     """
     loop = design.controller.outermost
-    words = "response to the command (with feed-forward), small signal"
+    words = f"response to {to_the_command(design)}, small signal"
     valid = sweep.valid
     if not valid.any():
         why = f"no frequency could be measured: {most_frequent(sweep.reason)}"

@@ -125,9 +125,55 @@ class Validation:
         return any(row.passed is not None for row in self.ledger)
 
     @property
+    def unstable(self) -> tuple[str, ...]:
+        """Loops that are not stable."""
+        return tuple(name for name, loop in self.loops.items() if loop.figures.margins.stable is False)
+
+    @property
+    def undecided(self) -> tuple[str, ...]:
+        """Loops of which the data do not tell whether they are stable."""
+        return tuple(name for name, loop in self.loops.items() if loop.figures.margins.stable is None)
+
+    @property
+    def instability(self) -> str:
+        """Which loops are not known to be stable, and what the simulator says of it; else empty."""
+        said = {row.loop: row for row in self.ledger if row.quantity == "stability"}
+        parts = []
+        for name in (*self.unstable, *self.undecided):
+            row = said.get(name)
+            if name in self.undecided:
+                parts.append(f"stability of the {name} loop not known")
+            elif self.loops[name].figures.margins.verdict == "on the border":
+                parts.append(f"the {name} loop is on the border of stability")
+            else:
+                seen: dict[bool | None, str] = {
+                    True: ", and a run of it grows as predicted",
+                    False: ", but no run of it grows so",
+                }
+                parts.append(f"the {name} loop is unstable{seen.get(row.passed if row else None, '')}")
+        return "; ".join(parts)
+
+    @property
+    def hunting(self) -> bool:
+        """Whether the drive does not come to rest after a step, by dry friction."""
+        points = () if self.friction is None else self.friction.points
+        return any(point.cycles.hunting is not None for point in points)
+
+    @property
+    def verdict(self) -> str:
+        """In a word: ``"PASS"``, ``"FAIL"``, ``"UNDECIDED"`` or ``"NOTHING JUDGED"``."""
+        if self.passed:
+            return "PASS"
+        if self.undecided and not (self.failed or self.unstable or self.hunting):
+            return "UNDECIDED"
+        return "FAIL" if self.judged else "NOTHING JUDGED"
+
+    @property
     def passed(self) -> bool:
-        """Whether predictions were judged, all hold, and no command within full deflection diverges."""
-        unstable = any(not loop.figures.stable for loop in self.loops.values())
+        """Whether predictions were judged, all hold, and the drive settles: no loop unstable or unknown, no
+        command within full deflection diverges, dry friction sustains no motion.
+        """
+        unstable = bool(self.unstable or self.undecided or self.hunting)
         diverges = self.conditional is not None and self.conditional.diverges
         border = None if self.large_signals is None else self.large_signals.border
         off = border is not None and border.passed is False
@@ -136,9 +182,11 @@ class Validation:
     def __str__(self) -> str:
         judged = [row for row in self.ledger if row.passed is not None]
         held = sum(row.passed is True for row in judged)
+        wrong = [self.instability, "the drive hunts: after a step it does not come to rest" * self.hunting]
+        first = "".join([f"{self.design.name}: ", *(f"{part}; " for part in wrong if part)])
         if not judged:
-            return f"{self.design.name}: nothing judged: no linear prediction could be compared"
-        words = f"{self.design.name}: {held} of {len(judged)} predictions agree with the simulation"
+            return f"{first}nothing judged: no linear prediction could be compared"
+        words = f"{first}{held} of {len(judged)} predictions agree with the simulation"
         words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}

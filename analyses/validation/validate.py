@@ -57,6 +57,7 @@ from analyses.validation.sweep import (
 )
 from analyses.validation.tones import tone_sweep
 from analyses.validation.transient import coarse, is_slow, transient_of
+from analyses.validation.unstable import unstable_entry
 from nonlinear import Rows
 
 if TYPE_CHECKING:
@@ -170,7 +171,7 @@ class _Work:
             self.loops = self._assemble()
         stable = all(result.stable for result in self.figures.values())
         if not stable:
-            self.notes.append("a linear loop is not stable: nothing is measured on what lies around it")
+            self.notes.append("a linear loop is not known to be stable: nothing is measured around it")
         placed = self.design.controller.position is not None
         whole = stable and placed
         if not placed:
@@ -289,7 +290,7 @@ class _Work:
     def _loop(self, name: str, loop: Loop, share: float) -> LoopValidation:
         """Sweep one loop and read its figures; where that cannot be done, say why."""
         figures, nothing = self.figures[name], np.empty(0, complex)
-        reason = "the linear loop is not stable: there is nothing to measure"
+        reason = f"the linear loop is {figures.margins.verdict}: there is nothing to measure"
         if name in self.settle:
             try:
                 with self.budget.part(share):
@@ -567,7 +568,7 @@ class _Work:
         rows: list[Entry] = []
         for name, loop in loops.items():
             if not loop.figures.stable:
-                rows.append(Entry(name, "stability", "", "linear", None, None, 0.0, False, loop.reason))
+                rows.append(unstable_entry(self.linear, name, loop.figures))
             elif loop.measured is None:
                 rows.append(not_judged(name, "bandwidth", "Hz", None, None, loop.reason))
                 rows += point_entries(name, loop.confirmed)

@@ -137,7 +137,7 @@ def correlate(
         print_json(_data(results) | {"passed": verdict})
     else:
         _show(sections, verdict)
-    leave_with(verdict is not False)
+    leave_with(verdict)
 
 
 def _show(sections: list[Section], verdict: bool | None) -> None:

@@ -18,13 +18,19 @@ if TYPE_CHECKING:
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
 
 DEFAULT_DURATION_S = 1.0
+DEFAULT_CYCLES = 5
+PERIODIC = ("sine", "triangle", "stepped-sine")
 
 CommandOption = Annotated[
     str | None, typer.Option("--command", metavar="KIND", help=f"One of {KINDS}; default step.")
 ]
 AmplitudeOption = Annotated[
     float,
-    typer.Option("--amplitude", help="Peak at the output, deg (mm on a linear axis); a ramp: per second."),
+    typer.Option(
+        "--amplitude",
+        help="Peak, for the outermost loop: deg at the output (mm on a linear axis), deg/s (mm/s) of "
+        "a speed drive, A, V; a ramp: per second.",
+    ),
 ]
 FrequencyOption = Annotated[
     float, typer.Option("--frequency", metavar="HZ", help="Frequency; the first of a chirp or a set.")
@@ -33,7 +39,10 @@ ToOption = Annotated[
     float | None, typer.Option("--to", metavar="HZ", help="Last frequency of a chirp or set.")
 ]
 CountOption = Annotated[int, typer.Option("--count", help="Number of frequencies of a stepped or multisine.")]
-CyclesOption = Annotated[int, typer.Option("--cycles", help="Periods of each frequency of a stepped sine.")]
+CyclesOption = Annotated[
+    int | None,
+    typer.Option("--cycles", help="Periods played of a sine or triangle, or of each of a stepped sine (5)."),
+]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of the phases of a multisine.")]
 StartOption = Annotated[float, typer.Option("--start", metavar="S", help="Time at which the command begins.")]
 DurationOption = Annotated[
@@ -41,7 +50,7 @@ DurationOption = Annotated[
     typer.Option("--duration", metavar="S", help="Duration; 1, or that of a stepped sine or a record."),
 ]
 BiasOption = Annotated[
-    float, typer.Option("--bias-rate", help="Constant speed added underneath, deg/s (mm/s) at the output.")
+    float, typer.Option("--bias-rate", help="Ramp added underneath: the amplitude's unit per second.")
 ]
 SlopeOption = Annotated[
     float,
@@ -53,10 +62,13 @@ SlopeOption = Annotated[
 ]
 LoadFileOption = Annotated[
     Path | None,
-    typer.Option("--load-file", metavar="CSV", help="Load torque over the time of the run: s, N m."),
+    typer.Option(
+        "--load-file", metavar="CSV", help="Load torque over time: s (of the run, or the record's), N m."
+    ),
 ]
 RecordOption = Annotated[
-    Path | None, typer.Option("--record", metavar="CSV", help="Recorded command: s, deg (mm) at the output.")
+    Path | None,
+    typer.Option("--record", metavar="CSV", help="Recorded command: s, and the amplitude's unit."),
 ]
 HeldOption = Annotated[
     bool, typer.Option("--held", help="The record is a log of changes: each value holds until the next.")
@@ -78,7 +90,7 @@ def simulate(
     frequency: FrequencyOption = 1.0,
     to: ToOption = None,
     count: CountOption = 10,
-    cycles: CyclesOption = 5,
+    cycles: CyclesOption = None,
     seed: SeedOption = 0,
     start: StartOption = 0.0,
     duration: DurationOption = None,
@@ -105,6 +117,8 @@ def simulate(
 
     drive = load_drive(design, changes)
     load = on_axis(load, drive)
+    if cycles is not None:
+        duration = played(command, cycles, frequency, start, duration)
     wanted = build_command(
         drive,
         command,
@@ -117,15 +131,17 @@ def simulate(
         frequency=frequency,
         to=to,
         count=count,
-        cycles=cycles,
+        cycles=DEFAULT_CYCLES if cycles is None else cycles,
     )
-    scale = unit_scale(drive)
+    seconds = run_time(wanted, duration)
+    begins_in_time(start, seconds)
+    scale = command_unit(drive)[1]
     with progress("simulating", quiet=quiet) as report:
         run = run_simulation(
             drive,
             wanted,
-            run_time(wanted, duration),
-            build_load(load, load_slope, load_file),
+            seconds,
+            build_load(load, load_slope, load_file, seconds, start - record_begins(record)),
             bias=commands.ramp(bias_rate * scale) if bias_rate else None,
             friction_on=not no_friction,
             limits_on=not no_limits,
@@ -135,6 +151,48 @@ def simulate(
         )
     files = write_files(run, csv, parquet, plot)
     show(run, files, as_json)
+
+
+def played(
+    kind: str | None, cycles: int, frequency: float, start: float, duration: float | None
+) -> float | None:
+    """Duration of the run that plays so many periods; that of a stepped sine is its own.
+
+    Raises
+    ------
+    InputError
+        For a command without periods, no period, or a duration that plays another number of them.
+    """
+    from actuator_lti.errors import InputError
+
+    if kind not in PERIODIC:
+        raise InputError(f"--cycles {cycles}: allowed with --command {', '.join(PERIODIC)}")
+    if cycles < 1:
+        raise InputError(f"--cycles {cycles}: must be at least 1")
+    if kind == "stepped-sine" or frequency <= 0.0:
+        return duration
+    needed = start + cycles / frequency
+    if duration is not None and abs(duration - needed) > 1e-9 * needed:
+        raise InputError(
+            f"--cycles {cycles}, --duration {duration:g}: {cycles} periods take {needed:g} s;"
+            " allowed: one of the two options"
+        )
+    return needed
+
+
+def begins_in_time(start: float, duration: float) -> None:
+    """Refuse a command that begins after the run."""
+    from actuator_lti.errors import InputError
+
+    if start >= duration > 0.0 and start > 0.0:
+        raise InputError(f"--start {start:g}: the run ends at {duration:g} s; allowed: less, or --duration")
+
+
+def record_begins(record: Path | None) -> float:
+    """The first time of a recorded command: where the run's clock has its zero."""
+    from nonlinear.records import read_columns
+
+    return 0.0 if record is None else float(read_columns(record, (0,))[0][0])
 
 
 def run_time(command: Command, wanted_s: float | None) -> float:
@@ -158,11 +216,12 @@ def run_time(command: Command, wanted_s: float | None) -> float:
     return wanted_s
 
 
-def unit_scale(drive: Design) -> float:
-    """Factor from the unit of the command line (deg, mm) to SI."""
-    from math import pi
+def command_unit(drive: Design) -> tuple[str, float]:
+    """The unit in which the command line takes the drive's command, and its factor to SI."""
+    from nonlinear.trajectory import COMMAND_UNITS
 
-    return 1e-3 if drive.axis == "linear" else pi / 180.0
+    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+    return unit, 1.0 / per_SI
 
 
 def build_command(
@@ -193,7 +252,8 @@ def build_command(
     from actuator_lti.errors import InputError
     from nonlinear import commands
 
-    peak = amplitude * unit_scale(drive)
+    unit, scale = command_unit(drive)
+    peak = amplitude * scale
     period = drive.controller.period_s
     last = to if to is not None else 10.0 * frequency
     if record is not None and kind not in (None, "recorded"):
@@ -203,7 +263,6 @@ def build_command(
     if start < 0.0 or not start < float("inf"):
         raise InputError(f"--start {start:g}: must be 0 or later")
     if record is not None:
-        unit = "mm" if drive.axis == "linear" else "deg"
         return commands.recorded(record, unit=unit, held=held).later(start)
     if kind == "recorded":
         raise InputError("--command recorded: needs --record CSV")
@@ -231,10 +290,19 @@ def build_command(
     return simple[kind]()
 
 
-def build_load(load: float, slope: float, file: Path | None) -> Any:
-    """The load torque asked for."""
+def build_load(
+    load: float, slope: float, file: Path | None, duration: float = float("inf"), shift: float = 0.0
+) -> Any:
+    """The load torque asked for; its file is on the clock of the record, whose first row is put at the start.
+
+    Raises
+    ------
+    InputError
+        If the rows of the file lie before or after the whole run: then none of it would act.
+    """
     from dataclasses import replace
 
+    from actuator_lti.errors import InputError
     from nonlinear import loads
     from nonlinear.records import read_columns
 
@@ -242,6 +310,11 @@ def build_load(load: float, slope: float, file: Path | None) -> Any:
     if file is None:
         return moment
     times, values = read_columns(file, (0, 1))
+    if not (times[0] + shift < duration and times[-1] + shift >= 0.0):
+        span = f"its rows are from {times[0]:g} to {times[-1]:g} s, the run from {0.0 - shift:g}"
+        clock = " on the record's clock" if shift else ""
+        raise InputError(f"{span} to {duration - shift:g} s{clock}: no load would act", str(file))
+    times = times + shift
     return replace(moment, series=loads.series(times, values, where=str(file)).series)
 
 
@@ -264,6 +337,7 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
     """Print the summary."""
     import math
 
+    from nonlinear.trajectory import COMMAND_UNITS
     from reports.cli.output import print_json, print_line
     from reports.sections.trajectory import summary
 
@@ -273,8 +347,12 @@ def show(run: Trajectory, files: list[str], as_json: bool) -> None:
         return
     detail = f" ({facts['status_detail']})" if facts["status_detail"] else ""
     print_line(f"{run.design_name}: {run.time_s.size} rows, status {facts['status']}{detail}")
+    unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
     for name, value in facts.items():
-        if isinstance(value, float):
+        if name.startswith(("largest_command", "largest_error")):
+            named = f"{name.split('_')[0]} {name.split('_')[1]}"
+            print_line(f"  {named:26} {value * per_SI:.6g} {unit}")
+        elif isinstance(value, float):
             print_line(f"  {_in_words(name, value)}")
     for name, use in run.limits.items():
         if math.isinf(use.limit):

@@ -117,13 +117,22 @@ def _print_tables(validation: Validation, made: Document, paths: tuple[Path, ...
 
         tables.append(doc.text(sections["conditional"]["result"]))
         tables += [block for block in sections["conditional"]["blocks"] if block["kind"] in ("text", "table")]
-    print_verdict(
-        validation.passed, str(validation), failed="FAIL" if validation.judged else "NOTHING JUDGED"
-    )
+    passed = validation.passed and made["verdict"]["passed"] is not False
+    failed = validation.verdict if not validation.passed else "FAIL"
+    print_verdict(passed, str(validation), failed=failed)
+    for label, reason in _not_met(made):
+        print_line(f"not met: {label}{f': {reason}' if reason else ''}")
     print_blocks(tables, validation.notes)
     for path in paths:
         print_line(str(path))
     print_line(f"{sum(validation.seconds.values()):.1f} s")
+
+
+def _not_met(made: Document) -> list[tuple[str, str]]:
+    """Every check of the document that is not met, and why."""
+    blocks = [block for part in made["sections"] for block in part["blocks"]]
+    items = [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
+    return [(item["label"], item["reason"]) for item in items if item["passed"] is False]
 
 
 def _ledger(rows: Any, caption: str) -> Block:

@@ -54,17 +54,17 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
         blocks,
         result=words([result], error_limit),
         intro=intro,
-        status="info" if judged is None else "pass" if judged else "fail",
+        status="pass" if judged else "fail",
     )
 
 
-def verdict(results: Sequence[CorrelationResult], error_limit: float | None) -> bool | None:
-    """Whether records and errors are in order; None where neither contradicts nor is judged."""
+def verdict(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
+    """Whether no record contradicts itself or the design and, with a limit, no error is above it."""
     if any(finding.passed is False for result in results for finding in result.findings):
         return False
-    if error_limit is None:
-        return None
-    return all(signal.relative_error <= error_limit for result in results for signal in result.signals)
+    return error_limit is None or all(
+        signal.relative_error <= error_limit for result in results for signal in result.signals
+    )
 
 
 def words(results: Sequence[CorrelationResult], error_limit: float | None = None) -> str:
@@ -83,7 +83,10 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     if far.name != motion.name:
         share = show(100.0 * far.relative_error, "sig:3")
         parts.append(f"Furthest off: {NAMES.get(far.name, far.name).lower()}, {share} %.")
-    if error_limit is not None:
+    if error_limit is None and not wrong:
+        one = "The record contradicts" if len(results) == 1 else "The records contradict"
+        parts.append(f"{one} neither {'itself' if len(results) == 1 else 'themselves'} nor the design.")
+    elif error_limit is not None:
         over = far.relative_error > error_limit
         parts.append(f"{'Above' if over else 'Within'} the limit of {100.0 * error_limit:g} %.")
     return " ".join(parts)
@@ -111,7 +114,7 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
     table = doc.table("All records", columns, rows)
     judged = verdict(results, error_limit)
-    status: Status = "info" if judged is None else "pass" if judged else "fail"
+    status: Status = "pass" if judged else "fail"
     return doc.section(
         "correlation", "All records", [table, figure],
         result=words(results, error_limit), intro=intro, status=status,

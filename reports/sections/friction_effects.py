@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from reports.figures import hysteresis as hysteresis_figure
 
 
+LEFT = 1e-3  # of a step: an error that is spoken of
+
+
 def section(result: FrictionEffects) -> Section:
     """Make the section from `analyses.friction_effects.friction_effects`."""
     title = "Dry friction at small signals"
@@ -34,7 +37,7 @@ def section(result: FrictionEffects) -> Section:
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
     )
     failed = any(item["passed"] is False for item in items)
-    words, more = _summary(result)
+    words, more = _summary(result, fine, small)
     blocks += [doc.text(more)] if more else []
     return doc.section(
         "friction-effects", title, blocks, result=words, intro=intro, status="fail" if failed else "info",
@@ -110,14 +113,22 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     ]
     rows = [_threshold_row(point, fine, 1e3 if load == "N m" else 1.0) for point in result.points]
     note = (
-        "The speed controller integrates: a step below the threshold moves the output after Tn (A0/A − 1), "
-        "and lost "
-        "motion is recovered. The effect of friction is largest just after a reversal."
-        if result.integrates
+        f"The {result.integrator} controller integrates: a step below the threshold moves the output later"
+        f"{_after(result)}, and lost motion is recovered. The effect of friction is largest just after a "
+        "reversal."
+        if result.integrator
         else "No controller integrates: a step below the threshold never moves the output. Each "
         "reversal loses 2 Tc over the stiffness."
     )
     return doc.table("Threshold of motion and lost motion", columns, rows, note)
+
+
+def _after(result: FrictionEffects) -> str:
+    """How much later a step below the threshold moves the output."""
+    known = [point.threshold.static for point in result.points if point.threshold is not None]
+    alone = all(static.outer_integral_time_s is None for static in known)
+    kicks = result.design.controller.position_loop.derivative_time_s > 0.0
+    return ", after Tn (A0/A − 1)" if alone and not kicks else ""
 
 
 def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> Row:
@@ -209,15 +220,23 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     return doc.figure("hysteresis", data, caption=caption, alt=caption)
 
 
-def _summary(result: FrictionEffects) -> tuple[str, str]:
+def _summary(result: FrictionEffects, fine: float, small: str) -> tuple[str, str]:
     """Say what becomes of the steady-state error, and a remark."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if any(one.hunting for one in settlings):
         return "The drive hunts: after a step the output does not come to rest.", ""
-    if result.integrates:
+    if result.integrator:
+        left = [one for one in settlings if abs(one.error_rad) > LEFT * one.amplitude_rad]
+        if left:
+            most = max(left, key=lambda one: abs(one.error_rad))
+            words = f"an error of up to {fine * abs(most.error_rad):.3g} {small} is left"
+            return (
+                f"The {result.integrator} controller integrates; {most.wait_s:.2g} s after a step {words}.",
+                "",
+            )
         return (
-            "Dry friction leaves no steady-state error and causes no hunting: the speed integrator removes "
-            "the error.",
+            f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
+            "integrator removes the error.",
             "With breakaway above sliding friction the drive may hunt. A describing function of dry friction "
             "cannot "
             "predict that, as a sinusoid spends no time at rest.",

@@ -58,15 +58,37 @@ def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
     largest, fraction = max(
         zip(amplitude_bode.amplitude_rad, amplitude_bode.fractions, strict=True), default=(math.nan, 0.0)
     )
-    value = amplitude_bode.minus3db_hz[int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - largest)))]
+    place = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - largest)))
     part = "full deflection" if fraction == 1.0 else f"{100.0 * fraction:.0f} % of full deflection"
     size, linear = f"{part} ({scale * largest:.3g} {unit})", amplitude_bode.linear_minus3db_hz
     if linear is None or not math.isfinite(linear):
         return "The linear loop has no −3 dB bandwidth in the range of the map."
+    value = amplitude_bode.minus3db_hz[place]
     if not math.isfinite(value):
-        start = amplitude_bode.frequency_hz[0]
-        return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to below {start:.3g} Hz at {size}."
-    return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
+        found = _between(amplitude_bode, place)
+        if amplitude_bode.below_from_start[place]:
+            return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {found} at {size}."
+        return f"The −3 dB bandwidth is {linear:.3g} Hz (linear); at {size} it is {found}."
+    if f"{value:.3g}" == f"{linear:.3g}":
+        return f"The −3 dB bandwidth stays at {linear:.3g} Hz up to {size}."
+    does = "falls" if value < linear else "rises"
+    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
+
+
+def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
+    """Say as much of a bandwidth as the steady points tell."""
+    low, high = amplitude_bode.minus3db_range_hz[place]
+    if amplitude_bode.below_from_start[place]:
+        return f"below {high:.3g} Hz"
+    if low == 0.0:
+        return (
+            "not known: no point below it is steady"
+            if math.isfinite(high)
+            else "not known: no point is steady"
+        )
+    hz = amplitude_bode.frequency_hz
+    unsteady = ", the points between are not steady" if np.any((hz > low) & (hz < high)) else ""
+    return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
 
 
 def output_unit(design: Design) -> tuple[float, str]:
@@ -268,14 +290,17 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
     rows = []
     for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
         k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
-        below = bool(amplitude_bode.below_from_start[k])
+        below, known = bool(amplitude_bode.below_from_start[k]), math.isfinite(amplitude_bode.minus3db_hz[k])
+        note = f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above" if below else ""
+        if not (below or known):
+            note = f"−3 dB {_between(amplitude_bode, k)}"
         rows.append(
             {
                 "fraction": 100.0 * fraction,
                 "amplitude": scale * amplitude,
                 "gain": amplitude_bode.minus3db_hz[k],
                 "phase": amplitude_bode.minus90deg_hz[k],
-                "note": f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above" if below else "",
+                "note": note,
             }
         )
     rows.append(

@@ -196,6 +196,16 @@ def _decibels(values: np.ndarray) -> np.ndarray:
     return 20.0 * np.log10(np.where(size > 0.0, size, np.nan))
 
 
+def _described_agreement(sweep: RestSweep) -> str:
+    """How far the describing function is from the simulation, where there is motion in both."""
+    both = (sweep.measured != 0.0) & np.isfinite(sweep.measured) & np.isfinite(sweep.described)
+    off = sweep.measured[both] / sweep.described[both]
+    if not off.size:
+        return "is not compared: dry friction holds the rotor"
+    gain, phase = 20.0 * np.log10(np.abs(off)), np.degrees(np.angle(off))
+    return f"agrees with the simulation within {np.abs(gain).max():.2g} dB and {np.abs(phase).max():.2g} deg"
+
+
 def _from_rest(sweep: RestSweep, axis: str) -> Section:
     """Make the section of the sweep from rest."""
     scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
@@ -218,20 +228,15 @@ def _from_rest(sweep: RestSweep, axis: str) -> Section:
             for label, values, points in series
         ],
     }
-    still = (sweep.measured == 0.0) | (sweep.described == 0.0)
-    off = np.where(still, np.nan, sweep.measured) / np.where(still, np.nan, sweep.described)
-    gain = float(np.nanmax(np.abs(20.0 * np.log10(np.abs(off)))))
-    phase = float(np.nanmax(np.abs(np.degrees(np.angle(off)))))
     low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale
+    agrees = _described_agreement(sweep)
+    clear = "" if any(sweep.limiter) else ", below every limit"
     caption = (
-        f"Command to output without bias motion, amplitudes of {low:.3g} to {high:.3g} {unit}, below every "
-        f"limit. The describing function at the measured speed amplitude agrees within {gain:.2g} dB and "
-        f"{phase:.2g} deg. The sliding loop does not include the reversals."
+        f"Command to output without bias motion, amplitudes of {low:.3g} to {high:.3g} {unit}{clear}. "
+        f"The describing function at the measured speed amplitude {agrees}. The sliding loop does not "
+        "include the reversals."
     )
     intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."
     block = doc.figure("rest_sweep", data, caption=caption, alt=caption)
-    result = (
-        f"The describing function of dry friction agrees with the simulation within {gain:.2g} dB and "
-        f"{phase:.2g} deg."
-    )
+    result = f"The describing function of dry friction {agrees}."
     return doc.section("from-rest", "From rest: effect of dry friction", [block], result=result, intro=intro)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.control import Stage
 from actuator_lti.tree import Tree
 from analyses.conduct import conduct
 from nonlinear import Trajectory
@@ -30,20 +31,26 @@ def figure_data(run: Trajectory) -> trajectory_figure.Data:
     def series(label: str, values: npt.NDArray[np.float64]) -> trajectory_figure.Signal:
         return {"label": label, "values": rounded(values[rows])}
 
-    position = [series("output", run.output_angle_rad * angle), series("command", run.reference_rad * angle)]
-    speed = [series("speed", run.motor_speed_rad_s)]
-    if run.speed_command_rad_s.any():
+    def ordered(stage: Stage, factor: float = 1.0) -> list[trajectory_figure.Signal]:
+        """The command, in the panel of what it orders."""
+        return [series("command", run.reference_rad * factor)] if run.stage == stage else []
+
+    position = [series("output", run.output_angle_rad * angle), *ordered("position", angle)]
+    speed = [series("speed", run.motor_speed_rad_s), *ordered("velocity", run.ratio)]
+    if run.stage == "position" and run.speed_command_rad_s.any():
         speed.append(series("commanded", run.speed_command_rad_s))
     panels = [
         _panel(f"output position, {unit}", position, run, None),
         _panel(f"{'axis' if linear else 'motor'} speed, {speed_unit}", speed, run, "speed"),
     ]
     if run.current_A.any():
-        current = [series("current", run.current_A)]
-        if run.current_command_A.any():
+        current = [series("current", run.current_A), *ordered("current")]
+        if run.stage in ("position", "velocity") and run.current_command_A.any():
             current.append(series("commanded", run.current_command_A))
         panels.append(_panel("motor current, A", current, run, "current"))
-    panels.append(_panel("voltage, V", [series("voltage", run.voltage_V)], run, "voltage"))
+    panels.append(
+        _panel("voltage, V", [series("voltage", run.voltage_V), *ordered("voltage")], run, "voltage")
+    )
     return {"time_s": abscissa(run.time_s[rows], 8), "panels": panels}
 
 
@@ -85,6 +92,7 @@ def summary(run: Trajectory) -> Tree:
         for name, u in run.limits.items()
     }
     angle = "m" if run.axis == "linear" else "rad"
+    si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
     ended = conduct(run)
     out = {
         "design": run.design_name,
@@ -93,7 +101,9 @@ def summary(run: Trajectory) -> Tree:
         "rows": run.time_s.size,
         "period_s": run.period_s,
         f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),
-        f"largest_error_{angle}": np.abs(run.reference_rad - run.output_angle_rad).max(),
+        "commanded": run.stage,
+        f"largest_command_{si}": np.abs(run.reference_rad).max(),
+        f"largest_error_{si}": np.abs(run.reference_rad - run.followed).max(),
         f"final_output_{angle}": run.output_angle_rad[-1],
         f"largest_motor_speed_{angle}_s": np.abs(run.motor_speed_rad_s).max(),
         "largest_current_A": np.abs(run.current_A).max(),

@@ -90,16 +90,27 @@ def summary(validation: Validation, *, timing: bool = True) -> Section:
 def result(validation: Validation) -> str:
     """Say how many predictions agree with the simulation."""
     judged = [row for row in validation.ledger if row.passed is not None]
+    first = (
+        f"{validation.instability[0].upper()}{validation.instability[1:]}. " if validation.instability else ""
+    )
     if not judged:
-        return "Nothing judged: no linear prediction could be compared with the simulation."
+        return f"{first}Nothing judged: no linear prediction could be compared with the simulation."
     agree, shown = sum(row.passed is True for row in judged), len(validation.ledger) - len(judged)
     rest = f" {shown} more are shown, but not judged." if shown else ""
-    return f"{agree} of {len(judged)} linear predictions agree with the simulation.{rest}"
+    return f"{first}{agree} of {len(judged)} linear predictions agree with the simulation.{rest}"
 
 
 def findings(validation: Validation) -> list[Finding]:
     """Name what has to be watched, the gravest first."""
     findings = [
+        Finding(severity="fail", text=f"{loop_name(name)}: not stable.", where="validation")
+        for name in validation.unstable
+    ]
+    findings += [
+        Finding(severity="warn", text=f"{loop_name(name)}: stability not known.", where="validation")
+        for name in validation.undecided
+    ]
+    findings += [
         Finding(
             severity="fail",
             text=f"{loop_name(row.loop)}: {quantity_name(row)} is not confirmed by simulation.",
@@ -146,6 +157,10 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
         why = "; ".join([*reasons, *validation.notes][:3]) or "the drive has no loop"
         label = "Linear predictions that could be judged"
         items.append(_verdict("judged", label, 0, 1, ">=", "", False, f"nothing judged: {why}"))
+    for name in validation.unstable + validation.undecided:
+        verdict, known = validation.loops[name].figures.margins.verdict, name in validation.unstable
+        label, why = f"{loop_name(name)}: stable", f"predicted: {verdict}"
+        items.append(_verdict(f"stable-{name}", label, 0, 1, ">=", "", False if known else None, why))
     for name, rows in by_loop(validation.ledger).items():
         judged = [row for row in rows if row.passed is not None]
         held = sum(row.passed is True for row in judged)

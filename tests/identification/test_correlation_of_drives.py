@@ -130,7 +130,9 @@ def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path: Path) -> 
     result = correlate_record(BASE, record, command="voltage")
     assert "voltage" not in {signal.name for signal in result.signals}
     assert result["speed"].relative_error < 1e-6
-    with pytest.raises(InputError, match=r'command "speed": one of reference, speed_reference'):
+    with pytest.raises(
+        InputError, match=r'command "speed": one of reference, output_speed_reference, speed_reference'
+    ):
         correlate_record(BASE, record, command="speed")
 
 

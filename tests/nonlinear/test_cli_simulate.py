@@ -44,6 +44,10 @@ def test_json_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         ("--every 0", "at least 1"),
         ("--duration 1e9", "ticks of one run; allowed"),
         ("--command stepped-sine --frequency 5 --to 20 --count 3 --duration 1", "takes 1.75 s"),
+        ("--start 3 --duration 1", "the run ends at 1 s"),
+        ("--start 1", "the run ends at 1 s"),
+        ("--command sine --frequency 2 --cycles 3 --duration 1", "3 periods take 1.5 s"),
+        ("--command step --cycles 3", "allowed with --command sine"),
     ],
 )
 def test_refusals(arguments: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -87,3 +91,33 @@ def test_a_stepped_sine_runs_to_its_end(capsys: pytest.CaptureFixture[str]) -> N
     out = capsys.readouterr().out
     assert "1750 rows, status ok" in out
     assert " deg\n" in out
+
+
+def test_a_sine_plays_the_periods_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.csv"
+    arguments = f"--command sine --frequency 4 --cycles 3 --start 0.1 --amplitude 1 --csv {path} --json"
+    assert main(["simulate", *arguments.split()]) == 0
+    assert json.loads(capsys.readouterr().out)["rows"] == round((0.1 + 3 / 4) / 1e-4)
+    command = np.genfromtxt(path, delimiter=",", names=True)["reference_rad"]
+    peaks = (command[1:-1] > command[:-2]) & (command[1:-1] >= command[2:])
+    assert np.count_nonzero(peaks) == 3
+
+
+def test_a_load_file_is_on_the_clock_of_the_record(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A record from 5 s on, held at zero, and a load from 5.5 s on, of the same clock: half a second late."""
+    record, load, early = (tmp_path / name for name in ("record.csv", "load.csv", "early.csv"))
+    record.write_text("t,deg\n" + "".join(f"{5.0 + 0.1 * k},0\n" for k in range(11)))
+    load.write_text("t,Nm\n5.5,2\n5.6,2\n5.7,2\n")
+    early.write_text("t,Nm\n0.5,2\n0.6,2\n0.7,2\n")
+    path = tmp_path / "run.csv"
+    assert main(f"simulate --record {record} --load-file {load} --csv {path} --json".split()) == 0
+    rows = np.genfromtxt(path, delimiter=",", names=True)
+    assert rows["load_Nm"][rows["time_s"] < 0.5 - 1e-6].tolist() == [0.0] * 5000
+    assert np.all(rows["load_Nm"][rows["time_s"] > 0.5 + 1e-6] == 2.0)
+    capsys.readouterr()
+    assert main(f"simulate --record {record} --load-file {early}".split()) == 2
+    assert "the run from 5 to 6 s on the record's clock: no load would act" in capsys.readouterr().err
+    assert main(f"simulate --load-file {load}".split()) == 2
+    assert "the run from 0 to 1 s: no load would act" in capsys.readouterr().err

@@ -75,7 +75,7 @@ def test_multisine_has_its_lines_and_its_seed() -> None:
         (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
         (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
         (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm or m"),
+        (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm, m"),
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
         (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),

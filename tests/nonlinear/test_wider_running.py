@@ -147,6 +147,29 @@ def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
     assert back * Ts == pytest.approx(tau * np.log(x / 0.5), abs=3 * Ts)
 
 
+@pytest.mark.parametrize(("amperes", "peak_s"), [(5.0, 0.0), (9.0, 1.0)])
+def test_the_overload_protection_is_not_called_the_current_limit(amperes: float, peak_s: float) -> None:
+    """Demand below the peak: the peak never acts; above it: until the protection takes over after 1 s.
+
+    Thermal: x = (i/i_c)^2 (1 - exp(-t/tau)) reaches 1; tau from one second at three times i_c.
+    """
+    limits = Limits(voltage_V=inf, peak_current_A=6.0, continuous_current_A=2.0, peak_time_s=1.0)
+    design = replace(
+        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=GAIN, integral_time_s=1e-3)),
+        limits=limits,
+    )
+    design = replace(design, friction=replace(design.friction, dry_torque_Nm=10.0))  # the rotor stays
+    tau = 1.0 / np.log(9.0 / 8.0)
+    ratio2 = (min(amperes, 6.0) / 2.0) ** 2
+    until = tau * np.log(ratio2 / (ratio2 - 1.0))
+    run = simulate(design, commands.step(amperes), 1.5 * until)
+    assert run.limits["overload"].first_time_s == pytest.approx(until, rel=0.01)
+    use = run.limits["current"]
+    assert use.active is (peak_s > 0.0)
+    assert use.fraction == pytest.approx(peak_s / (1.5 * until), rel=0.01)
+    assert not (run.limit_active("current") & run.limit_active("overload")).any()
+
+
 def test_noise_resolution_and_their_seeds() -> None:
     """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
     design = replace(

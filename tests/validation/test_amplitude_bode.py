@@ -9,8 +9,9 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from analyses.large_signal.bode import amplitude_bode
+from analyses.large_signal.bode import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
 from analyses.large_signal.map import amplitude_map
+from reports.sections.large_signal import _result
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "emps"])
@@ -44,3 +45,37 @@ def test_limits_take_bandwidth_away_as_the_amplitude_grows() -> None:
     expected = 4.0 / (np.pi * np.sqrt(0.5)) * rate / (2.0 * np.pi * result.amplitude_rad[place])
     assert gain[place] == pytest.approx(expected, rel=0.05)
     assert result.below_from_start[asked].tolist() == (~known).tolist()
+
+
+HZ = np.array([1.0, 2.0, 4.0, 8.0])
+
+
+def _words(gain_db: list[float]) -> str:
+    """What is said of one amplitude, 10 deg at full deflection, of a loop with a bandwidth of 5 Hz."""
+    gain, nothing = np.array([gain_db]), np.full((1, 4), np.nan)
+    low_high = np.array([crossing_range(HZ, row, MINUS_3DB) for row in gain])
+    found = np.array([_crossing(HZ, row, MINUS_3DB) for row in gain])
+    size = np.array([np.radians(10.0)])
+    below = gain[:, 0] < MINUS_3DB
+    result = AmplitudeBode(
+        0.0, HZ, (1.0,), size, gain, nothing, gain[0], nothing[0], size, found, nothing[:, 0], low_high,
+        below, 5.0, None,
+    )  # fmt: skip
+    return _result(result, 180.0 / np.pi, "deg")
+
+
+@pytest.mark.parametrize(
+    ("gain_db", "words"),
+    [
+        ([0.0, 0.0, np.nan, np.nan], "(linear); at full deflection (10 deg) it is above 2 Hz."),
+        ([0.0, np.nan, -6.0, -9.0], "between 1 and 4 Hz, the points between are not steady."),
+        ([np.nan, np.nan, np.nan, np.nan], "not known: no point is steady."),
+        ([np.nan, -6.0, -9.0, -9.0], "not known: no point below it is steady."),
+        ([-4.0, -6.0, -9.0, -9.0], "falls from 5 Hz (linear) to below 1 Hz at"),
+        ([0.0, 0.0, -6.02059991, -9.0], "falls from 5 Hz (linear) to 2.83 Hz at"),
+        ([0.0, 0.0, 0.0, -6.02059991], "rises from 5 Hz (linear) to 5.66 Hz at"),
+    ],
+)
+def test_a_missing_point_is_no_value(gain_db: list[float], words: str) -> None:
+    """3.01 dB is half of 6.02: halfway on the logarithm, the root of two times the lower frequency."""
+    assert words in _words(gain_db)

@@ -6,11 +6,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from actuator_lti import load_design
 from analyses.conduct import conduct
-from nonlinear import commands, simulate
+from nonlinear import Trajectory, commands, simulate
 from reports.cli.main import main
 
 AMBER = load_design("ilr33-amber")
@@ -46,6 +47,30 @@ def test_a_drive_that_is_held_sits_on_its_limit() -> None:
 
 def test_following_a_sine_is_no_oscillation() -> None:
     assert conduct(simulate(AMBER, commands.sine(0.01, 5.0), 0.5)).status == "ok"
+
+
+def _swinging(swing: np.ndarray) -> Trajectory:
+    """A run of a second whose output ends in a given deviation from 1 rad."""
+    run = simulate(AMBER, commands.step(1.0), 1.0, limits_on=False)
+    n = run.time_s.size
+    output = np.where(np.arange(n) < n // 8, np.linspace(0.0, 8.0, n), 1.0) + swing
+    return replace(run, output_angle_rad=np.where(np.arange(n) < n // 8, output, 1.0 + swing))
+
+
+@pytest.mark.parametrize("amplitude", [0.02, 2.5e-3, 5e-4])
+def test_stick_slip_of_two_and_a_half_periods_is_an_oscillation(amplitude: float) -> None:
+    """Jumps between two places of rest, 5 Hz: the last quarter holds little more than a period."""
+    time = np.arange(10_000) * 1e-4
+    result = conduct(_swinging(amplitude * np.sign(np.sin(2.0 * np.pi * 5.0 * time + 0.3))))
+    assert result.status == "keeps oscillating"
+    size, hertz = result.detail.split(" deg at ")
+    assert float(size) == pytest.approx(np.degrees(amplitude), rel=0.01)
+    assert float(hertz.removesuffix(" Hz")) == pytest.approx(5.0, rel=0.01)
+
+
+def test_noise_is_no_oscillation() -> None:
+    noise = 1e-4 * np.random.default_rng(5).standard_normal(10_000)
+    assert conduct(_swinging(noise)).status == "ok"
 
 
 def test_the_command_line_says_it(capsys: pytest.CaptureFixture[str]) -> None:

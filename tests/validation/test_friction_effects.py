@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
 from analyses.friction_effects.cycles import limit_cycles, settle
 from analyses.static_threshold import static_threshold
+from reports.sections.friction_effects import section
 
 
 @pytest.fixture(scope="module")
@@ -164,3 +166,89 @@ def test_too_weak_to_move() -> None:
     weak = replace(design, limits=replace(design.limits, peak_current_A=0.3))
     assert static_threshold(weak).forward_rad == math.inf
     assert friction_effects(weak).points[0].threshold is None
+
+
+EXTRUDER = """
+[design]
+name = "map"
+[motor]
+resistance = "2 ohm"
+inductance = "0.3 mH"
+torque_constant = "0.05 N*m/A"
+back_emf_constant = "0.05 V*s/rad"
+rotor_inertia = "2e-5 kg*m^2"
+[[gear]]
+name = "g"
+ratio = 20
+[load]
+inertia = "0.002 kg*m^2"
+path = "self-locking"
+[friction]
+{friction}
+[limits]
+voltage = "36 V"
+[control]
+period = "200 us"
+computing_delay = "100 us"
+[control.velocity]
+gain = "0.25 V*s/rad"
+{velocity}
+[control.position]
+gain = "25 1/s"
+{position}
+[validation]
+full_deflection = "45 deg"
+loads = ["0 N*m"]
+"""
+MAP = "".join(
+    f'[[friction.point]]\nspeed = "{speed} rad/s"\ntorque = "{torque} mN*m"\n'
+    for speed, torque in ((0, 30), (8, 36), (300, 60))
+)
+
+
+def _design(folder: Path, position: str = "", velocity: str = "", friction: str = MAP) -> Design:
+    path = folder / "drive.toml"
+    path.write_text(EXTRUDER.format(position=position, velocity=velocity, friction=friction))
+    return load_design(path)
+
+
+def test_a_friction_map_is_dry_friction(tmp_path: Path) -> None:
+    """The torque at rest over the stiffness: 30 mN m / (kM/R Kp Kv N)."""
+    stiffness = 0.05 / 2.0 * 0.25 * 25.0 * 20.0
+    result = friction_effects(_design(tmp_path))
+    assert result.integrator == ""
+    (point,) = result.points
+    assert point.threshold is not None
+    assert point.dry_torque_Nm == pytest.approx(0.03)
+    assert point.threshold.static.forward_rad == pytest.approx(0.03 / stiffness, rel=1e-12)
+    assert point.threshold.simulated_rad == pytest.approx(0.03 / stiffness, rel=3e-3)
+    assert "No controller integrates" in section(result)["result"]
+
+
+def test_the_position_integral_moves_a_small_step(tmp_path: Path) -> None:
+    """T (A0/A - 1) with the position's integral time; no error stays, and the words say who integrates."""
+    result = friction_effects(_design(tmp_path, 'integral_time = "0.4 s"'))
+    assert result.integrator == "position"
+    waits = result.points[0].threshold.waiting  # type: ignore[union-attr]
+    assert len(waits) == 5
+    for k, wait in enumerate(waits):
+        assert wait.predicted_s == pytest.approx(0.4 * (1.0 / (0.2, 0.3, 0.5, 0.7, 0.9)[k] - 1.0))
+        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=2e-3)
+    words = section(result)["result"]
+    assert "position" in words
+    assert "No controller" not in words
+
+
+def test_two_integrals_one_behind_the_other(tmp_path: Path) -> None:
+    """Constant error: the torque grows as 1 + t/T + t/U + t^2/(2 T U), integrated here step by step."""
+    result = friction_effects(_design(tmp_path, 'integral_time = "0.4 s"', 'integral_time = "80 ms"'))
+    assert result.integrator == "speed"
+    for wait in result.points[0].threshold.waiting:  # type: ignore[union-attr]
+        ratio = result.points[0].threshold.static.forward_rad / wait.amplitude_rad  # type: ignore[union-attr]
+        t, outer, inner, dt = 0.0, 0.0, 0.0, 1e-5
+        while (1.0 + outer) + inner < ratio:
+            inner += (1.0 + outer) * dt / 0.08
+            outer += dt / 0.4
+            t += dt
+        assert wait.predicted_s == pytest.approx(t, rel=1e-3, abs=1e-4)
+        assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)

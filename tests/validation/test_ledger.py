@@ -122,7 +122,8 @@ def test_an_unstable_loop_is_reported_not_raised() -> None:
     assert not result.passed
     bad = [row for row in result.ledger if row.quantity == "stability"]
     assert {row.loop for row in bad} >= {"velocity"}
-    assert all("not stable" in row.reason for row in bad)
+    assert all("unstable" in row.reason and row.passed for row in bad)
+    assert "the velocity loop is unstable" in str(result)
 
 
 def test_ride_leaves_room_everywhere() -> None:
