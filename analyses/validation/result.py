@@ -96,6 +96,8 @@ class Validation:
         How the time divided.
     notes : tuple of str
         What could not be done, and why.
+    held_by_friction : tuple of str
+        Loops that are stable with the friction that is left out where the drive is tested, and only with it.
     """
 
     design: Design
@@ -113,6 +115,7 @@ class Validation:
     notes: tuple[str, ...] = ()
     command: Sweep | None = None
     counts: tuple[Counts, ...] = ()
+    held_by_friction: tuple[str, ...] = ()
 
     @property
     def failed(self) -> tuple[Entry, ...]:
@@ -127,7 +130,11 @@ class Validation:
     @property
     def unstable(self) -> tuple[str, ...]:
         """Loops that are not stable."""
-        return tuple(name for name, loop in self.loops.items() if loop.figures.margins.stable is False)
+        return tuple(
+            name
+            for name, loop in self.loops.items()
+            if loop.figures.margins.stable is False and name not in self.held_by_friction
+        )
 
     @property
     def undecided(self) -> tuple[str, ...]:

@@ -141,6 +141,7 @@ class _Work:
     settle: dict[str, int] = field(default_factory=dict)
     held: Loop | None = None
     rigs: dict[str, Rig] = field(default_factory=dict)
+    held_by_friction: tuple[str, ...] = ()
     answer_loops: Any = None
     at: dict[str, Any] = field(default_factory=dict)
     done: int = 0
@@ -172,6 +173,7 @@ class _Work:
         stable = all(result.stable for result in self.figures.values())
         if not stable:
             self.notes.append("a linear loop is not known to be stable: nothing is measured around it")
+            self.held_by_friction = self._held_by_friction()
         placed = self.design.controller.position is not None
         whole = stable and placed
         if not placed:
@@ -231,6 +233,7 @@ class _Work:
             specification=specification,
             seconds=self.seconds,
             notes=tuple(dict.fromkeys([*self.notes, *self.budget.cut])),
+            held_by_friction=self.held_by_friction,
         )
 
     @contextmanager
@@ -254,6 +257,16 @@ class _Work:
                 return otherwise
 
         return attempt(name, lambda: self.budget.within(share, name, refused, otherwise), otherwise)
+
+    def _held_by_friction(self) -> tuple[str, ...]:
+        """Loops that are not stable as they are tested, but are with the friction that is left out there."""
+        from actuator_lti.loops import assemble_loops
+
+        if self.linear.friction == self.design.friction:
+            return ()
+        whole = assemble_loops(on_the_bench(self.model), **self.at)
+        figures = {name: loop_figures(loop, whole.plain_response) for name, loop in whole.present.items()}
+        return tuple(name for name, own in figures.items() if own.stable and not self.figures[name].stable)
 
     def _stage_loops(self) -> dict[str, Loop]:
         """The loops by name; that of the current with the rotor held."""
@@ -567,7 +580,10 @@ class _Work:
         """All entries: loops, break points, from rest."""
         rows: list[Entry] = []
         for name, loop in loops.items():
-            if not loop.figures.stable:
+            if name in self.held_by_friction:
+                why = "stable only with the friction of two slopes that is left out here"
+                rows.append(not_judged(name, "stability", "", None, None, why, "linear"))
+            elif not loop.figures.stable:
                 rows.append(unstable_entry(self.linear, name, loop.figures))
             elif loop.measured is None:
                 rows.append(not_judged(name, "bandwidth", "Hz", None, None, loop.reason))

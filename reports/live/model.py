@@ -164,16 +164,20 @@ def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[Follo
 def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection[str]) -> list[NotFollowed]:
     """Give the requirements that do not follow, with what they limit."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    return [
+    still: list[NotFollowed] = [
         {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {loop} loop held"}
         for item in design.requirements
         if item.quantity in LOOP_QUANTITIES
         for loop in judged_loops(item.loop, stages)
         if loop in held
-    ] + [
-        {"id": item.id, "words": QUANTITIES[item.quantity].words}
-        for item in design.requirements
-        if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
+    ]
+    return [
+        *still,
+        *(
+            NotFollowed(id=item.id, words=QUANTITIES[item.quantity].words)
+            for item in design.requirements
+            if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
+        ),
     ]
 
 

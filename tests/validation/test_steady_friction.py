@@ -11,6 +11,7 @@ from analyses.validation import validate
 from analyses.validation.bench import on_the_bench
 from analyses.validation.bias_motion import bias_motion
 from analyses.validation.steady import level, steady_entry
+from tests.validation.random_drives import full_drive
 from tests.validation.small_settings import SMALL
 
 SETTLE = 20_000  # ticks
@@ -71,3 +72,14 @@ def test_a_damped_load_fails_no_check(name: str) -> None:
     assert not result.failed
     if name == "ilr33-amber":
         assert any("by load" in note for note in result.notes)
+
+
+def test_a_loop_that_only_the_friction_left_out_holds_is_not_judged() -> None:
+    """Seed 80075: a pendulum behind a train whose friction grows with the load; failed as not stable."""
+    result = validate(full_drive(80075), SMALL)
+    assert result.held_by_friction == ("position",)
+    assert not result.failed
+    assert not result.unstable
+    row = next(row for row in result.ledger if row.quantity == "stability")
+    assert row.passed is None
+    assert "friction of two slopes" in row.reason
