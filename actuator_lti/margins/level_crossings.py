@@ -164,6 +164,16 @@ def on_axis(zeros: Complex) -> Complex:
     return near[near.imag.argsort()]
 
 
+def _values(loop: RationalLoop, points: Real) -> Real:
+    """L at real points; NaN where a pole stands exactly at one."""
+    try:
+        return np.asarray(loop.at(points))
+    except np.linalg.LinAlgError:
+        if points.size == 1:
+            return np.full(1, np.nan)
+        return np.concatenate([_values(loop, points[k : k + 1]) for k in range(points.size)])
+
+
 def _shifts(loop: RationalLoop, poles: Complex) -> Real:
     r"""Shifts in order of merit: L(+-shift) not above one, far from the poles, near their mean frequency.
 
@@ -182,7 +192,7 @@ def _shifts(loop: RationalLoop, poles: Complex) -> Real:
     if loop.in_z:
         points = (1.0 + points) / (1.0 - points)
     with np.errstate(all="ignore"):
-        gain = np.log(np.maximum(np.abs(loop.at(points)), 1.0)).reshape(2, -1).max(axis=0)
+        gain = np.log(np.maximum(np.abs(_values(loop, points)), 1.0)).reshape(2, -1).max(axis=0)
     distance = np.abs(np.abs(poles.real)[:, None] + 1j * poles.imag[:, None] - shifts).min(axis=0) / shifts
     cost = gain + 0.5 * np.abs(position) - 3.0 * np.log(np.minimum(distance, 0.2) + 1e-30)
     return shifts[np.argsort(np.nan_to_num(cost, nan=1e9, posinf=1e9), kind="stable")]
