@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import moment_slope
 from actuator_lti.loops import assemble_loops
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ def held_loop(loops: Loops, name: str) -> Loop | None:
     """The inner loop with the rotor held, or with the load's moment held; ``None`` where there is none."""
     at = loops.operating
     if name not in HELD or name == loops.design.controller.outermost:
+        return None
+    if not moment_slope(loops.design, at) > 0:  # nothing pushes away: the loop's own fault
         return None
     design = loops.design if name == "current" else constant_load(loops.design)
     held = assemble_loops(

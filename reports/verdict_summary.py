@@ -79,7 +79,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, bool]]:
 
     Examples
     --------
-    >>> verdict_lines({"parts": {}, "failed_sections": ["Missing parts"]})
+    >>> verdict_lines({"total": 0, "failed_sections": ["Missing parts"]})
     [('failed: Missing parts', False)]
     """
     parts = verdict.get("parts") or {"requirements": verdict}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.batch.parameters import Population
-from actuator_lti.drive.operating import Operating, OperatingPoint
+from actuator_lti.drive.operating import Operating, OperatingPoint, moment_slope
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block
@@ -208,8 +208,8 @@ def linear_figures(
     time_figures : bool
         Whether to follow the step responses as well (most of the time).
     held : bool
-        Give an inner loop that is unstable only by itself, in a drive that is stable as a whole, the figures
-        of the same loop with the rotor held (current) or the load's moment held (velocity), if stable so.
+        Give an inner loop that its load drives away by itself, in a drive that is stable as a whole, the
+        figures of the same loop with the rotor held (current) or the load moment held (velocity), if stable.
     threads : int
         Threads that share the designs.
     progress : callable, optional
@@ -260,7 +260,8 @@ def linear_figures(
 def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
     """Put the figures of a held loop in the place of one that is unstable only by itself."""
     whole = out[:, LOOPS.index(population.design.controller.outermost), 0] == 1.0
-    chosen = np.flatnonzero(whole & (out[:, LOOPS.index(loop), 0] == 0.0))
+    pushed = moment_slope(population.stacked, at) > 0
+    chosen = np.flatnonzero(whole & pushed & (out[:, LOOPS.index(loop), 0] == 0.0))
     if not chosen.size:
         return
     some, operating = population.part(chosen), at

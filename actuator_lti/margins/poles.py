@@ -136,7 +136,7 @@ def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
     V, W = _complex_vectors(left, values.imag), _complex_vectors(right, values.imag)
     overlap = (V.conj() * W).sum(axis=0)
     weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # left and right nearly apart
         radius = 10.0 * values.size * _EPS * weight / np.abs(overlap)
         sharper = (V.conj() * (A @ W)).sum(axis=0) / overlap
     radius = np.where(np.isnan(radius), np.inf, radius)

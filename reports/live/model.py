@@ -164,21 +164,19 @@ def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[Follo
 def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection[str]) -> list[NotFollowed]:
     """Give the requirements that do not follow, with what they limit."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    still: list[NotFollowed] = [
+    of_held: list[NotFollowed] = [
         {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {loop} loop held"}
         for item in design.requirements
         if item.quantity in LOOP_QUANTITIES
         for loop in judged_loops(item.loop, stages)
         if loop in held
     ]
-    return [
-        *still,
-        *(
-            NotFollowed(id=item.id, words=QUANTITIES[item.quantity].words)
-            for item in design.requirements
-            if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
-        ),
+    others: list[NotFollowed] = [
+        {"id": item.id, "words": QUANTITIES[item.quantity].words}
+        for item in design.requirements
+        if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
     ]
+    return [*of_held, *others]
 
 
 def _step(design: Design) -> StepData:

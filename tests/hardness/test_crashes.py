@@ -19,7 +19,7 @@ REPORT = ("report", "ilr33-amber", "--quiet")
 # What is broken on purpose (module, function), and the sections that must be there all the same.
 BROKEN = {
     "analyses.loop_survey:survey_loops": {"parameters", "provenance"},
-    "analyses.loop_survey:_other_forms": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
     "analyses.loop_survey:_locked": {"margins", "loop-current", "parameters"},
     "analyses.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
     "analyses.loop_survey:_operating_points": {"margins", "loop-position", "parameters"},

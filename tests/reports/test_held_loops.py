@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Requirement
-from analyses.held_loops import constant_load
+from analyses.held_loops import constant_load, held_loop
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import all_pass, evaluate_requirements
 from analyses.tuning.problem import problem_of
@@ -92,6 +92,14 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
         assert figures["position"].margins.stable is stable
         assert figures["current"].sound is stable
         assert figures["velocity"].sound is stable
+
+
+def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
+    """Without a load that pushes, an unstable current loop inside a stable drive stays what it is."""
+    loops = assemble_loops(pushed(-1.0))
+    assert held_loop(loops, "current") is None
+    assert held_loop(assemble_loops(pushed(1.0)), "current") is not None
+    assert held_loop(assemble_loops(pushed(1.0)), "position") is None
 
 
 def test_many_designs_at_once_are_judged_alike() -> None:
