@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _GAINS = np.geomspace(1.0, 1e4, 401)
 _DELAY_STEPS_A_TICK = 4
+AT_REST = 1e-12  # from 1: an eigenvalue that no gain of those tried moves away is a mode at rest
+TRIED_GAINS = (0.37, 1.0, 2.9)
 
 
 def phase_blocks(program: TickProgram, every: int, source: str, signal: str, scale: Any = 1.0) -> list[Block]:
@@ -111,17 +113,32 @@ class PeriodicLoop:
         One an update: y = C x seen at its start, e held over it.
     dt : float
         Time between two updates, s.
+    hidden : int
+        How many eigenvalues stand at 1 whatever the gain (`hidden_at_rest`); they are none of its modes.
     """
 
     systems: Sequence[System]
     dt: float
+    hidden: int = 0
 
     def modes(self, gain: float = 1.0) -> np.ndarray:
         """Eigenvalues over one period with the loop closed through a gain."""
         over = np.eye(self.systems[0][0].shape[0])
         for A, B, C in self.systems:
             over = (A - gain * B @ C) @ over
-        return np.asarray(np.linalg.eigvals(over), dtype=complex)
+        modes = np.asarray(np.linalg.eigvals(over), dtype=complex)
+        return modes[np.argsort(np.abs(modes - 1.0))[self.hidden :]] if self.hidden else modes
+
+    def radius(self, gain: float = 1.0) -> float:
+        """Largest magnitude of a mode."""
+        return float(np.max(np.abs(self.modes(gain)), initial=0.0))
+
+    def hidden_at_rest(self) -> int:
+        """How many modes stand at 1 at all gains tried: what rounding leaves of a rest that the loop keeps.
+
+        A velocity controller's integral holds a load that is a spring, and is damped, at any angle.
+        """
+        return min(int(np.sum(np.abs(self.modes(gain) - 1.0) < AT_REST)) for gain in TRIED_GAINS)
 
     def __call__(self, points: npt.ArrayLike) -> np.ndarray:
         """L = T/(1 - T) of the fundamental at points z (see the module), of their shape; inf where T is 1."""
@@ -153,8 +170,12 @@ class PeriodicLoop:
 def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:
     """The loop at a break point of sampled loops, what no gain moves left out."""
     wired = wire(loops.design, loops.operating)
-    moved, _ = _parts(point_blocks(wired, point))
-    return PeriodicLoop(moved, wired.interval[wired.producer(point)] * wired.tick_s)
+    return _moved(_parts(point_blocks(wired, point))[0], wired.interval[wired.producer(point)] * wired.tick_s)
+
+
+def _moved(systems: Sequence[System], dt: float) -> PeriodicLoop:
+    loop = PeriodicLoop(systems, dt)
+    return replace(loop, hidden=loop.hidden_at_rest())
 
 
 def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
@@ -187,11 +208,6 @@ def _without_rest(systems: list[System]) -> list[System]:
     return systems
 
 
-def _radius(systems: Sequence[System], gain: float) -> float:
-    """Spectral radius over one period with the loop closed through a gain."""
-    return float(np.max(np.abs(PeriodicLoop(systems, 0.0).modes(gain)), initial=0.0))
-
-
 def _first_border(excess: Callable[[float], float], grid: Sequence[float], none: float) -> float:
     """First root of ``excess`` (negative at grid[0]) along a grid."""
     from scipy.optimize import brentq
@@ -219,22 +235,23 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
     if point not in loops.break_points:
         raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
     wired = wire(loops.design, loops.operating)
-    systems, others = _parts(point_blocks(wired, point))
-    radius = max(_radius(systems, 1.0), _radius(others, 1.0))
+    moved, others = (_moved(part, wired.tick_s) for part in _parts(point_blocks(wired, point)))
+    radius = max(moved.radius(), others.radius())
     nan = float("nan")
     if radius >= 1:
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
-    upper = _first_border(lambda g: _radius(systems, g) - 1, list(_GAINS), float("inf"))
-    lower = _first_border(lambda g: _radius(systems, g) - 1, list(1 / _GAINS), 0.0)
-    delay = _delay_border(wired, longest_delay_ticks) if point == "u" else None
+    upper = _first_border(lambda g: moved.radius(g) - 1, list(_GAINS), float("inf"))
+    lower = _first_border(lambda g: moved.radius(g) - 1, list(1 / _GAINS), 0.0)
+    delay = _delay_border(wired, longest_delay_ticks, moved.hidden) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
 
-def _delay_border(wired: Drive, longest_ticks: float) -> float:
+def _delay_border(wired: Drive, longest_ticks: float, hidden: int) -> float:
     Ts = wired.tick_s
 
     def excess(ticks: float) -> float:
-        return _radius(_parts(point_blocks(wired.later(ticks * Ts), "u"))[0], 1.0) - 1
+        later, _ = _parts(point_blocks(wired.later(ticks * Ts), "u"))
+        return PeriodicLoop(later, Ts, hidden).radius() - 1
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = [0.0, *np.arange(step, longest_ticks, step)]

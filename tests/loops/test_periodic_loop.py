@@ -9,6 +9,9 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.resolvent import responses
+from analyses.validation.bench import on_the_bench
+from analyses.validation.bias_motion import on_its_stand
+from tests.validation.random_drives import full_drive
 
 SYSTEMS = [  # of one state, by turns
     (np.array([[0.9]]), np.array([[0.3]]), np.array([[1.0]])),
@@ -50,3 +53,11 @@ def test_a_slow_filter_of_the_command_moves_no_margin() -> None:
     plain, filtered = (exact_margins(assemble_loops(one), "u") for one in (design, slow))
     assert filtered.gain_upper == pytest.approx(plain.gain_upper, rel=1e-9)
     assert filtered.delay_s == pytest.approx(plain.delay_s, rel=1e-9)
+
+
+@pytest.mark.parametrize(("seed", "gain"), [(90004, 6.1718), (90006, 4.5869)])
+def test_a_rest_that_an_integral_holds_is_no_border(seed: int, gain: float) -> None:
+    """A damped load on a spring (or a pendulum): rounding of its rest was taken for a border at 1.145."""
+    found = exact_margins(assemble_loops(on_its_stand(on_the_bench(full_drive(seed)))), "u")
+    assert found.gain_upper == pytest.approx(gain, rel=1e-4)  # what runs in time show
+    assert found.spectral_radius < 0.999
