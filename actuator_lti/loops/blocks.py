@@ -22,12 +22,11 @@ def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
     start : ndarray of bool, shape (n,)
         What the output looks at itself.
     """
-    result = start
-    while True:
-        more = result | depends[result].any(axis=0)
-        if (more == result).all():
-            return result
-        result = more
+    result, new = start.copy(), start
+    while new.any():
+        new = depends[new].any(axis=0) & ~result
+        result |= new
+    return result
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,9 @@ def _nearness(item: VerdictItem) -> float:
 
 
 def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
-    """Make one Bode and one step figure, of the outermost loop."""
-
+    """Make one Bode and one step figure, of the outermost loop; none of a drive without loops."""
+    if not figures:
+        return []
     name, result = list(figures.items())[-1]
     blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name)]
     if result.step is not None:
