@@ -144,7 +144,12 @@ def limit_cycles(
     foreseen : tuple of ForeseenCycle, optional
         By describing function, if known already.
     """
-    design = replace(design, instruments=Instruments())  # what noise keeps moving, friction does not
+    design = replace(  # what noise or counts keep moving, friction does not
+        design,
+        instruments=Instruments(),
+        encoder=replace(design.encoder, counts_per_rev=None),
+        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+    )
     if foreseen is None:
         foreseen = described_cycles(design, load_Nm)
     checked = tuple(_confirm(design, load_Nm, cycle) for cycle in foreseen)

@@ -660,6 +660,13 @@ def validate_one(design: Design, settings: Settings, tally: Tally) -> None:
         print(
             f"    LARGE COMMANDS: {one.ending} from {one.next_rad} of {one.full_deflection_rad}: {one.limiter} limit {one.limiter_share:.0%}"
         )
+    points = () if found.friction is None else found.friction.points
+    for swing in (point.cycles.hunting for point in points):
+        if swing is not None:
+            print(
+                f"    HUNTS +-{swing.hunting_rad} rad at {swing.hunting_hz} Hz after {swing.amplitude_rad} rad"
+                f"{', limited' * swing.limited}"
+            )
     if not judged:
         print(f"    NOTES {found.notes} {[row.reason for row in found.ledger][:6]}")
     for note in found.notes:
