@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 Complexes = npt.NDArray[np.complex128]
 
 
+NOTICED = 1e-6  # of full deflection
+
+
 @dataclass(frozen=True)
 class LoopValidation:
     """One loop, linear and measured.
@@ -162,9 +165,14 @@ class Validation:
 
     @property
     def hunting(self) -> bool:
-        """Whether the drive does not come to rest after a step, by dry friction."""
+        """Whether the drive does not come to rest after a step, by dry friction.
+
+        A swing of less than `NOTICED` of full deflection is listed with what friction does, it fails nothing.
+        """
         points = () if self.friction is None else self.friction.points
-        return any(point.cycles.hunting is not None for point in points)
+        swings = [point.cycles.hunting for point in points]
+        least = NOTICED * self.design.validation.full_deflection_rad
+        return any(one is not None and (one.hunting_rad or 0.0) >= least for one in swings)
 
     @property
     def verdict(self) -> str:

@@ -98,3 +98,19 @@ def test_points_without_motion_are_left_out_without_a_warning() -> None:
     words = _described_agreement(replace(sweep, measured=measured, described=described))
     assert words == "agrees with the simulation within 6 dB and 90 deg"
     assert "not compared" in _described_agreement(replace(sweep, measured=nothing, described=described))
+
+
+@pytest.mark.parametrize(("part", "hunts"), [(2e-10, False), (1e-3, True)])
+def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> None:
+    """Seed 100035 hunts by 8e-14 rad of 4e-4 (plain integration says the same): a verdict of no use."""
+    design = load_design("ilr33-amber")
+    size = part * design.validation.full_deflection_rad
+    swing = Settling(
+        amplitude_rad=size, wait_s=1.0, error_rad=0.0, at_rest=False, limited=False,
+        hunting=True, hunting_rad=size, hunting_hz=3.0,
+    )  # fmt: skip
+    cycles = LimitCycles((), None, (swing,))
+    point = FrictionPoint(0.0, 1e-3, None, None, cycles)
+    result = validate(design, QUICK)
+    friction = FrictionEffects(design, (point,), "velocity")
+    assert replace(result, friction=friction).hunting is hunts
