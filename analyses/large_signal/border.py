@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -139,7 +139,8 @@ def check_border(
             )  # fmt: skip
             return limiter_fractions(result)
 
-        simulated[which], names[which] = _bisect(acting, foreseen, tries)
+        wanted = [border.active[k] for k in which]
+        simulated[which], names[which] = _bisect(acting, foreseen, tries, wanted)
 
     if len(limited):
         search(limited, tries)
@@ -204,9 +205,16 @@ def _straight(design: Design) -> Design:
 
 
 def _bisect(
-    acting: Callable[[np.ndarray], np.ndarray], foreseen: np.ndarray, tries: tuple[float, float]
+    acting: Callable[[np.ndarray], np.ndarray],
+    foreseen: np.ndarray,
+    tries: tuple[float, float],
+    wanted: Sequence[str],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Close in on the border from both sides, all frequencies at once, on a logarithmic scale."""
+    """Close in on the border from both sides, all frequencies at once, on a logarithmic scale.
+
+    The limiter that acts is the one foreseen, where it does: behind the border a drive may swing against
+    another one for longer.
+    """
     low, high = np.log(tries[0] * foreseen), np.log(tries[1] * foreseen)
     at_low, at_high = acting(np.exp(low)), acting(np.exp(high))
     valid = (at_low.max(axis=1) == 0.0) & (at_high.max(axis=1) > 0.0)
@@ -217,5 +225,8 @@ def _bisect(
         hit = seen.max(axis=1) > 0.0
         low, high = np.where(hit, low, middle), np.where(hit, middle, high)
         last = np.where(hit[:, None], seen, last)
-    names = [LIMITERS[int(np.argmax(row))] if ok else "" for row, ok in zip(last, valid, strict=True)]
+    names = [
+        "" if not ok else one if one and row[LIMITERS.index(one)] > 0.0 else LIMITERS[int(np.argmax(row))]
+        for row, ok, one in zip(last, valid, wanted, strict=True)
+    ]
     return np.where(valid, np.exp(0.5 * (low + high)), np.nan), np.array(names, dtype=object)
