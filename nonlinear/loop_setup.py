@@ -18,16 +18,16 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.bias_motion import (
-    BiasMotion,
-    bias_motion,
+from nonlinear.operating_motion import (
+    OperatingMotion,
     current_state,
     may_stand,
+    operating_motion,
     standing,
     velocity_state,
 )
-from nonlinear import Rows
 from nonlinear.probe import Probe, write_probe
+from nonlinear.rows import Rows
 
 Floats = npt.NDArray[np.float64]
 Value = float | npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
 
 @dataclass(frozen=True)
-class Rig:
+class LoopSetup:
     """A drive set up to test one loop.
 
     Attributes
@@ -45,7 +45,7 @@ class Rig:
     loop : str
         ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
         ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
-    bias : BiasMotion
+    bias : OperatingMotion
         The motion underneath.
     limits_on : bool
     held : bool
@@ -54,7 +54,7 @@ class Rig:
 
     design: Design
     loop: str
-    bias: BiasMotion
+    bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
 
@@ -113,11 +113,11 @@ class Rig:
         return "standing, without dry friction"
 
     def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
-        """Parameters of a run that starts in the steady state of the bias motion; see `rows`."""
+        """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
         return self.rows(np.array([gain]), np.array([delay_samples]))
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
-        """Parameters of runs that start in the steady state of the bias motion, one a value.
+        """Parameters of runs that start in the steady state of the operating motion, one a value.
 
         Parameters
         ----------
@@ -241,8 +241,8 @@ GAINS = {
 }
 
 
-def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
-    """Set a drive up for one loop, on a bias motion that the code chooses.
+def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> LoopSetup:
+    """Set a drive up for one loop, on an operating motion that the code chooses.
 
     A position controller with an integral or a derivative part cannot be started in the steady state of a
     ramp: then the drive stands, where it has no slope of its own about rest.
@@ -250,28 +250,28 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     Raises
     ------
     InputError
-        If the design has no such loop or break point, or has no bias motion.
+        If the design has no such loop or break point, or has no operating motion.
     """
     known = (*stages_of(design), *points_of(design))
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    result = Rig(design, loop, bias_motion(design), limits_on, held)
+    result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
     if result.outer == "position" and remembers(design) and may_stand(design):
-        return Rig(design, loop, standing(design), limits_on, held)
+        return LoopSetup(design, loop, standing(design), limits_on, held)
     return result
 
 
-def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
+def standing_setup(design: Design, loop: str, *, held: bool = False) -> LoopSetup:
     """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
 
     At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
     growth.  With play, or friction that differs by direction, the drive has to move on: these have a slope of
     their own about rest.
     """
-    setup = rig(design, loop, limits_on=False, held=held)
+    setup = loop_setup(design, loop, limits_on=False, held=held)
     if not may_stand(design):
         return setup
-    return Rig(design, loop, standing(design), limits_on=False, held=held)
+    return LoopSetup(design, loop, standing(design), limits_on=False, held=held)
 
 
 def remembers(design: Design) -> bool:
