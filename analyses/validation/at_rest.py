@@ -16,8 +16,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
+from analyses.responses import response_at
 from analyses.validation.coherent import coherent
-from analyses.validation.response import linear_response
 from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
 
@@ -131,7 +131,7 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     point = "sliding" if speed_rad_s is None else "describing-function"
     at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
     wired = wire(design, at)
-    return linear_response(reference_to_output(wired), frequency_hz)
+    return response_at(reference_to_output(wired), 2.0 * np.pi * frequency_hz)
 
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:

@@ -23,15 +23,15 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
-from analyses.validation.budget import OutOfTime
-from analyses.validation.confirm import oscillation_hz
-from analyses.validation.release import full_range
+from actuator_lti.errors import TooManyTicks
+from analyses.validation.settling import full_range
 from nonlinear import LIMITERS, Rows
 from nonlinear.loop_setup import points_of
 from nonlinear.operating_motion import lasting_torque_Nm
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
+    from actuator_lti.loops.periodic import PeriodicLoop
     from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -238,7 +238,7 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
     ratio = saturation_ratio(gain)
     from actuator_lti.loops import periodic_loop
 
-    hertz = oscillation_hz(periodic_loop(loops, point), gain=gain)
+    hertz = _oscillation_hz(periodic_loop(loops, point), gain)
     if hertz == 0.0:
         return None
     design, omega = loops.design, 2.0 * pi * hertz
@@ -247,6 +247,21 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
     integral = {"i_ref": design.controller.velocity, "u": design.controller.current}.get(point)
     stops = integral is not None and integral.integral_time_s is not None and "U/R" not in limiter
     return Prediction(point, limit, limiter, gain, ratio * limit, hertz, output, stops)
+
+
+def _oscillation_hz(loop: PeriodicLoop, gain: float) -> float:
+    """At which frequency a loop oscillates at a gain that brings a pole to the unit circle.
+
+    A pole over M updates is that of M frequencies: the one at which ``gain L`` comes nearest to -1 is meant.
+    """
+    poles = loop.modes(gain)
+    angle = abs(float(np.angle(poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))])))
+    count = len(loop.systems)
+    turns = 2.0 * pi * np.arange(count)
+    angles = np.concatenate([turns + angle, turns[1:] - angle]) / count  # of an update
+    angles = angles[angles <= pi * (1.0 + 1e-9)]
+    off = np.abs(1.0 + gain * loop(np.exp(1j * angles)))
+    return float(angles[int(np.argmin(off))]) / (2.0 * pi * loop.dt)
 
 
 def _to_output(design: Design, point: str, omega: float) -> float:
@@ -317,12 +332,12 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
 
     Raises
     ------
-    OutOfTime
-        Where one run would take most of the time of a validation.
+    TooManyTicks
+        Where one run would take more than `LONGEST_TICKS`.
     """
     rows = step_rows(design, sizes_rad, settle_ticks, longer)
     if rows["ticks"].max() > LONGEST_TICKS:
-        raise OutOfTime
+        raise TooManyTicks(f"a step of {int(rows['ticks'].max())} ticks: at most {LONGEST_TICKS} are run")
     result = rows.run()
     errors = []
     for last in (0, 1):

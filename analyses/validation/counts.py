@@ -24,7 +24,7 @@ from actuator_lti.design.model import Design
 from analyses.loop_figures import loop_figures
 from analyses.validation.coherent import coherent
 from analyses.validation.conditional import step_rows
-from analyses.validation.release import full_range
+from analyses.validation.settling import LONGEST_TICKS, full_range
 from nonlinear import Rows
 
 if TYPE_CHECKING:
@@ -204,12 +204,10 @@ def _ripple(
 
 def _rest(design: Design, ideal: Design, count_rad: float) -> tuple[float, float]:
     """Error that counts leave after a step, and half of what the output still moves by because of them."""
-    from analyses.validation.sweep import LONGEST_SETTLE_TICKS
-
     size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
     ends = []
     for one in (design, ideal):
-        result = step_rows(one, size, LONGEST_SETTLE_TICKS // 4).run()
+        result = step_rows(one, size, LONGEST_TICKS // 4).run()
         low, high = (float(x[0]) for x in result.span("output_angle_rad"))
         ends.append((abs(0.5 * (low + high) - float(size[0])), 0.5 * (high - low)))
     moves = ends[0][1] - ends[1][1]
@@ -221,14 +219,14 @@ def _linearity(
 ) -> Floats:
     """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
     from analyses.limit_cycles.foreseen import without_nonlinearities
-    from analyses.validation.response import linear_response
+    from analyses.responses import response_at
 
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
         return np.full(TRIED.size, inf)
     base = design.controller.position_loop.every
     window = coherent([band.minus3db_hz], design.controller.period_s, base, least_cycles=8)
-    gain = abs(complex(linear_response(loops.plain_response, window.frequency_hz)[0]))
+    gain = abs(complex(response_at(loops.plain_response, 2.0 * pi * window.frequency_hz)[0]))
     wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
     amplitude = wanted * TRIED
     seen, there = [], np.ones(TRIED.size, dtype=bool)

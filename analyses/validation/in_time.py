@@ -144,7 +144,7 @@ def _run_step(setup: LoopSetup, part: float, samples: int) -> Floats | None:
             back[k] = drive.s[RETURNED[setup.point]]
         runs.append(back)
         flags.append((drive.s[at.S_EVENTS], drive.s[at.S_STATUS]))
-    return None if flags[0] != flags[1] else np.asarray((runs[1] - runs[0]) / size)
+    return None if flags[0] != flags[1] else np.asarray((runs[1] - runs[0]) / size, float)
 
 
 def margin_shown(bench: Bench, name: str) -> MarginShown | None:
@@ -235,4 +235,4 @@ def _course(
         drive.run(setup.base_ticks)
         calm.run(setup.base_ticks)
     same = drive.s[[at.S_EVENTS, at.S_STATUS]] == calm.s[[at.S_EVENTS, at.S_STATUS]]
-    return seen / size if same.all() else None
+    return np.asarray(seen / size, complex) if same.all() else None

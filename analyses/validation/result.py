@@ -3,165 +3,91 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
 from actuator_lti.design.model import Design
+from actuator_lti.verdict import Tally, Verdict
 from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
+from analyses.validation.bench_sweep import BenchSweep
+from analyses.validation.by_amplitude import AmplitudeMargin
 from analyses.validation.conditional import Conditional
-from analyses.validation.confirm import Confirmation
 from analyses.validation.counts import Counts
-from analyses.validation.figures import Measured
 from analyses.validation.from_rest import RestSteps
-from analyses.validation.ledger import Entry
-from analyses.validation.release import AmplitudeMargin
-from analyses.validation.response import Sweep, SweepErrors
-from analyses.validation.tones import ToneSweep
+from analyses.validation.in_time import MarginShown, StepShown
+from analyses.validation.row import Row
 
 if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
     from analyses.large_signal import LargeSignals
     from analyses.specification import Specification
 
-Complexes = npt.NDArray[np.complex128]
-
-
 NOTICED = 1e-6  # of full deflection
 
 
-@dataclass(frozen=True)
-class LoopValidation:
-    """One loop, linear and measured.
-
-    Attributes
-    ----------
-    name : str
-    figures : LoopFigures
-        Linear.
-    measured : Measured or None
-        ``None`` where the loop is not stable, so that nothing can be measured; ``reason`` says so.
-    open_loop, closed_loop : ndarray of complex, shape (K,)
-        Linear responses at the frequencies of the sweep.
-    open_errors, closed_errors : SweepErrors or None
-    tones : ToneSweep or None
-    tone_errors : SweepErrors or None
-    confirmed : tuple of Confirmation
-    reason : str
-    """
-
-    name: str
-    figures: LoopFigures
-    measured: Measured | None
-    open_loop: Complexes
-    closed_loop: Complexes
-    open_errors: SweepErrors | None
-    closed_errors: SweepErrors | None
-    tones: ToneSweep | None
-    tone_errors: SweepErrors | None
-    confirmed: tuple[Confirmation, ...]
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class PointValidation:
-    """A break point with all other loops closed, linear and measured."""
-
-    name: str
-    sweep: Sweep | None
-    open_errors: SweepErrors | None
-    confirmed: tuple[Confirmation, ...]
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Validation:
-    """Everything the nonlinear simulator says of a design's linear predictions.
+    """Everything the nonlinear simulator says of a design's predictions.
 
     Attributes
     ----------
-    ledger : tuple of Entry
-        Every prediction beside its measurement.
-    loops, points : mapping by name
-    amplitude_margins : tuple of AmplitudeMargin
-    conditional : Conditional or None
-    rest_sweep : RestSweep or None
-    rest_steps : RestSteps or None
-    command : Sweep or None
-        Response to the command.
-    counts : tuple of Counts
-        What the counts of each encoder do.
-    large_signals, friction, specification : results or None
-        Of `analyses.large_signal`, `analyses.friction_effects`, `analyses.specification`.
-    seconds : mapping of str to float
-        How the time divided.
-    notes : tuple of str
-        What could not be done, and why.
+    rows : tuple of Row
+        Every check: small signals by the tangent, the runs in time, the numbers of the design.
+    figures : mapping of str to LoopFigures
+        The linear loops, as they are tested (of the current with the rotor locked).
+    steps : mapping of str to StepShown
+    margins : mapping of str to MarginShown
+        Runs on either side of the quoted gain margin of each loop.
+    sweeps : mapping of str to BenchSweep
+    amplitude_margins, conditional, rest_sweep, rest_steps, counts, large_signals, friction, specification :
+        Findings: what large signals, friction and counts do.
     held_by_friction : tuple of str
         Loops that are stable with the friction that is left out where the drive is tested, and only with it.
+    notes : tuple of str
+        What could not be done, and why.
     """
 
     design: Design
-    ledger: tuple[Entry, ...]
-    loops: Mapping[str, LoopValidation]
-    points: Mapping[str, PointValidation]
-    amplitude_margins: tuple[AmplitudeMargin, ...]
-    conditional: Conditional | None
-    rest_sweep: RestSweep | None
-    rest_steps: RestSteps | None
-    large_signals: LargeSignals | None
-    friction: FrictionEffects | None
-    specification: Specification | None
-    seconds: Mapping[str, float]
-    notes: tuple[str, ...] = ()
-    command: Sweep | None = None
+    rows: tuple[Row, ...]
+    figures: Mapping[str, LoopFigures]
+    steps: Mapping[str, StepShown] = field(default_factory=dict)
+    margins: Mapping[str, MarginShown] = field(default_factory=dict)
+    sweeps: Mapping[str, BenchSweep] = field(default_factory=dict)
+    amplitude_margins: tuple[AmplitudeMargin, ...] = ()
+    conditional: Conditional | None = None
+    rest_sweep: RestSweep | None = None
+    rest_steps: RestSteps | None = None
     counts: tuple[Counts, ...] = ()
+    large_signals: LargeSignals | None = None
+    friction: FrictionEffects | None = None
+    specification: Specification | None = None
     held_by_friction: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
-    def failed(self) -> tuple[Entry, ...]:
-        """Predictions that do not hold where they should."""
-        return tuple(row for row in self.ledger if row.passed is False)
+    def tally(self) -> Tally:
+        """The rows counted."""
+        return Tally.of(row.verdict for row in self.rows)
 
     @property
-    def judged(self) -> bool:
-        """Whether there is a prediction that could be judged."""
-        return any(row.passed is not None for row in self.ledger)
+    def not_met(self) -> tuple[Row, ...]:
+        """Predictions that the simulator contradicts."""
+        return tuple(row for row in self.rows if row.verdict is Verdict.NOT_MET)
 
     @property
     def unstable(self) -> tuple[str, ...]:
         """Loops that are not stable."""
         return tuple(
             name
-            for name, loop in self.loops.items()
-            if loop.figures.margins.stable is False and name not in self.held_by_friction
+            for name, own in self.figures.items()
+            if own.margins.stable is False and name not in self.held_by_friction
         )
 
     @property
     def undecided(self) -> tuple[str, ...]:
         """Loops of which the data do not tell whether they are stable."""
-        return tuple(name for name, loop in self.loops.items() if loop.figures.margins.stable is None)
-
-    @property
-    def instability(self) -> str:
-        """Which loops are not known to be stable, and what the simulator says of it; else empty."""
-        said = {row.loop: row for row in self.ledger if row.quantity == "stability"}
-        parts = []
-        for name in (*self.unstable, *self.undecided):
-            row = said.get(name)
-            if name in self.undecided:
-                parts.append(f"stability of the {name} loop not known")
-            elif self.loops[name].figures.margins.verdict == "on the border":
-                parts.append(f"the {name} loop is on the border of stability")
-            else:
-                seen: dict[bool | None, str] = {
-                    True: ", and a run of it grows as predicted",
-                    False: ", but no run of it grows so",
-                }
-                parts.append(f"the {name} loop is unstable{seen.get(row.passed if row else None, '')}")
-        return "; ".join(parts)
+        return tuple(name for name, own in self.figures.items() if own.margins.stable is None)
 
     @property
     def hunting(self) -> bool:
@@ -175,43 +101,36 @@ class Validation:
         return any(one is not None and (one.hunting_rad or 0.0) >= least for one in swings)
 
     @property
-    def verdict(self) -> str:
-        """In a word: ``"PASS"``, ``"FAIL"``, ``"UNDECIDED"`` or ``"NOTHING JUDGED"``."""
-        if self.passed:
-            return "PASS"
-        if self.undecided and not (self.failed or self.unstable or self.hunting):
-            return "UNDECIDED"
-        return "FAIL" if self.judged else "NOTHING JUDGED"
-
-    @property
-    def passed(self) -> bool:
-        """Whether predictions were judged, all hold, and the drive settles: no loop unstable or unknown, no
-        command within full deflection diverges, dry friction sustains no motion.
-        """
-        unstable = bool(self.unstable or self.undecided or self.hunting)
-        diverges = self.conditional is not None and self.conditional.diverges
-        border = None if self.large_signals is None else self.large_signals.border
-        off = border is not None and border.passed is False
-        return self.judged and not (self.failed or unstable or diverges or off)
-
-    def __str__(self) -> str:
-        judged = [row for row in self.ledger if row.passed is not None]
-        held = sum(row.passed is True for row in judged)
-        wrong = [self.instability, "the drive hunts: after a step it does not come to rest" * self.hunting]
-        first = "".join([f"{self.design.name}: ", *(f"{part}; " for part in wrong if part)])
-        if not judged:
-            return f"{first}nothing judged: no linear prediction could be compared"
-        words = f"{first}{held} of {len(judged)} predictions agree with the simulation"
-        words += f", {len(self.ledger) - len(judged)} shown with the reason why they need not"
+    def failures(self) -> tuple[str, ...]:
+        """What the drive does that it must not, beside rows that are not met; a sentence each."""
+        found = [f"the {name} loop is {self.figures[name].margins.verdict}" for name in self.unstable]
+        if self.hunting:
+            found.append("the drive does not come to rest after a step: dry friction sustains a limit cycle")
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
-            words += f"; a command within full deflection makes the drive {does}"
-            if self.conditional.limiter:
-                words += f" ({self.conditional.limiter} limit)"
+            by = f" ({self.conditional.limiter} limit)" if self.conditional.limiter else ""
+            found.append(f"a command within full deflection makes the drive {does}{by}")
         border = None if self.large_signals is None else self.large_signals.border
         if border is not None and border.passed is False:
-            words += (
-                "; a limit first acts at another command, or is another one, than the linear loop foresees"
-            )
-        return words
+            found.append("a limit first acts at another amplitude, or is another one, than predicted")
+        return tuple(found)
+
+    @property
+    def verdict(self) -> Verdict:
+        """``not met`` where a row is, or the drive fails by itself; then ``not proven``; else ``met``."""
+        if self.not_met or self.failures:
+            return Verdict.NOT_MET
+        if self.undecided or not self.rows:
+            return Verdict.NOT_PROVEN
+        return self.tally.verdict
+
+    @property
+    def passed(self) -> bool:
+        """Whether every prediction was judged and met, and the drive comes to rest where it is sent."""
+        return self.verdict is Verdict.MET
+
+    def __str__(self) -> str:
+        said = [self.tally.words("predictions"), *self.failures]
+        said += [f"stability of the {name} loop not known" for name in self.undecided]
+        return f"{self.design.name}: {'; '.join(said)}"

@@ -121,7 +121,8 @@ def _marks(place: Place) -> list[float]:
     if place.figures is None:
         return []
     figures, hold = place.figures, place.tangent.hold_s
-    at = [m.frequency_rad_s for m in (*figures.margins.gain_margins, *figures.margins.phase_margins)]
+    at = [gain.frequency_rad_s for gain in figures.margins.gain_margins]
+    at += [phase.frequency_rad_s for phase in figures.margins.phase_margins]
     if figures.bandwidth is not None:
         band = figures.bandwidth
         at += [x for x in (band.minus3db_rad_s, band.minus90deg_rad_s, band.resonance_rad_s) if x]
