@@ -17,6 +17,7 @@ from reports.html import show_signed
 from reports.numbers import show
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
+WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
 WORDS = {True: ("pass", "✓ met"), False: ("fail", "✗ not met"), None: ("info", "– not judged")}
 
 
@@ -47,13 +48,16 @@ def print_verdict(passed: bool, words: str, *, failed: str = "FAIL") -> None:
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
-def print_section(section: Mapping[str, Any], passed: bool | None) -> None:
-    """Print a section: verdict or result first, then how it was found, then its tables."""
+def print_section(section: Mapping[str, Any], passed: bool | None, name: str = "") -> None:
+    """Print a section: verdict or result first (of ``name``), then how it was found, then its tables."""
+    words = f"{name}: {section['result']}" if name else section["result"]
     if passed is None:
-        console().print(Text(section["result"]), soft_wrap=True)
+        console().print(Text(words), soft_wrap=True)
     else:
-        print_verdict(passed, section["result"])
-    print_blocks([{"kind": "text", "text": section["intro"]}, *section["blocks"]])
+        print_verdict(passed, words)
+    if section["intro"]:
+        console().print(Text(section["intro"], style="dim"))
+    print_blocks(section["blocks"])
 
 
 def _print(block: Mapping[str, Any], out: Console) -> None:
@@ -61,6 +65,10 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     if block["kind"] == "table":
         laid = table(block)
         out.print(laid if _fits(laid, out) else stacked(block))
+        if block.get("note"):
+            out.print(Text(block["note"], style="dim"))
+    elif block["kind"] == "facts":
+        out.print(fact_table(block))
     elif block["kind"] == "verdicts":
         laid = verdict_table(block)
         out.print(laid if _fits(laid, out) else stacked_verdicts(block))
@@ -79,10 +87,20 @@ def table(block: Mapping[str, Any]) -> Table:
             part for part in (column["label"], f"[{column['unit']}]" if column["unit"] else "") if part
         )
         cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
-        whole = max((cell.cell_len for cell in cells), default=0) if column["align"] == "right" else None
-        made.add_column(Text(label), justify=_side(column["align"]), min_width=whole)
+        longest = max((cell.cell_len for cell in cells), default=0)
+        least = longest if column["align"] == "right" else min(longest, WRAPPED)
+        least = max(least, *map(len, label.split(" ")))
+        made.add_column(Text(label), justify=_side(column["align"]), min_width=least)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
+    return made
+
+
+def fact_table(block: Mapping[str, Any]) -> Table:
+    """Lay labelled values out, a line each."""
+    made = Table.grid(padding=(0, 2))
+    for item in block["items"]:
+        made.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
     return made
 
 

@@ -12,18 +12,10 @@ from reports.sections.margins import shown
 from reports.sections.names import LOOPS, figure_column
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.corners import Corner, Corners
     from analyses.loop_figures import LoopFigures
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.corners import corners
-
-    return section(corners(design))
 
 
 def section(result: Corners) -> Section:

@@ -12,18 +12,10 @@ from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.duty import Duty, Heating
     from reports.figures import duty as duty_figure
 
 _SHOWN = 400
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.duty import duty
-
-    return section(duty(design))
 
 
 def section(result: Duty) -> Section:

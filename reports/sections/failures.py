@@ -14,7 +14,6 @@ from reports.numbers import short
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.failures import FailureCase, Failures
     from reports.figures import failures as failures_figure
 
@@ -28,13 +27,6 @@ NAMES = {
     "oscillatory-command": "Oscillatory command",
 }
 _SHOWN = 400
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.failures import failures
-
-    return section(failures(design))
 
 
 def section(result: Failures) -> Section:
@@ -71,12 +63,12 @@ def summary(result: Failures) -> str:
 def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
     columns = [
         doc.column("case", "Failure"),
-        doc.column("near", f"To {near}", format="ms:3"),
-        doc.column("stop", "To the stop", format="ms:3"),
+        doc.column("near", f"To {near}", "ms", format="ms:3"),
+        doc.column("stop", "To the stop", "ms", format="ms:3"),
         doc.column("seen", "Until detected", unit, format="sig:3", better=-1),
         doc.column("current", "Peak current", "A", format="sig:3", better=-1),
         doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3", better=-1),
-        doc.column("protected", "I²t acts at", format="ms:3"),
+        doc.column("protected", "I²t acts at", "ms", format="ms:3"),
         doc.column("words", "What happens"),
     ]
     note = f"No value: not within the {result.asked.watched_s:g} s watched."

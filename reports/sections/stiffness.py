@@ -45,7 +45,7 @@ def section(result: Stiffness) -> Section:
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status: Status = "info" if not result.checks else "pass" if result.agrees else "fail"
+    status: Status = "info" if not result.checks else "pass" if result.passed else "fail"
     return doc.section(
         "stiffness",
         "Stiffness",
@@ -64,7 +64,12 @@ def _result(result: Stiffness, unit: str) -> str:
     least, at = powered.least
     static = powered.static_Nm_rad
     words = f"{static:.4g} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-    return f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz."
+    words = f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz"
+    if result.checks:
+        most = max(check.difference for check in result.checks)
+        said = "confirms" if result.passed else "does not confirm"
+        words += f"; an injected moment {said} it (relative difference up to {most:.1e})"
+    return f"{words}."
 
 
 def _figure(result: Stiffness, unit: str) -> list[Block]:
@@ -95,7 +100,7 @@ def _table(result: Stiffness, unit: str) -> Block:
         doc.column("at", "at", "Hz", format="sig:4"),
     ]
     rows = [_row(curve) for curve in result.curves]
-    note = "No static value: the output comes back to its place, or does not move at all."
+    note = "Infinite: the output comes back to its place, or does not move at all."
     return doc.table("Stiffness by state", columns, rows, note)
 
 
@@ -104,7 +109,7 @@ def _row(curve: StiffnessCurve) -> Row:
     moves = math.isfinite(least)
     return {
         "state": STATES[curve.state],
-        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else None,
+        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else "infinite",
         "least": least if moves else None,
         "at": at if moves else None,
     }

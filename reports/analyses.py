@@ -1,0 +1,135 @@
+"""Every analysis of a design, declared once: what it asks, what answers, which section shows the answer.
+
+Commands with their help, options and exit status, ``--json``, ``--out``, the report's ``--also`` and the page
+of commands are loops over `ANALYSES`. Nothing is imported before it is asked for but the requests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.tree import Tree
+from analyses.corners.asked import Asked as CornersAsked
+from analyses.duty.asked import Asked as DutyAsked
+from analyses.failures.asked import Asked as FailuresAsked
+
+if TYPE_CHECKING:
+    from actuator_lti.design import Design
+    from reports.document_schema import Section
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """A question to a design.
+
+    Attributes
+    ----------
+    name : str
+        Of the command and of the section's module in `reports.sections`, whose ``section(result)`` shows it.
+    group : str
+        Panel of the help in which the command stands.
+    words : str
+        The command's help; its first paragraph stands in the list.
+    request : type or None
+        Dataclass of what is asked, its fields annotated (`analyses.request`); None: nothing.
+    function : str
+        ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
+        result says ``passed``, that is the exit status.
+    also : bool
+        Whether a report has the section where it is asked for (``--also``).
+    """
+
+    name: str
+    group: str
+    words: str
+    request: type | None = None
+    function: str = ""
+    also: bool = False
+
+    def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
+        """What the function is given beside the design: nothing, or the request with what is chosen."""
+        if self.request is None:
+            return ()
+        made = getattr(self.request, "of", None)
+        values = {name: value for name, value in chosen.items() if value is not None}
+        return (made(design, **values) if made else self.request(**values),)
+
+    def run(self, design: Design, *asked: Any) -> Any:
+        """Ask."""
+        package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
+        return getattr(import_module(package), name)(design, *asked)
+
+    def section(self, result: Any) -> Section:
+        """Show."""
+        made: Section = import_module(f"reports.sections.{self.name}").section(result)
+        return made
+
+
+ANALYSES = (
+    Analysis(
+        name="stiffness",
+        group="Linear loops",
+        words="""
+        Dynamic and static stiffness and lost motion, checked by an injected moment.
+
+        The exit status is 1 where the simulator does not confirm the linear stiffness.
+        """,
+    ),
+    Analysis(
+        name="corners",
+        group="Linear loops",
+        also=True,
+        request=CornersAsked,
+        words="""
+        Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
+
+        Resistance and torque constant follow \\[temperature] of the design, or copper and NdFeB. The
+        exit status is 1 where a requirement is not met, or a loop not stable, at any corner.
+        """,
+    ),
+    Analysis(
+        name="failures",
+        group="Nonlinear checks",
+        also=True,
+        request=FailuresAsked,
+        words="""
+        Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
+
+        Prints for each failure the time to a stated deflection and to the mechanical stop, the
+        deflection until the failure is detected, the largest current and the largest moment in the
+        train. What is not given comes from \\[failure] of the design.
+        """,
+    ),
+    Analysis(
+        name="duty",
+        group="Nonlinear checks",
+        also=True,
+        request=DutyAsked,
+        words="""
+        Hold a duty cycle against continuous current, overload protection (I2t) and winding
+        temperature.
+
+        The duty is a sine under a load, for a share of the time; what is not given comes from
+        \\[duty]. The temperature needs thermal_resistance and thermal_time in \\[temperature], the
+        protection limits.peak_time. The exit status is 1 where the drive cannot do the duty for ever.
+        """,
+    ),
+    Analysis(
+        name="cycles",
+        group="Nonlinear checks",
+        also=True,
+        function="analyses.limit_cycles.limit_cycles",
+        words="""
+        Foresee limit cycles of play and of a quantised output sensor, and seek them in the simulator.
+
+        Each is foreseen by describing function in the exact sampled loop, then the simulator is
+        started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
+        waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+)
+BY_NAME = {one.name: one for one in ANALYSES}
+FURTHER = tuple(one.name for one in ANALYSES if one.also)
+"""Sections that a report has only where they are asked for, as they take their time."""
