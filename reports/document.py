@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,6 +38,9 @@ from reports.findings import Finding
 from reports.findings import plain as plain_findings
 from reports.verdict_summary import verdict_of, walk
 from reports.visible import visible
+
+if TYPE_CHECKING:
+    from reports.charts.chart import Chart
 
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
@@ -116,11 +119,13 @@ def table(
     }
 
 
-def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout: Layout = "wide") -> Block:
-    """Make a figure, drawn by the module registered under ``name`` from these data alone.
+def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = "wide") -> Block:
+    """Make a figure of a chart.
 
     Parameters
     ----------
+    name : str
+        What kind of figure it is, such as ``"bode"``.
     caption : str
         What is seen; a figure must be understood alone.
     alt : str
@@ -128,10 +133,12 @@ def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
+    from reports.charts.data import chart_data
+
     return {
         "kind": "figure",
         "figure": name,
-        "data": plain(data),
+        "chart": chart_data(chart),
         "caption": caption,
         "alt": alt,
         "layout": layout,

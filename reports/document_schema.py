@@ -1,6 +1,6 @@
 """What a report.json must look like, so that a page or a PDF can be made of it: types, kinds, states.
 
-Keys beyond these are allowed: a later version may say more. What a figure holds is for its module.
+Keys beyond these are allowed: a later version may say more. What a chart holds is for `reports.charts.data`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from actuator_lti.tree import Tree
 from reports.live_schema import LiveData, Refused
 
 SCHEMA: Final = "actuator-lti/report"
-VERSION: Final = 1
+VERSION: Final = 2
 STATUSES = ("pass", "fail", "warn", "info")
 
 Status = Literal["pass", "fail", "warn", "info"]
@@ -98,11 +98,11 @@ class TableBlock(TypedDict):
 
 @_strict
 class FigureBlock(TypedDict):
-    """A figure: its module draws it from the data alone."""
+    """A figure: its chart (`reports.charts.data`) is drawn as it stands."""
 
     kind: Literal["figure"]
     figure: str
-    data: Tree
+    chart: Tree
     caption: str
     alt: str
     layout: NotRequired[Layout]
@@ -278,7 +278,7 @@ class Document(TypedDict):
     """A whole report.json."""
 
     schema: Literal["actuator-lti/report"]
-    version: Literal[1]
+    version: Literal[2]
     kind: str
     title: str
     subtitle: str

@@ -326,10 +326,10 @@ def write_files(run: Trajectory, csv: Path | None, parquet: Path | None, plot: P
         run.to_parquet(parquet)
     if plot is not None:
         from actuator_lti.atomic import write_text
-        from reports.figures.registry import draw_svg
-        from reports.sections.trajectory import figure_data
+        from reports.charts.svg import paper_svg
+        from reports.sections.trajectory import chart_of
 
-        write_text(plot, draw_svg("trajectory", figure_data(run), page=False))
+        write_text(plot, paper_svg(chart_of(run), "f"))
     return [str(path) for path in (csv, parquet, plot) if path is not None]
 
 

@@ -100,12 +100,9 @@ def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
     if not figures:
         return []
     name, result = list(figures.items())[-1]
-    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name)]
+    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name, small=True)]
     if result.step is not None:
-        blocks.append(loop_section.step(LOOPS[name], result, None, name=name))
-    for block in blocks:
-        if block["kind"] == "figure":
-            block["data"]["small"] = True
+        blocks.append(loop_section.step(LOOPS[name], result, None, name=name, small=True))
     return blocks
 
 

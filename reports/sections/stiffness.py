@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Status
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.stiffness import AtRest, Check, Stiffness, StiffnessCurve
-    from reports.figures import stiffness as stiffness_figure
 
 STATES = {
     "powered": "powered, command held",
@@ -76,20 +76,17 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
     shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
     if not shown:
         return []
-    data: stiffness_figure.Data = {
-        "frequency_hz": abscissa(shown[0].frequency_hz),
-        "series": [
-            {
-                "label": STATES[curve.state],
-                "size": rounded(np.abs(curve.stiffness_Nm_rad)),
-                "phase_deg": rounded(np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad)))),
-            }
-            for curve in shown
-        ],
-        "unit": unit,
-    }
+    chart = Chart(width=style.WIDE, height=420.0)
+    top, bottom = chart.column(1.2, 1.0)
+    top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
+    phases = [np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad))) for curve in shown]
+    for k, (curve, phase) in enumerate(zip(shown, phases, strict=True)):
+        top.curve(curve.frequency_hz, np.abs(curve.stiffness_Nm_rad), STATES[curve.state], **style.series(k))
+        bottom.curve(curve.frequency_hz, phase, STATES[curve.state], **style.series(k))
+    style.frequency(bottom, shown[0].frequency_hz)
+    style.phase_axis(bottom, np.concatenate(phases))
     caption = "Dynamic stiffness of the output, powered and unpowered."
-    return [doc.figure("stiffness", data, caption=caption, alt=f"Two panels. {caption}")]
+    return [doc.figure("stiffness", chart, caption=caption, alt=f"Two panels. {caption}")]
 
 
 def _table(result: Stiffness, unit: str) -> Block:

@@ -1,8 +1,6 @@
-"""A `Trajectory` as plain data: its figure and what a summary says of it."""
+"""A `Trajectory`: its figure and what a summary says of it."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,56 +9,62 @@ from actuator_lti.design.control import Stage
 from actuator_lti.tree import Tree
 from analyses.conduct import conduct
 from nonlinear import Trajectory
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.sections.thinning import kept_rows
 
-if TYPE_CHECKING:
-    from reports.figures import trajectory as trajectory_figure
-
+Signals = list[tuple[str, npt.NDArray[np.float64]]]
 LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
 
 
-def figure_data(run: Trajectory) -> trajectory_figure.Data:
-    """Data of the figure ``trajectory``: thinned with the peaks kept."""
+def chart_of(run: Trajectory) -> Chart:
+    """Position, speed, current and voltage on one time axis, thinned with the peaks kept."""
     linear = run.axis == "linear"
     angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
-    speed_unit = "m/s" if linear else "rad/s"
-    shown = [run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V]
-    rows = kept_rows(shown)
-
-    def series(label: str, values: npt.NDArray[np.float64]) -> trajectory_figure.Signal:
-        return {"label": label, "values": rounded(values[rows])}
-
-    def ordered(stage: Stage, factor: float = 1.0) -> list[trajectory_figure.Signal]:
-        """The command, in the panel of what it orders."""
-        return [series("command", run.reference_rad * factor)] if run.stage == stage else []
-
-    position = [series("output", run.output_angle_rad * angle), *ordered("position", angle)]
-    speed = [series("speed", run.motor_speed_rad_s), *ordered("velocity", run.ratio)]
+    command: dict[Stage, Signals] = {run.stage: [("command", run.reference_rad)]}
+    speed = [("speed", run.motor_speed_rad_s), *_scaled(command.get("velocity", []), run.ratio)]
     if run.stage == "position" and run.speed_command_rad_s.any():
-        speed.append(series("commanded", run.speed_command_rad_s))
-    panels = [
-        _panel(f"output position, {unit}", position, run, None),
-        _panel(f"{'axis' if linear else 'motor'} speed, {speed_unit}", speed, run, "speed"),
+        speed.append(("commanded", run.speed_command_rad_s))
+    current = [("current", run.current_A), *command.get("current", [])]
+    if run.stage in ("position", "velocity") and run.current_command_A.any():
+        current.append(("commanded", run.current_command_A))
+    position = _scaled([("output", run.output_angle_rad), *command.get("position", [])], angle)
+    parts: list[tuple[str, Signals, str]] = [
+        (f"output position, {unit}", position, ""),
+        (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, "speed"),
+        *([("motor current, A", current, "current")] if run.current_A.any() else []),
+        ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], "voltage"),
     ]
-    if run.current_A.any():
-        current = [series("current", run.current_A), *ordered("current")]
-        if run.stage in ("position", "velocity") and run.current_command_A.any():
-            current.append(series("commanded", run.current_command_A))
-        panels.append(_panel("motor current, A", current, run, "current"))
-    panels.append(
-        _panel("voltage, V", [series("voltage", run.voltage_V), *ordered("voltage")], run, "voltage")
-    )
-    return {"time_s": abscissa(run.time_s[rows], 8), "panels": panels}
+    rows = kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
+    chart = Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
+    panels = chart.column(*(1.0 for _ in parts))
+    scale = style.time_axis(panels[-1], float(run.time_s[rows][-1]))
+    time = run.time_s[rows] * scale
+    for panel, (label, signals, limiter) in zip(panels, parts, strict=True):
+        panel.y.label = label
+        for start, stop in spans(run.limit_active(limiter), run.time_s) if limiter else []:
+            panel.band_x(start * scale, stop * scale, f"{limiter} limit acts", colour=style.RED)
+        # the command lies under the response: drawn last in the list, first on the paper
+        for k, (name, values) in reversed(list(enumerate(signals))):
+            panel.curve(time, values[rows], name, width=2.0 if k == 0 else 1.5, **style.series(k))
+        if limiter and np.isfinite(run.limits[limiter].limit):
+            _limit(panel, run.limits[limiter].limit, max(np.abs(v[rows]).max() for _, v in signals))
+    panels[-1].x.limits(time[0], time[-1])
+    return chart
 
 
-def _panel(
-    label: str, series: list[trajectory_figure.Signal], run: Trajectory, limiter: str | None
-) -> trajectory_figure.Part:
-    use = run.limits[limiter] if limiter else None
-    active = spans(run.limit_active(limiter), run.time_s) if limiter else []
-    limit = use.limit if use and np.isfinite(use.limit) else None
-    return {"label": label, "series": series, "limit": limit, "limit_label": limiter or "", "active": active}
+def _scaled(signals: Signals, factor: float) -> Signals:
+    return [(name, factor * values) for name, values in signals]
+
+
+def _limit(panel: Panel, limit: float, peak: float) -> None:
+    """Draw both signs of the limit where it lies within reach of the signals."""
+    if limit > 4.0 * peak:
+        panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
+        return
+    panel.y.see([-limit, limit])
+    for sign in (1.0, -1.0):
+        panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
 
 
 def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> list[list[float]]:

@@ -11,16 +11,15 @@ from nightly_fakes import fake_document
 from test_nightly_hostile import HOSTILE
 
 from actuator_lti.errors import InputError
+from reports.charts.chart import Chart
 from reports.document import details, document, fact, facts, figure, section, text
 from reports.pdf import pdf_bytes, write_pdf
 from reports.pdf.printable import clean
 
 pypdf = pytest.importorskip("pypdf")
 
-CURVE = {
-    "series": [{"label": "L", "x": [1.0, 2.0, 3.0], "y": [1.0, 4.0, 9.0]}],
-    "x_label": "x", "y_label": "y",
-}  # fmt: skip
+CURVE = Chart(width=900.0, height=320.0)
+CURVE.panel().curve([1.0, 2.0, 3.0], [1.0, 4.0, 9.0], "L")
 
 ORIGIN = {
     "version": "1.2.3",

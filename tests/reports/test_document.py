@@ -74,7 +74,7 @@ def test_a_document_survives_writing_and_reading() -> None:
         ("[" * 100_000, "nested too deeply"),
         ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
         ("[]", "schema must be"),
-        (json.dumps({"schema": doc.SCHEMA, "version": 2, "sections": []}), "version = 2"),
+        (json.dumps({"schema": doc.SCHEMA, "version": 3, "sections": []}), "version = 3"),
         (
             json.dumps(made(sections=[doc.section("x", "X", [{"kind": "magic"}])])),
             r"sections\[1\].blocks\[1\].*'magic' found using 'kind'",

@@ -20,7 +20,7 @@ from analyses.specification.plane import torque_speed_plane
 from analyses.validation.bench import on_the_bench
 from nonlinear import commands, simulate
 from reports import document as doc
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section
 from reports.sections import large_signal as large_section
 from reports.sections import specification as specification_section
@@ -117,7 +117,7 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
     assert {"map", "amplitude_bode", "torque_speed"} <= set(names)
     assert ("sawtooth" in names) == name.startswith("ilr33")
     for block in doc.figures(again):
-        svg = draw_svg(block["figure"], block["data"], page=False)
+        svg = draw_svg(block, page=False)
         assert svg.startswith("<svg")
         assert "nan" not in svg.lower().replace("nano", "")
 

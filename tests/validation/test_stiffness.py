@@ -21,7 +21,7 @@ from analyses.stiffness import (
     stiffness_curves,
 )
 from reports.cli.main import main
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections.stiffness import section
 from tests.loops.two_mass import drive_d, drive_e
 
@@ -129,7 +129,7 @@ def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
     assert "infinite" in capsys.readouterr().out
     part = section(stiffness(load_design("fin")))
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
-    assert "<svg" in draw_svg("stiffness", figure["data"], page=False)
+    assert "<svg" in draw_svg(figure, page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
 
 
@@ -157,4 +157,4 @@ def test_a_slow_tick_ends_the_curve_below_nyquist() -> None:
     assert abs(open_winding.stiffness_Nm_rad[0]) == pytest.approx(inertia * w**2, rel=1e-3)
     made = section(stiffness(design))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
-    assert "unpowered" in draw_svg("stiffness", figure["data"], page=False)
+    assert "unpowered" in draw_svg(figure, page=False)
