@@ -9,7 +9,7 @@ from math import isfinite
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.loop_figures import LoopFigures
-from analyses.verdicts import RequirementVerdict, all_pass
+from analyses.verdicts import RequirementVerdict, tally
 
 HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
 
@@ -78,7 +78,7 @@ class Corner:
     @property
     def passed(self) -> bool:
         """Whether no requirement fails and every loop is stable."""
-        return all_pass(self.verdicts) and all(one.sound for one in self.figures.values())
+        return tally(self.verdicts).passes and all(one.sound for one in self.figures.values())
 
 
 @dataclass(frozen=True)

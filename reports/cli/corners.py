@@ -88,7 +88,7 @@ def _json(result: Corners) -> Tree:
                     for name, one, shown in ((n, f, f.judged) for n, f in corner.figures.items())
                 },
                 "requirements": [
-                    {"id": one.id, "value": one.value, "passed": one.passed} for one in corner.verdicts
+                    {"id": one.id, "value": one.value, "verdict": one.verdict} for one in corner.verdicts
                 ],
             }
             for corner in result.corners

@@ -232,9 +232,9 @@ def small_report() -> bytes:
     )
     curve = {"label": "k", "x": [1.0, 2.0, None], "y": [0.0, -3.0, 1.0], "style": "points"}
     drawn = {"series": [curve], "x_label": "x", "y_label": "y", "levels": [{"y": 1.0, "label": "l"}]}
-    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "passed": True}
+    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "verdict": "met"}
     glance = {
-        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "passed": True},
+        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "status": "pass"},
         "loops": [{
             "loop": "Position", "anchor": "a", "stable": {"text": "yes", "status": "pass"},
             "figures": [{"label": "Gain margin", "value": 7.5, "unit": "dB", "format": "fix:2", **near}],
