@@ -66,6 +66,7 @@ def design_report(
         *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
+    doc.waived(sections, design)
     with isolated() as unanswered:
         items = (
             [item for block in doc.walk(loops[0]) if block["kind"] == "verdicts" for item in block["items"]]

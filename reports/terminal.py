@@ -12,13 +12,16 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from actuator_lti.verdict import Verdict
 from reports.cli.output import console
 from reports.html import show_signed
 from reports.numbers import show
+from reports.verdict_summary import role, why
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
-WORDS = {True: ("pass", "✓ met"), False: ("fail", "✗ not met"), None: ("info", "– not judged")}
+SIGNS = {"pass": "✓", "fail": "✗", "warn": "?", "info": "–"}
+HEADS = {"met": "PASS", "not met": "FAIL", "not proven": "NOT PROVEN"}
 
 
 @dataclass(frozen=True)
@@ -42,9 +45,11 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
         out.print(Text(f"note: {note}", style="yellow"))
 
 
-def print_verdict(passed: bool, words: str, *, failed: str = "FAIL") -> None:
-    """Print the first line of an answer: whether all is well (else the word ``failed``), and why."""
-    line = Text().append("PASS" if passed else failed, style=COLOURS["pass" if passed else "fail"])
+def print_verdict(passed: bool | Verdict, words: str, *, failed: str = "FAIL") -> None:
+    """Print the first line of an answer: a verdict, or whether all is well (else ``failed``), and why."""
+    verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
+    head = failed if passed is False else HEADS[verdict]
+    line = Text().append(head, style=COLOURS[verdict.role()])
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
@@ -128,12 +133,12 @@ def stacked_verdicts(block: Mapping[str, Any]) -> Text:
     """Write verdicts as two lines each: what and whether, then the figures."""
     text = Text().append(block.get("what", "requirements").capitalize(), style="bold")
     for item in block["items"]:
-        status, word = WORDS[item["passed"]]
+        status, word = _judged(item)
         limit = f"limit {item['comparison']} {show(item['limit'])}"
         figures = f"{show(item['value'])} {item['unit']}, {limit}, distance {show_signed(item['distance'])}"
         text.append(f"\n{item['label']}: ").append(word, style=COLOURS[status])
         text.append(f"\n  {' '.join(figures.split())}")
-        text.append(f"\n  {item['reason']}" if item["reason"] else "")
+        text.append(f"\n  {why(item)}" if why(item) else "")
     return text.append("\n")
 
 
@@ -196,12 +201,18 @@ def verdict_table(block: Mapping[str, Any]) -> Table:
         made.add_column(label, justify="right", no_wrap=True)
     made.add_column("Unit")
     for item in block["items"]:
-        status, word = WORDS[item["passed"]]
-        word += f" ({item['reason']})" if item["reason"] else ""
+        status, word = _judged(item)
+        word += f" ({why(item)})" if why(item) else ""
         limit = f"{item['comparison']} {show(item['limit'])}"
         cells = [show(item["value"]), limit, show_signed(item["distance"]), item["unit"]]
         made.add_row(Text(item["label"]), Text(word, style=COLOURS[status]), *map(Text, cells))
     return made
+
+
+def _judged(item: Mapping[str, Any]) -> tuple[str, str]:
+    """Colour and word of a verdict."""
+    status = role(item)
+    return status, f"{SIGNS[status]} {item['verdict']}"
 
 
 def _empty(caption: str) -> Table:

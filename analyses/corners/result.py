@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from actuator_lti.design.model import Design
 from analyses.corners.asked import Asked
 from analyses.loop_figures import LoopFigures
-from analyses.verdicts import RequirementVerdict, all_pass
+from analyses.verdicts import RequirementVerdict, tally
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Corner:
     @property
     def passed(self) -> bool:
         """Whether no requirement fails and every loop is stable."""
-        return all_pass(self.verdicts) and all(one.sound for one in self.figures.values())
+        return tally(self.verdicts).passes and all(one.sound for one in self.figures.values())
 
 
 @dataclass(frozen=True)

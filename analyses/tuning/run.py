@@ -21,6 +21,7 @@ from analyses.tuning.result import Aim, BindingRequirement, GainSetting, TuningR
 from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import Solution, solve
 from analyses.tuning.trade_off import trade_off
+from analyses.verdicts import tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -115,7 +116,7 @@ def tune(
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
-        bool(result.min() >= 0.0) and all(v.passed is True for v in confirmed),
+        bool(result.min() >= 0.0) and tally(confirmed).passes,
         design,
         tuned,
         _settings(problem, design, rules, solution.gains, gains),
@@ -160,7 +161,7 @@ def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
         f"Not confirmed by certified margins: {v.id}: "
         + (v.reason if v.value is None else f"{v.value:.6g} {v.requirement.unit}")
         for v in confirmed
-        if v.passed is not True
+        if v.verdict != "met"
     )
 
 

@@ -60,6 +60,7 @@ def report(
     With --include the results of identify and correlate become sections of it; with --also
     failure cases, duty cycle, limit cycles and corners.
     """
+    from actuator_lti.verdict import Verdict
     from reports.build import design_report, further_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
@@ -87,8 +88,8 @@ def report(
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
-        first, *more = verdict_words(made["verdict"]) or ["no requirement in the design file"]
-        print_verdict(passed, f"{drive.name}: {first}")
+        first, *more = verdict_words(made["verdict"])
+        print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
         print_line("\n".join([*more, *map(str, written)]))
     leave_with(passed)
 

@@ -50,7 +50,7 @@ def unmet(corner: Corner) -> str:
     doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
-    return ", ".join([*loops, *(one.id for one in corner.verdicts if one.passed is False)])
+    return ", ".join([*loops, *(one.id for one in corner.verdicts if not one.passes)])
 
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:

@@ -38,7 +38,7 @@ def section(result: FrictionEffects) -> Section:
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
     )
-    failed = any(item["passed"] is False for item in items)
+    failed = any(item["verdict"] == "not met" for item in items)
     words, more = _summary(result, fine, small)
     blocks += [doc.text(more)] if more else []
     return doc.section(

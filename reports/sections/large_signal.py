@@ -15,6 +15,7 @@ from reports.findings import Finding
 from reports.sections.amplitude_map import chart as map_chart
 from reports.sections.limits import words_of
 from reports.sections.names import figure_column
+from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -31,14 +32,13 @@ def section(result: LargeSignals) -> Section:
 
     design = result.design
     scale, unit = output_unit(design)
-    items = [_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
+    items = [*_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
     if result.border is not None and np.isfinite(result.border.predicted_rad).any():
         blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
-    failed = any(item["passed"] is False for item in items)
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear model "
         "holds. "
@@ -46,7 +46,7 @@ def section(result: LargeSignals) -> Section:
     )
     words = _result(result.bode, scale, unit)
     findings = [Finding(severity="info", text=words, where="large-signal")]
-    status: Status = "fail" if failed else "pass"
+    status: Status = tally(items).role
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, findings=findings
     )
@@ -100,8 +100,8 @@ def load_unit(design: Design) -> str:
     return "N" if design.axis == "linear" else "N m"
 
 
-def _border_verdict(border: BorderCheck | None) -> VerdictItem:
-    """Judge the simulated border against the smallest A_k."""
+def _border_verdict(border: BorderCheck | None) -> list[VerdictItem]:
+    """Judge the simulated border against the smallest A_k; a drive without limits has none."""
     from analyses.large_signal.border import TOLERANCE
 
     what = {
@@ -110,31 +110,26 @@ def _border_verdict(border: BorderCheck | None) -> VerdictItem:
     }
     common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
     if border is None:
-        return doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")
+        return [doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")]
     error = border.largest_error
     if error is None:
-        reason = "the design has no limit"
-        return doc.verdict(**common, value=None, distance=None, passed=None, reason=reason)
+        return []
     same, count = sum(border.same_limiter), len(border.same_limiter)
     reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
     reason += f"; without {border.left_out}" if border.left_out else ""
-    reason += f"; not judged: {border.reason}" if border.reason else ""
-    distance = 100.0 * (TOLERANCE - error)
-    return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
+    reason += f"; {border.reason}" if border.reason else ""
+    common |= {"distance": 100.0 * (TOLERANCE - error), "passed": border.passed}
+    return [doc.verdict(**common, value=100.0 * error, reason=reason)]
 
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
-    """Judge the rate-limit formulas, or say why they do not apply."""
+    """Judge the rate-limit formulas, where they apply."""
     from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
 
-    gain = max((abs(run.gain_error) for run in sawtooth.runs), default=None)
-    lag = max((abs(run.lag_error_deg) for run in sawtooth.runs), default=None)
-    reason = sawtooth.reason
-    if sawtooth.runs and not sawtooth.applicable:
-        reason = (
-            f"the formulas need Kv/w >= 50 (here {sawtooth.gain_over_frequency:.3g}) and a reversal "
-            f"within 1° of the period (here {sawtooth.reversal_deg:.3g}°); shown, not judged"
-        )
+    if not (sawtooth.runs and sawtooth.applicable):
+        return []
+    gain = max(abs(run.gain_error) for run in sawtooth.runs)
+    lag = max(abs(run.lag_error_deg) for run in sawtooth.runs)
     rows = (
         ("gain", "Sawtooth: difference of the fundamental from 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
         ("lag", "Sawtooth: difference of the lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
@@ -143,13 +138,12 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
         doc.verdict(
             f"validation-sawtooth-{key}",
             label,
-            value=None if error is None else scale * error,
+            value=scale * error,
             limit=scale * limit,
             unit=unit,
             comparison="<=",
-            distance=None if error is None or not sawtooth.applicable else scale * (limit - error),
-            passed=None if sawtooth.passed is None or error is None else error <= limit,
-            reason=reason,
+            distance=scale * (limit - error),
+            passed=error <= limit,
         )
         for key, label, error, limit, scale, unit in rows
     ]
@@ -297,6 +291,8 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
     """Make the sawtooth, or say why there is none."""
+    from analyses.large_signal.sawtooth import FAST, REVERSAL_DEG
+
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s
@@ -320,6 +316,11 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
         f"times faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated "
         "values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
     )
+    if not sawtooth.applicable:
+        caption += (
+            f" Not checked: they need Kv/w >= {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
+            f"reversal within {REVERSAL_DEG:g}° of the period (here {sawtooth.reversal_deg:.3g}°)."
+        )
     return [doc.figure("sawtooth", chart, caption=caption, alt=caption)]
 
 

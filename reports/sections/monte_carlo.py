@@ -66,7 +66,7 @@ def section(result: MonteCarloResult, at_least: float | None = None) -> Section:
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
         doc.fact("Parameters that vary", ", ".join(result.paths)),
     ]))  # fmt: skip
-    failed = any(item["passed"] is False for item in items)
+    failed = any(item["verdict"] == "not met" for item in items)
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
         "case in "

@@ -149,7 +149,7 @@ def confirmed(result: TuningResult) -> Block:
         {
             "label": v.id, "value": v.value, "unit": "" if v.requirement.unit == "1" else v.requirement.unit,
             "limit": v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum,
-            "met": v.passed is True, "_status": "pass" if v.passed is True else "fail",
+            "met": v.verdict == "met", "_status": v.role,
         }
         for v in result.confirmed
     ]  # fmt: skip

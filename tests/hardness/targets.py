@@ -236,9 +236,9 @@ def small_report() -> bytes:
     panel.points([1.0, 2.0, None], [0.0, -3.0, 1.0], "k")
     panel.rule_y(1.0, label="l")
     panel.note("n", corner="top left")
-    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "passed": True}
+    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "verdict": "met"}
     glance = {
-        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "passed": True},
+        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "status": "pass"},
         "loops": [{
             "loop": "Position", "anchor": "a", "stable": {"text": "yes", "status": "pass"},
             "figures": [{"label": "Gain margin", "value": 7.5, "unit": "dB", "format": "fix:2", **near}],
