@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-Kind = Literal["number", "output", "load"]
+Kind = Literal["plain", "output", "load"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
@@ -26,14 +26,14 @@ class Option:
         What stands for the value in the help.
     flag : str
         The option, without dashes; the field's name without its unit where empty.
-    kind : {"number", "output", "load"}
+    kind : {"plain", "output", "load"}
         ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without.
     """
 
     words: str
     metavar: str = ""
     flag: str = ""
-    kind: Kind = "number"
+    kind: Kind = "plain"
 
 
 def options(request: type) -> dict[str, tuple[Any, Option]]:

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.tree import Tree
 from analyses.corners.asked import Asked as CornersAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
+from analyses.motion.asked import Asked as MotionAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -39,6 +42,10 @@ class Analysis:
         result says ``passed``, that is the exit status.
     also : bool
         Whether a report has the section where it is asked for (``--also``).
+    doing : str
+        What the bar says while the function works, which then takes ``progress``.
+    out : str
+        Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
     """
 
     name: str
@@ -47,6 +54,8 @@ class Analysis:
     request: type | None = None
     function: str = ""
     also: bool = False
+    doing: str = ""
+    out: str = ""
 
     def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
@@ -56,15 +65,30 @@ class Analysis:
         values = {name: value for name, value in chosen.items() if value is not None}
         return (made(design, **values) if made else self.request(**values),)
 
-    def run(self, design: Design, *asked: Any) -> Any:
+    def run(self, design: Design, *asked: Any, **more: Any) -> Any:
         """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
-        return getattr(import_module(package), name)(design, *asked)
+        return getattr(import_module(package), name)(design, *asked, **more)
 
     def section(self, result: Any) -> Section:
         """Show."""
-        made: Section = import_module(f"reports.sections.{self.name}").section(result)
+        made: Section = self._shown.section(result)
         return made
+
+    def data(self, result: Any) -> Any:
+        """The result as plain data: what the section's module says (``data``), else by its names."""
+        from reports.as_json import as_json
+
+        return getattr(self._shown, "data", as_json)(result)
+
+    def write(self, result: Any, folder: Path | None) -> list[str]:
+        """Write what goes with the result (``write`` of the section's module); the files."""
+        written: list[str] = getattr(self._shown, "write", lambda _result, _folder: [])(result, folder)
+        return written
+
+    @property
+    def _shown(self) -> ModuleType:
+        return import_module(f"reports.sections.{self.name}")
 
 
 ANALYSES = (
@@ -87,6 +111,16 @@ ANALYSES = (
 
         Resistance and torque constant follow \\[temperature] of the design, or copper and NdFeB. The
         exit status is 1 where a requirement is not met, or a loop not stable, at any corner.
+        """,
+    ),
+    Analysis(
+        name="simulate",
+        group="Nonlinear checks",
+        request=MotionAsked,
+        function="analyses.motion.motion",
+        doing="simulating",
+        words="""
+        Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.
         """,
     ),
     Analysis(

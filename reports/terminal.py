@@ -53,7 +53,7 @@ def print_verdict(passed: bool | Verdict, words: str, *, failed: str = "FAIL") -
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
-def print_section(section: Mapping[str, Any], passed: bool | None, name: str = "") -> None:
+def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, name: str = "") -> None:
     """Print a section: verdict or result first (of ``name``), then how it was found, then its tables."""
     words = f"{name}: {section['result']}" if name else section["result"]
     if passed is None:

@@ -36,7 +36,7 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("design", DesignArgument, DEFAULT_DESIGN),
         _parameter("changes", SetOption, None),
         *(_parameter(name, *_option(name, *each)) for name, each in _options(one).items()),
-        _parameter("out", FolderOption, None),
+        _parameter("out", FolderOption, Path(one.out) if one.out else None),
         _parameter("as_json", JsonOption, False),
         _parameter("quiet", QuietOption, False),
     ]
@@ -50,7 +50,6 @@ def answer(
     one: Analysis, drive: Design, chosen: dict[str, Any], out: Path | None, as_json: bool, quiet: bool
 ) -> None:
     """Ask, then print the section or the result, and leave with the verdict."""
-    from reports.as_json import as_json as plain
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
     from reports.cli.progress import progress
@@ -58,36 +57,38 @@ def answer(
     from reports.terminal import print_section
 
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
-    result = one.run(drive, *one.asked(drive, values))
+    with progress(f"{one.doing} {drive.name}", quiet=quiet) as doing:
+        more = {"progress": doing} if one.doing else {}
+        result = one.run(drive, *one.asked(drive, values), **more)
     part = one.section(result)
-    passed = getattr(result, "passed", None)
-    paths: tuple[Path, ...] = ()
+    passed = getattr(result, "verdict", getattr(result, "passed", None))
+    files = one.write(result, out)
     if out is not None:
         title = f"{drive.title or drive.name}: {part['title'].lower()}"
         made = study_document(drive, [part], title=title, subtitle=part["result"], kind=one.name)
         with progress("drawing figures", quiet=quiet) as drawing:
-            paths = write_pages(made, out, one.name, progress=drawing)
+            files += map(str, write_pages(made, out, one.name, progress=drawing))
     if as_json:
-        print_json(plain(result))
+        print_json(one.data(result))
     else:
         print_section(part, passed, name=drive.name)
-        for path in paths:
-            print_line(str(path))
-    leave_with(passed is not False)
+        for path in files:
+            print_line(f"wrote {path}")
+    leave_with(passed in (None, True, "met"))
 
 
 def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
     return {} if one.request is None else options(one.request)
 
 
-def _option(name: str, kind: Any, option: Option) -> tuple[Any, None]:
+def _option(name: str, kind: Any, option: Option) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = {"number": kind, "output": str, "load": float}[option.kind]
+    text = {"plain": kind, "output": str, "load": float}[option.kind]
     more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
     made = typer.Option(
         f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words, **more
     )
-    return Annotated[text | None, made], None
+    return (Annotated[bool, made], False) if kind is bool else (Annotated[text | None, made], None)
 
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:

@@ -20,7 +20,7 @@ def _declared(group: str) -> tuple[str, ...]:
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
     "Linear loops": ("margins", *_declared("Linear loops"), "report", "pdf"),
-    "Nonlinear checks": ("simulate", "validate", *_declared("Nonlinear checks")),
+    "Nonlinear checks": (*_declared("Nonlinear checks"), "validate"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
     "Variants and history": ("compare", "montecarlo", "tune", "nightly"),

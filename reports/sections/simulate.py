@@ -1,20 +1,125 @@
-"""A `Trajectory`: its figure and what a summary says of it."""
+"""One motion: what happened in numbers, and its figure."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.atomic import write_text
 from actuator_lti.design.control import Stage
 from actuator_lti.tree import Tree
 from analyses.conduct import conduct
+from analyses.motion import Motion
 from nonlinear import Trajectory
+from nonlinear.trajectory import COMMAND_UNITS
+from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
+from reports.charts.svg import paper_svg
+from reports.document_schema import Block, Row, Section, Status
 from reports.sections.thinning import kept_rows
 
 Signals = list[tuple[str, npt.NDArray[np.float64]]]
 LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
+
+
+def section(result: Motion) -> Section:
+    """Make the section from `analyses.motion.motion`."""
+    run, ended = result.run, conduct(result.run)
+    detail = f" ({ended.detail})" if ended.detail else ""
+    blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
+    figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
+    status: Status = "info" if ended.status == "ok" else "warn"
+    words = f"{run.time_s.size} rows, status {ended.status}{detail}"
+    return doc.section("simulate", "Motion", [figure, *blocks], result=words, status=status)
+
+
+def data(result: Motion) -> Tree:
+    """What happened in numbers, without the rows."""
+    return {**summary(result.run), "files": result.asked.files}
+
+
+def write(result: Motion, folder: Path | None) -> list[str]:
+    """Write the plot that is asked for; all files of the motion."""
+    if result.asked.plot is not None:
+        write_text(result.asked.plot, paper_svg(chart_of(result.run), "f"))
+    return result.asked.files
+
+
+def _table(run: Trajectory) -> Block:
+    """Largest and last values: outputs in the unit of the command line, motor speeds in rpm as well."""
+    unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
+    rows: list[Row] = []
+    for name, value in summary(run).items():
+        if name.startswith(("largest_command", "largest_error")):
+            rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
+        elif isinstance(value, float):
+            rows += _in_words(name, value)
+    events = f"stick-slip events (at most {run.events_per_tick} in one tick)"
+    rows.append({"what": events, "value": run.events, "unit": ""})
+    return doc.table("What happened", COLUMNS, rows)
+
+
+COLUMNS = [
+    doc.column("what", "What"),
+    doc.column("value", "Value", format="short:6"),
+    doc.column("unit", "Unit"),
+]
+UNITS = (
+    ("_rad_s", 1.0, "rad/s"), ("_m_s", 1.0, "m/s"), ("_rad", 180.0 / np.pi, "deg"), ("_m", 1e3, "mm"),
+    ("_A", 1.0, "A"), ("_V", 1.0, "V"), ("_s", 1.0, "s"),
+)  # fmt: skip
+
+
+def _in_words(name: str, value: float) -> list[Row]:
+    """A figure as people read it.
+
+    Examples
+    --------
+    >>> [row["unit"] for row in _in_words("largest_motor_speed_rad_s", 100.0)]
+    ['rad/s', 'rpm']
+    """
+    ending, factor, unit = next((one for one in UNITS if name.endswith(one[0])), ("", 1.0, ""))
+    what = name.removesuffix(ending).replace("_", " ")
+    more: list[Row] = [{"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}] if unit == "rad/s" else []
+    return [{"what": what, "value": value * factor, "unit": unit}, *more]
+
+
+def _limits(run: Trajectory) -> Block:
+    columns = [
+        doc.column("name", "Limit"),
+        doc.column("limit", "Value", format="short:6"),
+        doc.column("unit", "Unit"),
+        doc.column("share", "Acts, of the time", "%", format="short:3"),
+        doc.column("first", "First at", "s", format="short:6"),
+    ]
+    rows = [
+        {
+            "name": name,
+            "limit": use.limit if np.isfinite(use.limit) else "none",
+            "unit": use.unit if np.isfinite(use.limit) else "",
+            "share": 100.0 * use.fraction,
+            "first": use.first_time_s,
+        }
+        for name, use in run.limits.items()
+    ]
+    return doc.table("Limits", columns, rows)
+
+
+def _energy(run: Trajectory) -> Block:
+    assert run.energy is not None
+    values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
+    rows = [
+        {
+            "what": name.removesuffix("_J").replace("_", " "),
+            "value": value,
+            "unit": "J" if "_J" in name else "",
+        }
+        for name, value in values.items()
+    ]
+    return doc.table("Where the electrical energy went", COLUMNS, rows)
 
 
 def chart_of(run: Trajectory) -> Chart:
