@@ -17,6 +17,7 @@ from analyses.corners.asked import Asked as CornersAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
 from analyses.motion.asked import Asked as MotionAsked
+from analyses.tuning.asked import Asked as TuningAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -161,6 +162,27 @@ ANALYSES = (
         Each is foreseen by describing function in the exact sampled loop, then the simulator is
         started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
         waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+    Analysis(
+        name="tune",
+        group="Variants and history",
+        request=TuningAsked,
+        function="analyses.tuning.tune",
+        doing="tuning",
+        out="out/tune",
+        words="""
+        Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
+
+        By default the least change of the design. With --place also a notch, a low-pass, feed-forward
+        where gains alone do not do, as in
+
+        actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
+
+        The result is confirmed by certified margins, nominal and at each requirement's worst corner.
+
+        Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements
+        cannot be met.
         """,
     ),
 )

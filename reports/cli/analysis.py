@@ -35,7 +35,10 @@ def command(one: Analysis) -> Callable[..., None]:
     parameters = [
         _parameter("design", DesignArgument, DEFAULT_DESIGN),
         _parameter("changes", SetOption, None),
-        *(_parameter(name, *_option(name, *each)) for name, each in _options(one).items()),
+        *(
+            _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
+            for name, each in _options(one).items()
+        ),
         _parameter("out", FolderOption, Path(one.out) if one.out else None),
         _parameter("as_json", JsonOption, False),
         _parameter("quiet", QuietOption, False),
@@ -81,14 +84,14 @@ def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
     return {} if one.request is None else options(one.request)
 
 
-def _option(name: str, kind: Any, option: Option) -> tuple[Any, Any]:
+def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
     text = {"plain": kind, "output": str, "load": float}[option.kind]
     more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
     made = typer.Option(
         f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words, **more
     )
-    return (Annotated[bool, made], False) if kind is bool else (Annotated[text | None, made], None)
+    return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
 
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:

@@ -23,7 +23,7 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Nonlinear checks": (*_declared("Nonlinear checks"), "validate"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
-    "Variants and history": ("compare", "montecarlo", "tune", "nightly"),
+    "Variants and history": ("compare", "montecarlo", *_declared("Variants and history"), "nightly"),
 }
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_lti.atomic import write_text
+from actuator_lti.design import write_design
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -67,6 +70,14 @@ def section(result: TuningResult) -> Section:
     return doc.section(
         "tuning", title, blocks, result=summary(result), status="pass" if result.feasible else "fail"
     )
+
+
+def write(result: TuningResult, folder: Path | None) -> list[str]:
+    """Write the tuned design into the folder."""
+    if folder is None:
+        return []
+    write_text(folder / "tuned.toml", write_design(result.design))
+    return [str(folder / "tuned.toml")]
 
 
 def summary(result: TuningResult) -> str:
