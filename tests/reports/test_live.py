@@ -43,6 +43,9 @@ def document() -> dict[str, Any]:
     panel = nyquist.panel()
     panel.equal = panel.by_point = True
     panel.curve(response.real[near], response.imag[near], "L", parameter=f[near])
+    panel.x.limits(-2.6, 1.25)
+    panel.y.limits(-1.6, 1.6)
+    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     t = np.linspace(0.0, 2.0, 41)
     curves = Chart(width=900.0, height=320.0)
     panel = curves.panel()

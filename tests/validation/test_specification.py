@@ -112,7 +112,7 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
     ]
     made = doc.document(title="t", subtitle="", design={}, provenance={}, sections=sections)
     again = doc.loads(doc.dumps(made))
-    assert again["verdict"]["failed"] == 0
+    assert again["verdict"]["verdict"] != "not met"
     names = [block["figure"] for block in doc.figures(again)]
     assert {"map", "amplitude_bode", "torque_speed"} <= set(names)
     assert ("sawtooth" in names) == name.startswith("ilr33")
