@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from actuator_lti.design.model import Design
 from actuator_lti.loops import assemble_loops
 from analyses.loop_figures import LoopFigures, all_loop_figures
-from analyses.verdicts import RequirementVerdict, all_pass, distance, judged, which_response
+from analyses.verdicts import RequirementVerdict, distance, judged, tally, which_response
 
 if TYPE_CHECKING:
     from analyses.asked_figures import AskedFigures
 
-__all__ = ["RequirementVerdict", "all_pass", "distance", "evaluate_requirements", "which_response"]
+__all__ = ["RequirementVerdict", "distance", "evaluate_requirements", "tally", "which_response"]
 
 
 def evaluate_requirements(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
+from actuator_lti.verdict import Role, Tally, Verdict
 from analyses.held_loops import by_itself
 from analyses.loop_figures import LoopFigures
 
@@ -32,10 +33,12 @@ class RequirementVerdict:
         What was found, in ``requirement.unit``; ``inf`` where there is no such bound.
     distance : float or None
         To the limit in ``requirement.unit``, positive on the good side.
-    passed : bool or None
-        ``None`` where it cannot be judged; ``reason`` says why.
+    verdict : Verdict
+        Not proven where it cannot be judged; ``reason`` says why.
     reason : str
         What has to be known to read it.
+    waiver : Waiver or None
+        Of what is not proven.
     """
 
     id: str
@@ -43,19 +46,40 @@ class RequirementVerdict:
     loop: str | None
     value: float | None
     distance: float | None
-    passed: bool | None
+    verdict: Verdict
     reason: str = ""
+    waiver: Waiver | None = None
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is met, or waived."""
+        return self.verdict.passes(waived=self.waiver is not None)
+
+    @property
+    def role(self) -> Role:
+        """The colour of it."""
+        return self.verdict.role(waived=self.waiver is not None)
 
 
-def all_pass(verdicts: tuple[RequirementVerdict, ...]) -> bool:
-    """Whether no requirement failed; one that could not be judged does not fail."""
-    return not any(verdict.passed is False for verdict in verdicts)
+def tally(verdicts: Iterable[RequirementVerdict]) -> Tally:
+    """Count verdicts: the one count that every headline and exit status comes from."""
+    every = list(verdicts)
+    return Tally.of((one.verdict for one in every), (one.waiver is not None for one in every))
 
 
 def judged(
     design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
 ) -> list[RequirementVerdict]:
     """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
+    verdicts = _judged(design, requirement, figures, asked)
+    waiver = design.waiver_of
+    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+
+
+def _judged(
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
+) -> list[RequirementVerdict]:
+    """Judge one requirement wherever it holds, waivers apart."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
         raise InputError(
@@ -97,8 +121,9 @@ def _judge_loop(
     if not result.stable:
         reason = f"the {name} loop is {result.margins.verdict}"
         return RequirementVerdict(
-            id=id, requirement=requirement, loop=name, value=None, distance=None, passed=False, reason=reason
-        )
+            id=id, requirement=requirement, loop=name, value=None, distance=None, verdict=Verdict.NOT_MET,
+            reason=reason,
+        )  # fmt: skip
     value = QUANTITIES[requirement.quantity].read(result)
     reason = which_response(requirement.quantity, name)
     if value is None:
@@ -132,8 +157,9 @@ def _verdict(
     """Compare a value with the limits."""
     if value is None or math.isnan(value):
         return RequirementVerdict(
-            id=id, requirement=requirement, loop=loop, value=None, distance=None, passed=None, reason=reason
-        )
+            id=id, requirement=requirement, loop=loop, value=None, distance=None,
+            verdict=Verdict.NOT_PROVEN, reason=reason,
+        )  # fmt: skip
     room = distance(requirement, value)
     if math.isinf(value):
         reason = "nothing limits it" if value > 0 else reason
@@ -143,7 +169,7 @@ def _verdict(
         loop=loop,
         value=value,
         distance=room,
-        passed=room >= 0.0,
+        verdict=Verdict.of(room >= 0.0),
         reason=reason,
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
 from reports import document as doc
+from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
 
 if TYPE_CHECKING:
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from analyses.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
-FURTHER = ("failures", "duty", "cycles", "corners")
-"""Sections that a report has only where they are asked for, as they take their time."""
 
 
 def design_report(
@@ -68,6 +66,7 @@ def design_report(
         *(part for part in validation if part not in first),
         *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
     ]
+    doc.waived(sections, design)
     with isolated() as unanswered:
         items = (
             [item for block in doc.walk(loops[0]) if block["kind"] == "verdicts" for item in block["items"]]
@@ -125,13 +124,17 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     made: list[doc.Section] = []
     with isolated() as missing:
         for name in dict.fromkeys(names):
-            maker = import_module(f"reports.sections.{name}").of_design
+            one = BY_NAME[name]
             try:
-                part = attempt(f"section {name}", partial(maker, design), None)
+                part = attempt(f"section {name}", partial(_further, one, design), None)
             except InputError as error:
                 part = doc.section(name, name.capitalize(), [doc.text(f"Not for this drive: {error}")])
             made += [part] if part is not None else []
     return [*made, *notices(missing, "further")]
+
+
+def _further(one: Analysis, design: Design) -> doc.Section:
+    return one.section(one.run(design, *one.asked(design, {})))
 
 
 def validation_sections(

@@ -10,13 +10,14 @@ import json
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.tree import Tree
+from actuator_lti.verdict import Verdict
 from reports.certain import certain
 from reports.document_schema import (
     SCHEMA,
@@ -39,10 +40,15 @@ from reports.findings import plain as plain_findings
 from reports.verdict_summary import verdict_of, walk
 from reports.visible import visible
 
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from reports.charts.chart import Chart
+
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
     "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "load", "loads", "plain",
-    "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "walk", "with_columns",
+    "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived", "walk",
+    "with_columns",
 ]  # fmt: skip
 
 
@@ -116,11 +122,13 @@ def table(
     }
 
 
-def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout: Layout = "wide") -> Block:
-    """Make a figure, drawn by the module registered under ``name`` from these data alone.
+def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = "wide") -> Block:
+    """Make a figure of a chart.
 
     Parameters
     ----------
+    name : str
+        What kind of figure it is, such as ``"bode"``.
     caption : str
         What is seen; a figure must be understood alone.
     alt : str
@@ -128,10 +136,12 @@ def figure(name: str, data: Mapping[str, Any], *, caption: str, alt: str, layout
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
+    from reports.charts.data import chart_data
+
     return {
         "kind": "figure",
         "figure": name,
-        "data": plain(data),
+        "chart": chart_data(chart),
         "caption": caption,
         "alt": alt,
         "layout": layout,
@@ -189,10 +199,12 @@ def verdict(
     source: str = "",
     reason: str = "",
     comparison: str = "",
+    waiver: str = "",
 ) -> VerdictItem:
-    """Make one item of `verdicts`; ``distance`` is positive on the good side, ``passed`` may be None.
+    """Make one item of `verdicts`; ``distance`` is positive on the good side.
 
-    ``comparison`` is the good side of the limit, ``">="`` or ``"<="``; it is kept as it is printed.
+    ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
+    the limit, ``">="`` or ``"<="``; it is kept as it is printed. ``waiver``: see `actuator_lti` ``Waiver``.
     """
     item: VerdictItem = plain(
         {
@@ -203,12 +215,21 @@ def verdict(
             "comparison": COMPARISONS.get(comparison, comparison),
             "unit": unit,
             "distance": distance,
-            "passed": passed,
+            "verdict": str(Verdict.of(passed)),
+            "waiver": waiver,
             "source": source,
             "reason": reason,
         }
     )
     return item
+
+
+def waived(sections: Iterable[Section], design: Design) -> None:
+    """Mark in place the checks not proven that the design file waives; its requirements know it already."""
+    for block in (block for part in sections for block in walk(part) if block["kind"] == "verdicts"):
+        for item in block["items"]:
+            waiver = design.waiver_of(item["id"]) if item["verdict"] == Verdict.NOT_PROVEN else None
+            item["waiver"] = item["waiver"] or (waiver.words if waiver else "")
 
 
 def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
@@ -230,6 +251,7 @@ def section(
     intro: str = "",
     status: Status = "info",
     findings: Iterable[Finding] = (),
+    verdict: Verdict | None = None,
 ) -> Section:
     """Make a section.
 
@@ -243,8 +265,10 @@ def section(
         How it was found.
     findings : iterable of Finding
         What the first screen has to say of it.
+    verdict : Verdict, optional
+        Not proven: a report is not proven by this section, whatever its verdicts.
     """
-    return {
+    made: Section = {
         "id": id,
         "title": title,
         "result": result,
@@ -253,6 +277,7 @@ def section(
         "blocks": list(blocks),
         "findings": plain_findings(findings),
     }
+    return made if verdict is None else {**made, "verdict": verdict.value}
 
 
 def document(

@@ -1,6 +1,6 @@
 """What a report.json must look like, so that a page or a PDF can be made of it: types, kinds, states.
 
-Keys beyond these are allowed: a later version may say more. What a figure holds is for its module.
+Keys beyond these are allowed: a later version may say more. What a chart holds is for `reports.charts.data`.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from actuator_lti.tree import Tree
 from reports.live_schema import LiveData, Refused
 
 SCHEMA: Final = "actuator-lti/report"
-VERSION: Final = 1
+VERSION: Final = 2
 STATUSES = ("pass", "fail", "warn", "info")
 
 Status = Literal["pass", "fail", "warn", "info"]
 Layout = Literal["wide", "half", "tall"]
 Align = Literal["left", "right", "center"]
 Severity = Literal["fail", "warn", "info"]
+Judged = Literal["met", "not met", "not proven"]
 Scalar = None | bool | int | float | str
 Format = Annotated[str, Field(pattern=r"^(text|yesno|int|fix:1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
 
@@ -98,11 +99,11 @@ class TableBlock(TypedDict):
 
 @_strict
 class FigureBlock(TypedDict):
-    """A figure: its module draws it from the data alone."""
+    """A figure: its chart (`reports.charts.data`) is drawn as it stands."""
 
     kind: Literal["figure"]
     figure: str
-    data: Tree
+    chart: Tree
     caption: str
     alt: str
     layout: NotRequired[Layout]
@@ -136,7 +137,7 @@ class FactsBlock(TypedDict):
 
 @_strict
 class VerdictItem(TypedDict):
-    """One verdict."""
+    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty."""
 
     id: str
     label: str
@@ -145,7 +146,8 @@ class VerdictItem(TypedDict):
     comparison: str
     unit: str
     distance: float | None
-    passed: bool | None
+    verdict: Judged
+    waiver: str
     source: str
     reason: str
     loop: NotRequired[str | None]
@@ -181,7 +183,7 @@ class GlanceFigure(TypedDict):
     limit: float | None
     comparison: str
     distance: float | None
-    passed: bool | None
+    verdict: Judged | None
 
 
 @_strict
@@ -209,7 +211,7 @@ class Weakest(TypedDict):
 
     label: str
     words: str
-    passed: bool | None
+    status: Status
 
 
 @_strict
@@ -238,6 +240,7 @@ class Section(TypedDict):
     result: NotRequired[str]
     intro: str
     status: Status
+    verdict: NotRequired[Judged]
     findings: NotRequired[list[FindingItem]]
     blocks: list[Block]
 
@@ -246,21 +249,21 @@ class Section(TypedDict):
 class Counts(TypedDict):
     """Verdicts of one kind, counted."""
 
-    failed: int
-    not_judged: int
-    total: int
+    met: int
+    not_met: int
+    not_proven: int
+    waived: int
 
 
 @_strict
 class Verdict(TypedDict):
-    """The verdicts of the whole document, counted."""
+    """The verdicts of the whole document: the worst of them, and the count of each kind."""
 
+    verdict: Judged
     passed: bool
-    failed: int
-    not_judged: int
-    total: int
-    parts: NotRequired[dict[str, Counts]]
+    parts: dict[str, Counts]
     failed_sections: NotRequired[list[str]]
+    unproven_sections: NotRequired[list[str]]
 
 
 @_strict
@@ -278,7 +281,7 @@ class Document(TypedDict):
     """A whole report.json."""
 
     schema: Literal["actuator-lti/report"]
-    version: Literal[1]
+    version: Literal[2]
     kind: str
     title: str
     subtitle: str

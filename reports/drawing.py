@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from analyses.isolation import caught, note
-from reports.figures.registry import draw_svg
+from reports.charts.data import chart_of
+from reports.charts.svg import page_svg, paper_svg
 
 Progress = Callable[[int, int], None]
 PLACEHOLDER = (
@@ -25,16 +26,19 @@ def draw_all(
     Parameters
     ----------
     blocks : sequence of mapping
-        Figure blocks of a document; their data pass through JSON, so that a page equals one made of
+        Figure blocks of a document; their charts pass through JSON, so that a page equals one made of
         report.json.
     progress : callable, optional
         Called with (drawn, in all).
     page : bool
-        Whether for a page or for paper (see `reports.figures.registry.draw_svg`).
+        For a page: a picture a column, colours as CSS variables with the light ones as fallback, the legend
+        as a list. Otherwise one picture with plain colours.
     """
     drawn: list[str] = []
     for k, block in enumerate(blocks):
-        svg, missing = caught(f"figure {k + 1} ({block['figure']})", partial(_draw, block, f"f{k + 1}", page))
+        svg, missing = caught(
+            f"figure {k + 1} ({block['figure']})", partial(draw_svg, block, f"f{k + 1}", page)
+        )
         drawn.append(svg or PLACEHOLDER)
         note([missing] if missing else [])
         if progress is not None:
@@ -42,7 +46,7 @@ def draw_all(
     return drawn
 
 
-def _draw(block: Mapping[str, Any], prefix: str, page: bool) -> str:
-    """Draw one figure; its data pass through JSON, so that a page equals one made of report.json."""
-    data = json.loads(json.dumps(block["data"], allow_nan=False))
-    return draw_svg(block["figure"], data, prefix=prefix, page=page, alt=block["alt"])
+def draw_svg(block: Mapping[str, Any], prefix: str = "f", page: bool = True) -> str:
+    """Draw one figure; its chart passes through JSON, so that a page equals one made of report.json."""
+    chart = chart_of(json.loads(json.dumps(block["chart"], allow_nan=False)))
+    return page_svg(chart, prefix, block["alt"]) if page else paper_svg(chart, prefix)

@@ -21,7 +21,7 @@ from actuator_lti.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
-from reports.verdict_summary import verdict_lines
+from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import visible
 
 LONG_TABLE = 13  # rows; longer tables fold
@@ -88,6 +88,8 @@ def render(template: str, **context: Any) -> str:
             script=Markup(code),
             security_policy=security_policy(code, wasm="live" in context),
             verdict_lines=verdict_lines,
+            role=role,
+            why=why,
             LONG_TABLE=LONG_TABLE,
             unique=lambda letter: f"{letter}{next(counter)}",
             **context,

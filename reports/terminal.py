@@ -12,12 +12,16 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
+from actuator_lti.verdict import Verdict
 from reports.cli.output import console
 from reports.html import show_signed
 from reports.numbers import show
+from reports.verdict_summary import role, why
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
-WORDS = {True: ("pass", "✓ met"), False: ("fail", "✗ not met"), None: ("info", "– not judged")}
+WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
+SIGNS = {"pass": "✓", "fail": "✗", "warn": "?", "info": "–"}
+HEADS = {"met": "PASS", "not met": "FAIL", "not proven": "NOT PROVEN"}
 
 
 @dataclass(frozen=True)
@@ -41,19 +45,24 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
         out.print(Text(f"note: {note}", style="yellow"))
 
 
-def print_verdict(passed: bool, words: str, *, failed: str = "FAIL") -> None:
-    """Print the first line of an answer: whether all is well (else the word ``failed``), and why."""
-    line = Text().append("PASS" if passed else failed, style=COLOURS["pass" if passed else "fail"])
+def print_verdict(passed: bool | Verdict, words: str, *, failed: str = "FAIL") -> None:
+    """Print the first line of an answer: a verdict, or whether all is well (else ``failed``), and why."""
+    verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
+    head = failed if passed is False else HEADS[verdict]
+    line = Text().append(head, style=COLOURS[verdict.role()])
     console().print(line.append(f"  {words}"), soft_wrap=True)
 
 
-def print_section(section: Mapping[str, Any], passed: bool | None) -> None:
-    """Print a section: verdict or result first, then how it was found, then its tables."""
+def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, name: str = "") -> None:
+    """Print a section: verdict or result first (of ``name``), then how it was found, then its tables."""
+    words = f"{name}: {section['result']}" if name else section["result"]
     if passed is None:
-        console().print(Text(section["result"]), soft_wrap=True)
+        console().print(Text(words), soft_wrap=True)
     else:
-        print_verdict(passed, section["result"])
-    print_blocks([{"kind": "text", "text": section["intro"]}, *section["blocks"]])
+        print_verdict(passed, words)
+    if section["intro"]:
+        console().print(Text(section["intro"], style="dim"))
+    print_blocks(section["blocks"])
 
 
 def _print(block: Mapping[str, Any], out: Console) -> None:
@@ -61,6 +70,10 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     if block["kind"] == "table":
         laid = table(block)
         out.print(laid if _fits(laid, out) else stacked(block))
+        if block.get("note"):
+            out.print(Text(block["note"], style="dim"))
+    elif block["kind"] == "facts":
+        out.print(fact_table(block))
     elif block["kind"] == "verdicts":
         laid = verdict_table(block)
         out.print(laid if _fits(laid, out) else stacked_verdicts(block))
@@ -79,10 +92,20 @@ def table(block: Mapping[str, Any]) -> Table:
             part for part in (column["label"], f"[{column['unit']}]" if column["unit"] else "") if part
         )
         cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
-        whole = max((cell.cell_len for cell in cells), default=0) if column["align"] == "right" else None
-        made.add_column(Text(label), justify=_side(column["align"]), min_width=whole)
+        longest = max((cell.cell_len for cell in cells), default=0)
+        least = longest if column["align"] == "right" else min(longest, WRAPPED)
+        least = max(least, *map(len, label.split(" ")))
+        made.add_column(Text(label), justify=_side(column["align"]), min_width=least)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
+    return made
+
+
+def fact_table(block: Mapping[str, Any]) -> Table:
+    """Lay labelled values out, a line each."""
+    made = Table.grid(padding=(0, 2))
+    for item in block["items"]:
+        made.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
     return made
 
 
@@ -110,12 +133,12 @@ def stacked_verdicts(block: Mapping[str, Any]) -> Text:
     """Write verdicts as two lines each: what and whether, then the figures."""
     text = Text().append(block.get("what", "requirements").capitalize(), style="bold")
     for item in block["items"]:
-        status, word = WORDS[item["passed"]]
+        status, word = _judged(item)
         limit = f"limit {item['comparison']} {show(item['limit'])}"
         figures = f"{show(item['value'])} {item['unit']}, {limit}, distance {show_signed(item['distance'])}"
         text.append(f"\n{item['label']}: ").append(word, style=COLOURS[status])
         text.append(f"\n  {' '.join(figures.split())}")
-        text.append(f"\n  {item['reason']}" if item["reason"] else "")
+        text.append(f"\n  {why(item)}" if why(item) else "")
     return text.append("\n")
 
 
@@ -178,12 +201,18 @@ def verdict_table(block: Mapping[str, Any]) -> Table:
         made.add_column(label, justify="right", no_wrap=True)
     made.add_column("Unit")
     for item in block["items"]:
-        status, word = WORDS[item["passed"]]
-        word += f" ({item['reason']})" if item["reason"] else ""
+        status, word = _judged(item)
+        word += f" ({why(item)})" if why(item) else ""
         limit = f"{item['comparison']} {show(item['limit'])}"
         cells = [show(item["value"]), limit, show_signed(item["distance"]), item["unit"]]
         made.add_row(Text(item["label"]), Text(word, style=COLOURS[status]), *map(Text, cells))
     return made
+
+
+def _judged(item: Mapping[str, Any]) -> tuple[str, str]:
+    """Colour and word of a verdict."""
+    status = role(item)
+    return status, f"{SIGNS[status]} {item['verdict']}"
 
 
 def _empty(caption: str) -> Table:

@@ -1,51 +1,78 @@
-"""The verdict of a whole document: how many of each kind passed, in numbers and in words."""
+"""The verdict of a whole document: how many of each kind are met, in numbers and in words."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import Any, cast
 
-from reports.document_schema import Block, Counts, Verdict
+from actuator_lti.verdict import Role, Tally, Verdict
+from reports.document_schema import Block, Counts, VerdictItem
+from reports.document_schema import Verdict as Overall
 
 WORDS = {
-    "requirements": ("requirements", "met", "not met"),
-    "checks": ("checks by simulation", "passed", "failed"),
-    "odds": ("requirements under tolerances", "met", "not met"),
+    "requirements": "requirements",
+    "checks": "checks by simulation",
+    "odds": "requirements under tolerances",
 }
+_SECTIONS: tuple[tuple[str, str, Role], ...] = (
+    ("failed_sections", "failed", "fail"),
+    ("unproven_sections", "not proven", "warn"),
+)
 
 
-def summary(blocks: Iterable[Mapping[str, Any]]) -> Verdict:
-    """Count the verdicts, of each kind too: passed if none failed; those not judged are counted apart."""
-    outcomes: dict[str, list[bool | None]] = {}
+def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
+    """Count items of `reports.document.verdicts`."""
+    every = list(items)
+    return Tally.of((Verdict(item["verdict"]) for item in every), (bool(item["waiver"]) for item in every))
+
+
+def role(item: Mapping[str, Any]) -> Role:
+    """The colour of one item."""
+    return Verdict(item["verdict"]).role(waived=bool(item["waiver"]))
+
+
+def why(item: Mapping[str, Any]) -> str:
+    """What stands beside the word of one item: its reason, and how it is waived."""
+    return "; ".join(filter(None, (item["reason"], item["waiver"])))
+
+
+def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
+    """Count the verdicts of some blocks, each kind by itself."""
+    kinds: dict[str, list[VerdictItem]] = {}
     for block in blocks:
         if block["kind"] == "verdicts":
-            kind = outcomes.setdefault(block.get("what", "requirements"), [])
-            kind += [item["passed"] for item in block["items"]]
-    whole = _counts([outcome for kind in outcomes.values() for outcome in kind])
-    parts = {what: _counts(kind) for what, kind in outcomes.items()}
-    return {
-        "passed": whole["failed"] == 0,
-        "failed": whole["failed"],
-        "not_judged": whole["not_judged"],
-        "total": whole["total"],
-        "parts": parts,
-    }
+            kinds.setdefault(block.get("what", "requirements"), []).extend(block["items"])
+    return {what: tally(items) for what, items in kinds.items() if items}
 
 
-def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Verdict:
-    """Count the verdicts of a document; a report fails by a section that failed without one, too.
+def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
+    """Count the verdicts of a document; a report is also judged by sections that say so without one.
 
-    Such a section says that a loop is unstable, say, or that a part could not be computed.
+    Such a section says that a loop is unstable, say, or that its stability is not known.
     """
-    made = summary(block for part in sections for block in walk(part))
-    parts = [part for part in sections if part["status"] == "fail" and not summary(walk(part))["failed"]]
-    first = [part["title"] for part in parts if part["id"] == "answer"]  # it gathers what the others say
-    failed = [part["title"] for part in parts if part["id"] != "answer"]
-    if not failed and made["passed"]:
+    report = kind == "report"
+    parts = {"requirements": Tally()} if report else {}
+    parts |= counted(block for part in sections for block in walk(part))
+    whole = sum(parts.values(), Tally())
+    silent = [part for part in sections if report and part["status"] == "fail" and not _missed(part)]
+    first = [part["title"] for part in silent if part["id"] == "answer"]  # it gathers what the others say
+    failed = [part["title"] for part in silent if part["id"] != "answer"]
+    if not failed and not whole.not_met:
         failed = first
-    if kind != "report" or not failed:
-        return made
-    return {**made, "passed": False, "failed_sections": failed}
+    open_ones = [part["title"] for part in sections if report and part.get("verdict") == Verdict.NOT_PROVEN]
+    sections_too = Tally(not_met=len(failed), not_proven=len(open_ones))
+    made: Overall = {
+        "verdict": (whole + sections_too).verdict.value,
+        "passed": (whole + sections_too).passes,
+        "parts": {what: cast(Counts, asdict(count)) for what, count in parts.items()},
+    }
+    more = {"failed_sections": failed, "unproven_sections": open_ones}
+    return cast(Overall, {**made, **{key: titles for key, titles in more.items() if titles}})
+
+
+def _missed(part: Mapping[str, Any]) -> int:
+    return sum(count.not_met for count in counted(walk(part)).values())
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:
@@ -55,41 +82,32 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
         yield from walk(block)
 
 
-def _counts(outcomes: Sequence[bool | None]) -> Counts:
-    return {
-        "failed": sum(outcome is False for outcome in outcomes),
-        "not_judged": sum(outcome is None for outcome in outcomes),
-        "total": len(outcomes),
-    }
-
-
 def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
     """Say a document's verdict in words, a line for each kind.
 
     Examples
     --------
-    >>> verdict_words({"parts": {"requirements": {"failed": 1, "not_judged": 0, "total": 12}}})
-    ['1 of 12 requirements not met']
+    >>> verdict_words({"parts": {"requirements": {"met": 11, "not_met": 1, "not_proven": 0, "waived": 0}}})
+    ['11 of 12 requirements met, 1 not met']
     """
     return [words for words, _ in verdict_lines(verdict)]
 
 
-def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, bool]]:
-    """Say a document's verdict in words, with whether it is good: failed sections, then each kind of verdict.
+def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
+    """Say a document's verdict in words, each with its colour: failed sections, then each kind of verdict.
 
     Examples
     --------
-    >>> verdict_lines({"total": 0, "failed_sections": ["Missing parts"]})
-    [('failed: Missing parts', False)]
+    >>> verdict_lines({"parts": {}, "failed_sections": ["Missing parts"]})
+    [('failed: Missing parts', 'fail')]
+    >>> verdict_lines({"parts": {"requirements": {}}})
+    [('the design states no requirements', 'info')]
     """
-    parts = verdict.get("parts") or {"requirements": verdict}
-    failed = verdict.get("failed_sections")
-    first = [(f"failed: {'; '.join(failed)}", False)] if failed else []
-    return first + [(_words(what, n), not n["failed"]) for what, n in parts.items() if n["total"]]
-
-
-def _words(what: str, counts: Counts) -> str:
-    name, good, bad = WORDS.get(what, (what, "passed", "failed"))
-    total, failed, unjudged = counts["total"], counts["failed"], counts["not_judged"]
-    words = f"{failed} of {total} {name} {bad}" if failed else f"{total - unjudged} of {total} {name} {good}"
-    return words + (f", {unjudged} not judged" if unjudged else "")
+    lines: list[tuple[str, Role]] = []
+    for key, word, colour in _SECTIONS:
+        lines += [(f"{word}: {'; '.join(titles)}", colour)] if (titles := verdict.get(key)) else []
+    for what, counts in verdict["parts"].items():
+        count = Tally(**counts)
+        words = count.words(WORDS.get(what, what))
+        lines.append((words if count.total else f"the design states {words}", count.role))
+    return lines

@@ -82,6 +82,23 @@ class Requirement:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Waiver:
+    """Leave to go on while a requirement or a check is not proven; one that is not met stays so.
+
+    ``requirement`` is the id as reports have it, ``id/loop`` of a requirement on every loop.
+    """
+
+    requirement: str
+    reason: str
+    date: str
+
+    @property
+    def words(self) -> str:
+        """As reports write it."""
+        return f"waived {self.date}: {self.reason}"
+
+
+@dataclass(frozen=True, kw_only=True)
 class Tolerance:
     """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution.
 

@@ -218,6 +218,7 @@ class Builder:
             description=head.description or "",
             origin=origin,
             requirements=tuple(self.requirement(raw) for raw in self.document.requirement),
+            waivers=tuple(model.Waiver(**raw.model_dump()) for raw in self.document.waiver),
             correlations=tuple(
                 model.Correlation(first=c.first, second=c.second, coefficient=float(c.coefficient))
                 for c in self.document.correlation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from math import inf, isfinite, log
 
 import numpy as np
@@ -14,6 +15,7 @@ from actuator_lti.design.sections import parts_of
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
+CHECKS = "validation"  # what the ids of checks by simulation begin with
 _ELECTRICAL = {
     "resistance": "resistance_ohm",
     "inductance": "inductance_H",
@@ -40,6 +42,7 @@ def check_design(design: Design, where: str) -> None:
         check_elastic,
         _limits,
         _requirements,
+        _waivers,
         _correlations,
     )
     for check in checks:
@@ -180,6 +183,25 @@ def _requirements(design: Design, where: str) -> None:
             raise _refuse(
                 where, f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
             )
+
+
+def _waivers(design: Design, where: str) -> None:
+    """Each for a requirement of the file, on one loop or on all, or for a check by simulation; dated."""
+    known = {item.id for item in design.requirements}
+    seen: set[str] = set()
+    for item in design.waivers:
+        path = f"waiver.{shown(item.requirement)[1:-1]}"
+        named = item.requirement in known or item.requirement.rpartition("/")[0] in known
+        if item.requirement in seen or not (named or item.requirement.startswith(CHECKS)):
+            allowed = f"each once: a requirement's id, id/loop, or the id of a check ({CHECKS}...)"
+            raise _refuse(where, "waiver.requirement", shown(item.requirement), f"allowed: {allowed}")
+        seen.add(item.requirement)
+        if not item.reason.strip():
+            raise _refuse(where, f"{path}.reason", shown(item.reason), "allowed: a text")
+        try:
+            date.fromisoformat(item.date)
+        except ValueError:
+            raise _refuse(where, f"{path}.date", shown(item.date), "allowed: a day, YYYY-MM-DD") from None
 
 
 def _correlations(design: Design, where: str) -> None:

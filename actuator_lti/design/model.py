@@ -22,6 +22,7 @@ from actuator_lti.design.asked import (
     Requirement,
     Tolerance,
     Validation,
+    Waiver,
     default_deflection,
 )
 from actuator_lti.design.control import (
@@ -113,6 +114,7 @@ __all__ = [
     "Tolerance",
     "Validation",
     "VelocityLoop",
+    "Waiver",
     "default_deflection",
 ]
 
@@ -141,6 +143,7 @@ class Design:
     duty: DutyCycle | None = None
     instruments: Instruments = field(default_factory=Instruments)
     requirements: tuple[Requirement, ...] = ()
+    waivers: tuple[Waiver, ...] = ()
     correlations: tuple[Correlation, ...] = ()
     facts: tuple[Fact, ...] = ()
     objects: ControllerObjects = field(default_factory=ControllerObjects)
@@ -186,6 +189,11 @@ class Design:
         from actuator_lti.notebook import design_html
 
         return design_html(self)
+
+    def waiver_of(self, id: str) -> Waiver | None:
+        """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""
+        names = (id, id.rpartition("/")[0])
+        return next((item for item in self.waivers if item.requirement in names), None)
 
     @property
     def total_ratio(self) -> float:

@@ -16,12 +16,13 @@ from actuator_lti.tree import Tree
 
 _KEYS = {
     "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),
+    "waiver": ("requirement", "reason", "date"),
     "correlation": ("first", "second", "coefficient"),
     "fact": ("label", "value", "source", "grade"),
     "objects": ("velocity_gain_factor", "values"),
     "tolerance": ("kind", "half_width", "std", "lower", "upper"),
 }
-_KEYS_OF_TABLES = ("requirement", "correlation", "fact", "objects")
+_KEYS_OF_TABLES = ("requirement", "waiver", "correlation", "fact", "objects")
 _VALUE = ("value", "source", "grade", "tolerance")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Optional
 
@@ -62,6 +63,15 @@ class RawRequirement(BaseModel):
     load: Written | None = None
     source: StrictStr = ""
     note: StrictStr = ""
+
+
+class RawWaiver(BaseModel):
+    """One ``[[waiver]]``; a date of TOML is taken as its text."""
+
+    model_config = _STRICT
+    requirement: StrictStr
+    reason: StrictStr
+    date: Annotated[StrictStr, BeforeValidator(lambda d: d.isoformat() if isinstance(d, date) else d)]
 
 
 class RawCorrelation(BaseModel):
@@ -142,6 +152,7 @@ def document_model() -> type[BaseModel]:
         __config__=_STRICT,
         design=(_section("design"), ...),
         requirement=_many(RawRequirement, MAX_LIST),
+        waiver=_many(RawWaiver, MAX_LIST),
         correlation=_many(RawCorrelation, MAX_LIST),
         fact=_many(RawFact, MAX_LIST),
         objects=(RawObjects | None, None),

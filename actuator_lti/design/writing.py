@@ -69,6 +69,7 @@ def design_tree(design: Design) -> Tree:
         elif table or section.required or at_place(_BARE, section.place) is None:
             here[section.key] = table
     tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
+    tree["waiver"] = [asdict(item) for item in design.waivers]
     tree["correlation"] = [asdict(item) for item in design.correlations]
     tree["fact"] = [asdict(item) for item in design.facts]
     if design.objects != ControllerObjects():
@@ -193,7 +194,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
-    lists = ("requirement", *(section.path for section in SECTIONS if section.many))
+    lists = ("requirement", "waiver", *(section.path for section in SECTIONS if section.many))
     for depth, part in enumerate(parts[:-1]):
         if isinstance(here, list):
             here = next((item for k, item in enumerate(here, 1) if _label(item, k) == part), None)
@@ -233,6 +234,7 @@ def design_hash(design: Design) -> str:
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}
     content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
+    content |= {"waivers": [asdict(item) for item in design.waivers]} if design.waivers else {}
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
     content["tolerances"] = {
         path: _canonical(item.tolerance)

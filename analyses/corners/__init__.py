@@ -1,6 +1,15 @@
 """The drive at its corners: hot, cold, low supply, and the worst ends of its tolerances."""
 
-from analyses.corners.result import Asked, Corner, Corners
-from analyses.corners.run import corners
+from typing import TYPE_CHECKING
+
+from actuator_lti.on_first_use import on_first_use
+
+if TYPE_CHECKING:
+    from analyses.corners.asked import Asked
+    from analyses.corners.result import Corner, Corners
+    from analyses.corners.run import corners
 
 __all__ = ["Asked", "Corner", "Corners", "corners"]
+
+_ROOMS = {"Asked": "asked", "Corner": "result", "Corners": "result", "corners": "run"}
+__getattr__, __dir__ = on_first_use(__name__, {name: f"{__name__}.{room}" for name, room in _ROOMS.items()})

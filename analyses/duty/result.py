@@ -1,4 +1,4 @@
-"""What is asked of a duty cycle, and what it returns."""
+"""What a duty cycle returns."""
 
 from __future__ import annotations
 
@@ -8,61 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from analyses.duty.asked import Asked
 
 Floats = npt.NDArray[np.float64]
-USUAL_SHARE, USUAL_HZ = 0.5, 1.0  # of the full deflection, where none is stated
-
-
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """A duty: a sine of the command, for a share of the time, the drive holding still for the rest.
-
-    Attributes
-    ----------
-    amplitude_rad, frequency_hz : float
-        Of the sine, peak, at the output.
-    load_Nm : float
-        Constant moment at the output, all the time.
-    share : float
-        Share of the time in motion, above 0 to 1 (S3 duty).
-    cycle_s : float
-        One motion and one rest together; the motion is whole periods of the sine.
-    """
-
-    amplitude_rad: float
-    frequency_hz: float = USUAL_HZ
-    load_Nm: float = 0.0
-    share: float = 1.0
-    cycle_s: float = 10.0
-
-    def __post_init__(self) -> None:
-        """Refuse what is no duty."""
-        for name in ("amplitude_rad", "frequency_hz", "cycle_s"):
-            if not 0.0 < getattr(self, name) < np.inf:
-                raise InputError(f"{name} = {getattr(self, name)}: must be positive")
-        if not 0.0 < self.share <= 1.0:
-            raise InputError(f"share = {self.share}: allowed: above 0, at most 1")
-        if not np.isfinite(self.load_Nm):
-            raise InputError(f"load_Nm = {self.load_Nm}: must be finite")
-        if self.share < 1.0 and self.share * self.cycle_s * self.frequency_hz < 1.0:
-            period = f"{1.0 / self.frequency_hz:g} s"
-            raise InputError(f"share = {self.share:g} of {self.cycle_s:g} s: must hold a period, {period}")
-
-    @classmethod
-    def of(cls, design: Design, **chosen: float | None) -> Asked:
-        """What is chosen; else [duty] of the design; else half the full deflection under the largest load."""
-        usual: dict[str, float | None] = {
-            "amplitude_rad": USUAL_SHARE * design.validation.full_deflection_rad,
-            "load_Nm": max(design.validation.loads_Nm, key=abs),
-        }
-        if design.duty is not None:
-            stated = dict(vars(design.duty))
-            turns = stated.pop("frequency_rad_s")
-            stated["frequency_hz"] = None if turns is None else turns / (2.0 * np.pi)
-            usual |= {name: value for name, value in stated.items() if value is not None}
-        usual |= {name: value for name, value in chosen.items() if value is not None}
-        return cls(**usual)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,15 @@
 """What a drive does when a part of it fails: deflection, current and moment over time."""
 
-from analyses.failures.result import Asked, FailureCase, Failures
-from analyses.failures.run import failures
+from typing import TYPE_CHECKING
+
+from actuator_lti.on_first_use import on_first_use
+
+if TYPE_CHECKING:
+    from analyses.failures.asked import Asked
+    from analyses.failures.result import FailureCase, Failures
+    from analyses.failures.run import failures
 
 __all__ = ["Asked", "FailureCase", "Failures", "failures"]
+
+_ROOMS = {"Asked": "asked", "FailureCase": "result", "Failures": "result", "failures": "run"}
+__getattr__, __dir__ = on_first_use(__name__, {name: f"{__name__}.{room}" for name, room in _ROOMS.items()})

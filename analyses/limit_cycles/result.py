@@ -97,3 +97,8 @@ class LimitCycles:
         """The largest cycle that a step of the drive as it is ended in; None: it rests."""
         swings = [one for one in self.rests if one.settling.hunting]
         return max(swings, key=lambda one: one.settling.hunting_rad or 0.0, default=None)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every step of the drive as it is ends at rest."""
+        return self.hunting is None

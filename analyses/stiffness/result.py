@@ -97,7 +97,7 @@ class Stiffness:
     at_rest: tuple[AtRest, ...] = ()
 
     @property
-    def agrees(self) -> bool:
+    def passed(self) -> bool:
         """Whether every check agrees to `AGREED`."""
         return all(check.difference <= AGREED for check in self.checks)
 

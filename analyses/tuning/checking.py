@@ -11,9 +11,11 @@ from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.loops import assemble_loops
 from actuator_lti.quantities import QUANTITIES
+from analyses.loop_figures import all_loop_figures
 from analyses.monte_carlo.stepping import StepCheck, step_columns
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import NonlinearCheck
+from analyses.verdicts import judged
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -38,9 +40,6 @@ def confirm(
     binding : tuple of BindingRequirement
         The same at their worst corners.
     """
-    from analyses.loop_figures import all_loop_figures
-    from analyses.verdicts import judged
-
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
     rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
     for item, result in zip(requirements, binding, strict=True):

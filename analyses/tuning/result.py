@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from analyses.tuning.asked import Aim
     from analyses.verdicts import RequirementVerdict
-
-Aim = Literal["least-change", "reserve"]
 
 
 @dataclass(frozen=True)
@@ -139,6 +138,11 @@ class TuningResult:
     aim: Aim = "least-change"
     placed: tuple[str, ...] = ()
     confirmed: tuple[RequirementVerdict, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is feasible."""
+        return self.feasible
 
     def __str__(self) -> str:
         head = "every requirement met" if self.feasible else "REQUIREMENTS CANNOT BE MET"

@@ -11,16 +11,18 @@ import numpy as np
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from analyses.monte_carlo.judging import label
+from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.checking import confirm, nonlinear_checks
 from analyses.tuning.least import least_change
 from analyses.tuning.objects import neighbours, object_of, step_of_gain
 from analyses.tuning.placing import Placed, checked, place, subsets
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
 from analyses.tuning.program import RESERVE
-from analyses.tuning.result import Aim, BindingRequirement, GainSetting, TuningResult
+from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import Solution, solve
 from analyses.tuning.trade_off import trade_off
+from analyses.verdicts import tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -28,33 +30,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
-
-
-@dataclass(frozen=True)
-class TuningSettings:
-    """What tuning is to do.
-
-    Attributes
-    ----------
-    requirements : tuple of Requirement
-        In place of those of the design on the same figure of the same loop.
-    rounded : bool
-        Round the gains to the steps of the motion controller's objects, where the drive is that controller.
-    curve, check : bool
-        Whether the trade-off curve and the nonlinear check are wanted.
-    aim : {"least-change", "reserve"}
-        The least change of the design that meets every requirement, or the largest common distance to all
-        (up to 30 % of each limit).
-    place : tuple of str
-        What may be added where gains alone do not meet the requirements: `ELEMENTS`.
-    """
-
-    requirements: tuple[Requirement, ...] = ()
-    rounded: bool = True
-    curve: bool = True
-    check: bool = True
-    aim: Aim = "least-change"
-    place: tuple[str, ...] = ()
 
 
 def tune(
@@ -115,7 +90,7 @@ def tune(
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
-        bool(result.min() >= 0.0) and all(v.passed is True for v in confirmed),
+        bool(result.min() >= 0.0) and tally(confirmed).passes,
         design,
         tuned,
         _settings(problem, design, rules, solution.gains, gains),
@@ -160,7 +135,7 @@ def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
         f"Not confirmed by certified margins: {v.id}: "
         + (v.reason if v.value is None else f"{v.value:.6g} {v.requirement.unit}")
         for v in confirmed
-        if v.passed is not True
+        if v.verdict != "met"
     )
 
 

@@ -81,7 +81,7 @@ def commands_page() -> str:
         "# Commands",
         "",
         "Made from the command line itself; each command has `--help`. Exit status: 0 all requirements met,",
-        "1 a requirement or verdict fails, 2 bad input, 3 no result (numerical failure, time limit, crash).",
+        "1 one is not met or not proven, 2 bad input, 3 no result (numerical failure, time limit, crash).",
         "`python -m reports.cli` is the same program where `actuator-lti` is not on the path.",
         "",
     ]

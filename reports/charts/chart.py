@@ -8,13 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Discriminator, PlainValidator
 
 from reports.charts.axis import Axis
 
 Values = Sequence[float | None] | Sequence[float] | np.ndarray
+
+
+def numbers(values: Values) -> np.ndarray:
+    """Turn plain values into floats; None is NaN."""
+    return np.asarray(values, dtype=float)
+
+
+def _read_numbers(values: Any) -> np.ndarray:
+    try:
+        return numbers(values)
+    except TypeError as error:
+        raise ValueError(str(error)) from None
+
+
+Numbers = Annotated[np.ndarray, PlainValidator(_read_numbers)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +52,16 @@ class Look:
 class Curve:
     """A line, its points, or both; None and NaN are gaps. ``label`` puts it into the legend."""
 
-    x: np.ndarray
-    y: np.ndarray
+    kind: Literal["curve"] = "curve"
+    x: Numbers
+    y: Numbers
     look: Look
     label: str = ""
     line: bool = True
     stairs: bool = False
     every: int = 1
     read: bool = True
-    parameter: np.ndarray | None = None
+    parameter: Numbers | None = None
     id: str = ""
 
 
@@ -52,7 +69,8 @@ class Curve:
 class Shape:
     """A closed outline: a bar, an area, a region."""
 
-    rings: Sequence[tuple[np.ndarray, np.ndarray]]
+    kind: Literal["shape"] = "shape"
+    rings: Sequence[tuple[Numbers, Numbers]]
     look: Look
     label: str = ""
 
@@ -61,6 +79,7 @@ class Shape:
 class Rule:
     """A line across the whole panel, at an x or a y; ``words`` stand at its end, inside the frame."""
 
+    kind: Literal["rule"] = "rule"
     at: float
     across: Literal["x", "y"]
     look: Look
@@ -72,6 +91,7 @@ class Rule:
 class Band:
     """A stretch of an axis, over the whole panel."""
 
+    kind: Literal["band"] = "band"
     low: float
     high: float
     across: Literal["x", "y"]
@@ -86,6 +106,7 @@ class Note:
     ``over``: on the point itself where that is free; ``pinned``: there in any case.
     """
 
+    kind: Literal["note"] = "note"
     words: str
     at: tuple[float, float] | None = None
     corner: str = ""
@@ -95,7 +116,7 @@ class Note:
     over: bool = False
 
 
-Item = Curve | Shape | Rule | Band | Note
+Item = Annotated[Curve | Shape | Rule | Band | Note, Discriminator("kind")]
 
 
 @dataclass(kw_only=True)
@@ -170,6 +191,7 @@ class Column:
     heights: Sequence[float]
     width: float = 1.0
     title: str = ""
+    shared: bool = True
 
 
 @dataclass(kw_only=True)
@@ -191,7 +213,7 @@ class Chart:
         sizes = heights or (1.0,)
         axis = Axis()
         panels = [Panel(x=axis if shared else Axis()) for _ in sizes]
-        self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title))
+        self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title, shared=shared))
         return panels
 
     def panel(self, **options: Any) -> Panel:
@@ -207,11 +229,6 @@ class Chart:
                     if not isinstance(item, Note) and item.label:
                         result.setdefault(item.label, item)
         return list(result.items())
-
-
-def numbers(values: Values) -> np.ndarray:
-    """Turn plain values into floats; None is NaN."""
-    return np.asarray(values, dtype=float)
 
 
 def _shade(look: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,14 +8,22 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.analyses import ANALYSES, BY_NAME
+from reports.cli.analysis import command as declared
+
+
+def _declared(group: str) -> tuple[str, ...]:
+    return tuple(one.name for one in ANALYSES if one.group == group)
+
+
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
-    "Linear loops": ("margins", "stiffness", "corners", "report", "pdf"),
-    "Nonlinear checks": ("simulate", "validate", "failures", "duty", "cycles"),
+    "Linear loops": ("margins", *_declared("Linear loops"), "report", "pdf"),
+    "Nonlinear checks": (*_declared("Nonlinear checks"), "validate"),
     "Bench records": ("identify", "correlate"),
     "Out of Python": ("export",),
-    "Variants and history": ("compare", "montecarlo", "tune", "nightly"),
+    "Variants and history": ("compare", "montecarlo", *_declared("Variants and history"), "nightly"),
 }
 
 
@@ -83,12 +91,12 @@ def options_by_name() -> dict[str, str]:
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:
     """Add a command: the function of its name, or the typer application `app` where it has sub-commands."""
-    module = import_module(f"reports.cli.{command}")
+    module = None if command in BY_NAME else import_module(f"reports.cli.{command}")
     group = getattr(module, "app", None)
     if isinstance(group, typer.Typer):
         app.add_typer(group, name=command, rich_help_panel=panel)
     else:
-        function = getattr(module, command)
+        function = declared(BY_NAME[command]) if module is None else getattr(module, command)
         app.command(command, rich_help_panel=panel, help=flowed(function.__doc__ or ""))(function)
 
 

@@ -61,6 +61,7 @@ def compare(
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
 
+    from actuator_lti.verdict import Verdict
     from analyses.engine import Engine
     from analyses.variants import compare as compared
     from reports.cli.errors import leave_with
@@ -95,7 +96,8 @@ def compare(
     if as_json:
         print_json(made)
     else:
-        print_verdict(passed, _verdict(result, untrue))
+        worst = Verdict(made["verdict"]["verdict"])
+        print_verdict(worst if worst != "met" else passed, _verdict(result, untrue))
         print_blocks([overview(result)])
         print_line(f"{page}\n{data}\n{out / TABLE}")
     leave_with(passed)
@@ -103,12 +105,14 @@ def compare(
 
 def _verdict(comparison: Comparison, untrue: bool) -> str:
     """Which designs meet their requirements, in one sentence."""
-    failing = [one.variant.name for one in comparison.all if any(v.passed is False for v in one.verdicts)]
-    said = (
-        f"{_listed(failing)}: a requirement is not met"
-        if failing
-        else "every requirement of every design met"
-    )
+    from actuator_lti.verdict import Tally, Verdict
+    from analyses.requirements import tally
+
+    counts = {one.variant.name: tally(one.verdicts) for one in comparison.all}
+    said = f"{sum(counts.values(), Tally()).words('requirements')}, over {len(counts)} designs"
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        names = [name for name, count in counts.items() if count.verdict == word]
+        said += f"; {word}: {_listed(names)}" if names else ""
     refused = [variant.name for variant in comparison.refused]
     said += f"; no design: {_listed(refused)}" if refused else ""
     return said + ("; a prediction is not confirmed by the simulator" if untrue else "")

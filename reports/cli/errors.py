@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import typer
 
@@ -42,13 +42,16 @@ def leave_with(passed: bool) -> None:
         raise typer.Exit(VERDICT_FAILED)
 
 
-def run(call: Callable[[], object]) -> int:
-    """Run a command and give its exit status; whatever fails becomes one line on standard error."""
+def run(call: Callable[[], object], options: Callable[[], Mapping[str, str]] = dict) -> int:
+    """Run a command and give its exit status; whatever fails becomes one line on standard error.
+
+    ``options`` gives the option behind each Python argument (`reports.cli.app.options_by_name`).
+    """
     from analyses.isolation import drain, reason, traceback_of
 
     drain()
     try:
-        status = _run(call)
+        status = _run(call, options)
     except Exception as error:  # noqa: BLE001 - the one place for what nobody foresaw
         return _say(f"{reason(error)}; traceback: {write_crash_file(traceback_of(error))}", NO_RESULT)
     finally:
@@ -62,7 +65,7 @@ def run(call: Callable[[], object]) -> int:
     return _say(f"the report lacks {len(missing)} part(s): {words}{where}", NO_RESULT)
 
 
-def _run(call: Callable[[], object]) -> int:
+def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -> int:
     """Run a command; the failures that were foreseen become their lines."""
     output = sys.stdout
     try:
@@ -71,7 +74,7 @@ def _run(call: Callable[[], object]) -> int:
     except UnstableError as error:
         return _say(str(error), VERDICT_FAILED)
     except InputError as error:
-        return _say(_by_option(error), BAD_INPUT)
+        return _say(_by_option(error, options), BAD_INPUT)
     except NumericalError as error:
         return _say(f"numerical failure: {error}", NO_RESULT)
     except BrokenPipeError:
@@ -94,14 +97,12 @@ def _run(call: Callable[[], object]) -> int:
     return status if isinstance(status, int) else DONE
 
 
-def _by_option(error: InputError) -> str:
+def _by_option(error: InputError, known: Callable[[], Mapping[str, str]]) -> str:
     """Name the option where the message begins with the Python argument behind it: ``duration_s = ...``."""
-    from reports.cli.app import options_by_name
-
     name, equals, rest = str(error).partition(" = ")
     if error.where is not None or not equals or not name.isidentifier():
         return str(error)
-    options = options_by_name()
+    options = known()
     short = name.removesuffix("_Nm").removesuffix("_s").removesuffix("_rad")
     option = options.get(name) or options.get(short)
     return f"{option} {rest}" if option else str(error)

@@ -20,8 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     for name, value in same_order().items():
         os.environ.setdefault(name, value)
-    from reports.cli.app import build
+    from reports.cli.app import build, options_by_name
     from reports.cli.errors import run
 
     given = None if arguments is None else list(arguments)
-    return run(lambda: build()(args=given, prog_name="actuator-lti", standalone_mode=False))
+    return run(lambda: build()(args=given, prog_name="actuator-lti", standalone_mode=False), options_by_name)

@@ -20,9 +20,10 @@ from reports.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from actuator_lti.loops import Loops
+    from actuator_lti.verdict import Verdict
     from analyses.loop_figures import LoopFigures
     from analyses.requirements import RequirementVerdict
 
@@ -54,7 +55,7 @@ def margins(
     from actuator_lti.design import warnings_of
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
-    from analyses.requirements import all_pass, evaluate_requirements
+    from analyses.requirements import evaluate_requirements
     from reports.cli.errors import leave_with
     from reports.cli.output import print_warning
     from reports.sections.names import load_unit
@@ -84,8 +85,20 @@ def margins(
         _print_json(where, figures, verdicts, outer)
     else:
         _print_tables(where, figures, verdicts, outer)
-    every = [*figures.values(), *outer.values()]
-    leave_with(all_pass(verdicts) and all(result.sound for result in every))
+    leave_with(_whole(verdicts, figures, outer).passes())
+
+
+def _whole(
+    verdicts: Iterable[RequirementVerdict],
+    figures: Mapping[str, LoopFigures],
+    outer: Mapping[str, LoopFigures],
+) -> Verdict:
+    """The requirements, and that every loop is stable."""
+    from actuator_lti.verdict import Tally, Verdict
+    from analyses.requirements import tally
+
+    sound = Tally.of(Verdict.of(one.sound) for one in (*figures.values(), *outer.values()))
+    return (tally(verdicts) + sound).verdict
 
 
 def _outer_figures(loops: Loops, around: Path | None, *, step: bool) -> dict[str, LoopFigures]:
@@ -107,20 +120,18 @@ def _print_json(
     outer: Mapping[str, LoopFigures],
 ) -> None:
     """Print everything for a machine."""
-    from analyses.requirements import all_pass
     from reports.cli.output import print_json
     from reports.loop_json import loop_json
     from reports.sections.requirements import item
 
     loops = {name: loop_json(result) for name, result in figures.items()}
-    passed = all_pass(tuple(verdicts)) and all(
-        result.sound for result in (*figures.values(), *outer.values())
-    )
+    whole = _whole(verdicts, figures, outer)
     around = {"around": {name: loop_json(result) for name, result in outer.items()}} if outer else {}
     print_json(
         {
             **where,
-            "passed": passed,
+            "verdict": whole,
+            "passed": whole.passes(),
             "loops": loops,
             **around,
             "verdicts": [item(v, where["load_unit"]) for v in verdicts],
@@ -135,7 +146,6 @@ def _print_tables(
     outer: Mapping[str, LoopFigures],
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
-    from analyses.requirements import all_pass
     from reports.sections.margins import (
         by_itself_notes,
         crossing_table,
@@ -154,12 +164,7 @@ def _print_tables(
     unknown = [name for name, result in named.items() if result.sound is None]
     loops = f"not stable: {', '.join(unstable)}" if unstable else _stable_words(named)
     loops = f"stability not known: {', '.join(unknown)}" if unknown and not unstable else loops
-    good = all_pass(tuple(verdicts)) and not unstable
-    print_verdict(
-        good and not unknown,
-        f"{where['design']}: {loops}. {made['result']}",
-        failed="UNDECIDED" if good else "FAIL",
-    )
+    print_verdict(_whole(verdicts, figures, outer), f"{where['design']}: {loops}. {made['result']}")
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     said = by_itself_notes(named)

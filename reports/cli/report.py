@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reports.analyses import FURTHER
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
@@ -36,7 +37,7 @@ AlsoOption = Annotated[
     typer.Option(
         "--also",
         metavar="SECTION",
-        help="Add what takes its time: failures, duty, cycles, corners, or all (repeatable).",
+        help=f"Add what takes its time: {', '.join(FURTHER)}, or all (repeatable).",
     ),
 ]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
@@ -59,7 +60,8 @@ def report(
     With --include the results of identify and correlate become sections of it; with --also
     failure cases, duty cycle, limit cycles and corners.
     """
-    from reports.build import FURTHER, design_report, further_sections, write_report
+    from actuator_lti.verdict import Verdict
+    from reports.build import design_report, further_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
@@ -86,8 +88,8 @@ def report(
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
-        first, *more = verdict_words(made["verdict"]) or ["no requirement in the design file"]
-        print_verdict(passed, f"{drive.name}: {first}")
+        first, *more = verdict_words(made["verdict"])
+        print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
         print_line("\n".join([*more, *map(str, written)]))
     leave_with(passed)
 

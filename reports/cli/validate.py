@@ -132,7 +132,7 @@ def _not_met(made: Document) -> list[tuple[str, str]]:
     """Every check of the document that is not met, and why."""
     blocks = [block for part in made["sections"] for block in part["blocks"]]
     items = [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
-    return [(item["label"], item["reason"]) for item in items if item["passed"] is False]
+    return [(item["label"], item["reason"]) for item in items if item["verdict"] == "not met"]
 
 
 def _ledger(rows: Any, caption: str) -> Block:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TypedDict
 
-from reports.figures import style
-from reports.figures.style import Chart, Panel, Values
+from reports.charts import style
+from reports.charts.style import Chart, Panel, Values
 
 LEAST = 1e-9
 LOWEST = 0.02  # of the linear margin: a border below is drawn here

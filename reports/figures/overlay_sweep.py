@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NotRequired, TypedDict
 
-from reports.figures import style
-from reports.figures.style import Chart, Panel, Values
+from reports.charts import style
+from reports.charts.style import Chart, Panel, Values
 from reports.numbers import significant
 
 LEAST = 1e-12  # errors below this are drawn there

@@ -6,9 +6,9 @@ import math
 
 from actuator_lti.drive.signals import LIMITERS
 from nonlinear.export.page import line_of
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.charts.svg import page_svg
-from reports.figures import style
-from reports.figures.style import Chart, Panel
 
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}

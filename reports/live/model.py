@@ -19,7 +19,6 @@ from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRAC
 from analyses.large_signal.grid import LEAST_UPDATES
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
-from reports.figures.map import COLOURS, WORDS
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
@@ -32,6 +31,7 @@ from reports.live_schema import (
     Refused,
     StepData,
 )
+from reports.sections.amplitude_map import COLOURS, WORDS
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
 MAP = "The friction of the loops has the slope of the first piece of its map."

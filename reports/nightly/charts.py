@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.charts import chart as figures
+from reports.charts import style
 from reports.charts.svg import page_svg
-from reports.figures import style
 from reports.nightly.text import one_line
 from reports.nightly.trend import ChangePoint
 from reports.numbers import significant

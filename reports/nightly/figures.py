@@ -9,7 +9,7 @@ from typing import Any
 
 from actuator_lti.tree import Tree
 from reports.nightly.text import one_line
-from reports.verdict_summary import verdict_words
+from reports.verdict_summary import role, tally, verdict_words, why
 
 MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
@@ -31,7 +31,7 @@ class Figure:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One requirement: ``distance`` is positive where it is met; ``passed`` is ``None`` where not judged."""
+    """One requirement: ``distance`` is positive where it is met; ``waiver`` of one that is not proven."""
 
     id: str
     label: str
@@ -40,15 +40,27 @@ class Verdict:
     unit: str
     distance: float | None
     relative: float | None
-    passed: bool | None
+    verdict: str
+    waiver: str = ""
     source: str = ""
     reason: str = ""
     what: str = REQUIREMENTS
+
+    @property
+    def role(self) -> str:
+        """Its colour."""
+        return role(asdict(self))
+
+    @property
+    def why(self) -> str:
+        """What stands beside its word."""
+        return why(asdict(self))
 
 
 def digest(document: Mapping[str, Any]) -> Tree:
     """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
     verdicts = list(verdicts_of(document))
+    count = tally(asdict(v) for v in verdicts)
     figures = list(figures_of(document))
     design = document.get("design") or {}
     return {
@@ -56,9 +68,10 @@ def digest(document: Mapping[str, Any]) -> Tree:
         "revision": str(design.get("revision", "") or ""),
         "verdicts": [asdict(v) for v in verdicts],
         "figures": [asdict(f) for f in figures[:MAX_FIGURES]],
-        "words": verdict_words({**document["verdict"], "failed_sections": []}) if verdicts else [],
-        "failed": sum(v.passed is False for v in verdicts),
-        "total": len(verdicts),
+        "words": verdict_words({"parts": document["verdict"]["parts"]}),
+        "failed": count.not_met,
+        "unproven": count.not_proven + len(document["verdict"].get("unproven_sections", ())),
+        "total": count.total,
         "failed_sections": [
             one_line(str(part.get("title", "")), 120)
             for part in document.get("sections", ())
@@ -70,7 +83,7 @@ def digest(document: Mapping[str, Any]) -> Tree:
 def _has_failed_verdict(part: Mapping[str, Any]) -> bool:
     blocks = [block for _, block in _nested("", part.get("blocks", ()))]
     items = [item for block in blocks if block.get("kind") == "verdicts" for item in block.get("items", ())]
-    return any(item.get("passed") is False for item in items)
+    return any(item["verdict"] == "not met" for item in items)
 
 
 def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
@@ -94,7 +107,7 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
     if limit is None:
         limit = first_number(str(item.get("limit", "")))
     scale = abs(limit) if limit else 1.0
-    ranked = distance is not None and (what == REQUIREMENTS or item.get("passed") is False)
+    ranked = distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met")
     return Verdict(
         id=name,
         label=str(item.get("label", "") or name),
@@ -103,7 +116,8 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
         unit=str(item.get("unit", "") or ""),
         distance=distance,
         relative=distance / scale if ranked and distance is not None else None,
-        passed=item.get("passed"),
+        verdict=item["verdict"],
+        waiver=item["waiver"],
         source=str(item.get("source", "") or ""),
         reason=str(item.get("reason", "") or ""),
         what=what,
@@ -132,8 +146,8 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
             better=1,
             kind="distance",
         )
-        passed = None if verdict.passed is None else float(verdict.passed)
-        yield Figure(name=f"{verdict.id}: met", value=passed, kind="verdict")
+        met = {"met": 1.0, "not met": 0.0}.get(verdict.verdict)
+        yield Figure(name=f"{verdict.id}: met", value=met, kind="verdict")
     for section, block in _blocks(document):
         if section in _INPUT_SECTIONS:
             continue

@@ -25,7 +25,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
 from reports.nightly import schema, sums
 from reports.nightly.figures import Figure
-from reports.nightly.job import canonical
+from reports.nightly.job import BROKEN, canonical
 from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, NewResult, Result, Run
 from reports.nightly.text import sha256
@@ -106,7 +106,7 @@ class History:
             sums.write(c)
 
     def _insert(self, run: int, result: NewResult) -> None:
-        snapshot = self._snapshot(result) if result.key and result.status in ("pass", "fail") else None
+        snapshot = self._snapshot(result) if result.key and result.status not in BROKEN else None
         subject = self._id("subjects", "name", {"name": result.name, "kind": result.kind})
         self.connection.execute(
             "INSERT INTO results VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",

@@ -11,7 +11,7 @@ from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.text import one_line, sha256
 
-Status = Literal["pass", "fail", "error", "timeout", "crash"]
+Status = Literal["pass", "unproven", "fail", "error", "timeout", "crash"]
 BROKEN: tuple[Status, ...] = ("error", "timeout", "crash")
 
 MAX_NAME = 20_000

@@ -15,11 +15,17 @@ from reports.numbers import significant
 from reports.visible import visible
 
 SCHEMA = "actuator-lti/nightly"
-VERSION = 1
+VERSION = 2
 _MAX_TEXT = 20_000
 _LISTED = 20
-STATE_WORDS = {"broken": "no result", "fail": "failing", "regression": "regressed", "pass": "passing"}
-_SIGNS = {"broken": "⚠", "fail": "✗", "regression": "▼", "pass": "✓"}
+STATE_WORDS = {
+    "broken": "no result",
+    "fail": "failing",
+    "unproven": "not proven",
+    "regression": "regressed",
+    "pass": "passing",
+}
+SIGNS = {"broken": "⚠", "fail": "✗", "unproven": "?", "regression": "▼", "pass": "✓"}
 
 
 class RequirementJson(TypedDict):
@@ -31,7 +37,8 @@ class RequirementJson(TypedDict):
     limit: str
     unit: str
     distance: float | None
-    passed: bool | None
+    verdict: str
+    waiver: str
 
 
 class ChangeJson(TypedDict):
@@ -162,7 +169,8 @@ def _requirement(verdict: Verdict) -> RequirementJson:
         "limit": verdict.limit,
         "unit": verdict.unit,
         "distance": verdict.distance,
-        "passed": verdict.passed,
+        "verdict": verdict.verdict,
+        "waiver": verdict.waiver,
     }
 
 
@@ -258,15 +266,14 @@ def _requirement_case(design: DesignView, verdict: Verdict) -> str:
         f"found {_value(verdict.value)}, limit {verdict.limit}, "
         f"distance {_value(verdict.distance)} {verdict.unit}"
     )
-    if verdict.passed is None:
-        return _case(design, name, f"<skipped message={_attribute(verdict.reason or 'not judged')}/>")
-    if verdict.passed:
+    if verdict.verdict == "met":
         return _case(design, name)
-    return _case(
-        design,
-        name,
-        f'<failure type="requirement" message={_attribute(result)}>{_text(verdict.reason)}</failure>',
-    )
+    if verdict.waiver:
+        return _case(design, name, f"<skipped message={_attribute(verdict.why)}/>")
+    message = result if verdict.verdict == "not met" else "not proven"
+    kind = "requirement" if verdict.verdict == "not met" else "not proven"
+    inside = f'<failure type="{kind}" message={_attribute(message)}>{_text(verdict.reason)}</failure>'
+    return _case(design, name, inside)
 
 
 def _section_case(design: DesignView, title: str) -> str:
@@ -314,7 +321,7 @@ def markdown(night: Overview) -> str:
 
 def _row(design: DesignView) -> str:
     worst = "" if design.result.worst is None else f"{100 * design.result.worst:+.1f} %"
-    state = f"{_SIGNS[design.state]} {STATE_WORDS[design.state]}"
+    state = f"{SIGNS[design.state]} {STATE_WORDS[design.state]}"
     cells = (markdown_cell(design.name), state, markdown_cell(design.result.worst_id), worst)
     return f"| {' | '.join(cells)} | {len(design.last_night.changes)} |"
 

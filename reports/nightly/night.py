@@ -306,7 +306,9 @@ def _built(cache: Cache, job: Job, done: Done) -> Outcome:
 
 
 def _status(meta: Mapping[str, Any]) -> Any:
-    return "fail" if meta.get("failed") or meta.get("failed_sections") else "pass"
+    if meta.get("failed") or meta.get("failed_sections"):
+        return "fail"
+    return "unproven" if meta.get("unproven") else "pass"
 
 
 def _message(outcome: Outcome) -> str:

@@ -13,7 +13,7 @@ from reports.nightly.course import Course, course_of
 from reports.nightly.figures import Figure
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
-from reports.nightly.machines import STATE_WORDS, cause_lines
+from reports.nightly.machines import SIGNS, STATE_WORDS, cause_lines
 from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line
 from reports.nightly.trend import ChangePoint
@@ -23,15 +23,11 @@ from reports.visible import visible
 
 MAX_NIGHTS = 400
 MAX_HEADLINES = 12
-STATES = {
-    "broken": ("⚠", STATE_WORDS["broken"]),
-    "fail": ("✗", STATE_WORDS["fail"]),
-    "regression": ("▼", STATE_WORDS["regression"]),
-    "pass": ("✓", STATE_WORDS["pass"]),
-}
+STATES = {name: (SIGNS[name], words) for name, words in STATE_WORDS.items()}
 NIGHT_SIGNS = {
     "pass": ("✓", "passed"),
     "regressed": ("▼", "passed, closer to its limit"),
+    "unproven": ("?", "not proven"),
     "fail": ("✗", "failed"),
     "error": ("⚠", "raised an error"),
     "timeout": ("⚠", "did not end in time"),

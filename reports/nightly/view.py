@@ -96,11 +96,11 @@ class DesignView:
 
     @property
     def state(self) -> str:
-        """``broken``, ``fail``, ``regression`` or ``pass``."""
+        """``broken``, ``fail``, ``unproven``, ``regression`` or ``pass``."""
         if self.broken:
             return "broken"
-        if self.result.status == "fail":
-            return "fail"
+        if self.result.status != "pass":
+            return self.result.status
         return "regression" if self.regressions else "pass"
 
     @property

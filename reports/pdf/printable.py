@@ -11,7 +11,7 @@ from reports.document import figures, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
-from reports.verdict_summary import verdict_lines
+from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import visible
 
 MAX_CELL = 600
@@ -23,8 +23,6 @@ SCALE = 0.54
 _LONG_WORD = re.compile(r"\S{24,}")
 _BREAKS = re.compile(r"[\t\n\r\f\v\x1c-\x1f\x85\u2028\u2029]+")
 _SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
-_WORDS = {True: "met", False: "not met", None: "not judged"}
-_STATES = {True: "pass", False: "fail", None: "info"}
 
 
 def printable(made: Mapping[str, Any]) -> Tree:
@@ -36,7 +34,7 @@ def printable(made: Mapping[str, Any]) -> Tree:
         "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
         "title": clean(made.get("title"), MAX_TITLE),
         "subtitle": clean(made.get("subtitle"), 1200),
-        "overall": [[clean(words, 200), good] for words, good in verdict_lines(made["verdict"])],
+        "overall": [[clean(words, 200), status] for words, status in verdict_lines(made["verdict"])],
         "facts": _facts(design, origin),
         "revision": clean(design.get("revision"), 60),
         "verdicts": [_verdict(item) for item in _required(made)],
@@ -81,17 +79,17 @@ def _required(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
 def _verdict(item: Mapping[str, Any]) -> Tree:
     limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'short:6')}".strip()
     return {
-        "state": _STATES[item.get("passed")],
+        "state": role(item),
         "cells": [
             clean(item.get("label"), 200),
-            _WORDS[item.get("passed")],
+            item["verdict"],
             clean(item["shown"], 60) if item.get("shown") else show(item.get("value"), "sig:4"),
             "" if item.get("shown") else clean(limit, 60),
             "" if item.get("shown") else show_signed(item.get("distance")),
             clean(item.get("unit"), 30),
         ],
         "id": clean(item.get("id"), 120),
-        "reason": clean(item.get("reason"), 400),
+        "reason": clean(why(item), 400),
         "source": clean(item.get("source"), 200),
     }
 

@@ -23,6 +23,7 @@ from reports.numbers import short
 from reports.sections import loop as loop_section
 from reports.sections.margins import margin_row, shown, worst_status
 from reports.sections.names import LOOPS
+from reports.verdict_summary import role
 
 SHOWN = 5
 
@@ -42,7 +43,7 @@ def section(
         "more": max(len(result) - SHOWN, 0),
     }
     status = worst_status([one.sound for one in figures.values()])
-    if any(item["passed"] is False for item in items) or any(item.severity == "fail" for item in result):
+    if any(item["verdict"] == "not met" for item in items) or any(item.severity == "fail" for item in result):
         status = "fail"
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
 
@@ -62,7 +63,7 @@ def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> Glan
                 "limit": nearest["limit"] if nearest else None,
                 "comparison": nearest["comparison"] if nearest else "",
                 "distance": nearest["distance"] if nearest else None,
-                "passed": nearest["passed"] if nearest else None,
+                "verdict": nearest["verdict"] if nearest else None,
             }
         )
     stable = margin_row(figures.judged)["stable"]
@@ -85,7 +86,7 @@ def weakest(items: Sequence[VerdictItem]) -> Weakest | None:
     side, value = "inside" if distance >= 0.0 else "beyond", short(found, 4)
     limit = f"{item['comparison']} {short(bound, 6)}".strip()
     words = f"{value} {unit}, limit {limit} {unit}: {share:.0f} % {side} its limit"
-    return {"label": item["label"], "words": " ".join(words.split()), "passed": item["passed"]}
+    return {"label": item["label"], "words": " ".join(words.split()), "status": role(item)}
 
 
 def _nearness(item: VerdictItem) -> float:
@@ -100,12 +101,9 @@ def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
     if not figures:
         return []
     name, result = list(figures.items())[-1]
-    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name)]
+    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name, small=True)]
     if result.step is not None:
-        blocks.append(loop_section.step(LOOPS[name], result, None, name=name))
-    for block in blocks:
-        if block["kind"] == "figure":
-            block["data"]["small"] = True
+        blocks.append(loop_section.step(LOOPS[name], result, None, name=name, small=True))
     return blocks
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from actuator_lti.verdict import Verdict
+from analyses.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import significant
@@ -65,14 +67,14 @@ def verdicts(comparison: Comparison) -> Section:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
     if len(comparison.refused) > compare_many.MANY:
         blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
-    failed = [(one, v) for one in everything.all for v in one.verdicts if v.passed is False]
-    count = sum(len(one.verdicts) for one in everything.all)
-    result = f"All {count} verdicts pass."
-    if failed:
-        first = ", ".join((failed[0][0].variant.name, label(failed[0][1])))
-        which = first if len(failed) == 1 else f"{first}, and {len(failed) - 1} more"
-        result = f"{len(failed)} of {count} verdicts {'fails' if len(failed) == 1 else 'fail'}: {which}."
-    status: Status = "fail" if failed or comparison.refused else "pass"
+    count = tally(v for one in everything.all for v in one.verdicts)
+    result = f"{count.words('requirements')}, over {len(everything.all)} designs."
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]
+        if of:
+            more = f", and {len(of) - 1} more" if len(of) > 1 else ""
+            result += f" {word.capitalize()}: {of[0][0].variant.name}, {label(of[0][1])}{more}."
+    status: Status = "fail" if comparison.refused else count.role
     return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
 
 
@@ -91,14 +93,16 @@ def design_columns(designs: Sequence[Compared]) -> list[Column]:
 def overview(comparison: Comparison) -> Block:
     """One line a design that the page shows: how many requirements it meets, and which it misses."""
     comparison = compare_many.choice(comparison)
-    columns = [doc.column("design", "Design"), doc.column("met", "Met"), doc.column("missed", "Missed")]
+    columns = [doc.column("design", "Design"), doc.column("met", "Met")]
+    columns += [doc.column("missed", "Not met"), doc.column("unproven", "Not proven")]
     rows = []
     for one in comparison.all:
-        missed = [v.id for v in one.verdicts if v.passed is False]
-        met = sum(v.passed is True for v in one.verdicts)
+        missed = [v.id for v in one.verdicts if v.verdict == "not met"]
+        count = tally(one.verdicts)
         rows.append({
-            "design": one.variant.name, "met": f"{met} of {len(one.verdicts)}", "missed": ", ".join(missed),
-            "_status": "fail" if missed else "pass",
+            "design": one.variant.name, "met": f"{count.met} of {count.total}", "missed": ", ".join(missed),
+            "unproven": ", ".join(v.id for v in one.verdicts if v.verdict == "not proven"),
+            "_status": count.role,
         })  # fmt: skip
     left_out = len(comparison.everything.all) - len(rows)
     note = f"{left_out} more designs are in {compare_many.TABLE}." if left_out else ""
@@ -115,14 +119,13 @@ def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> Row
     for k, one in enumerate(designs):
         verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
         if verdict is None or verdict.value is None:
-            status: Status = "fail" if verdict and verdict.passed is False else "info"
-            row[f"d{k}"] = {"text": "none", "status": status}
+            row[f"d{k}"] = {"text": "none", "status": verdict.role if verdict else "info"}
             continue
         words = number(verdict.value) or ""
         change = 0.0 if wanted.value is None else verdict.value - wanted.value
         if abs(change) > _SEEN * abs(verdict.value):
             words += f" ({_signed(change)})"
-        row[f"d{k}"] = {"text": words, "status": "pass" if verdict.passed else "fail"}
+        row[f"d{k}"] = {"text": words, "status": verdict.role}
     return row
 
 

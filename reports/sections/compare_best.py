@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from analyses.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import significant
@@ -52,8 +53,8 @@ def _result(comparison: Comparison, met: Sequence[Compared]) -> str:
 
 
 def failed(one: Compared) -> int:
-    """Number of requirements that a design does not meet."""
-    return sum(v.passed is False for v in one.verdicts)
+    """Number of requirements that a design does not meet, or that are not proven of it."""
+    return sum(not v.passes for v in one.verdicts)
 
 
 def nearness(verdict: RequirementVerdict) -> float | None:
@@ -86,11 +87,11 @@ def _designs(comparison: Comparison) -> Block:
         gains, losses = _changes(one, comparison)
         rows.append({
             "design": one.variant.name,
-            "met": f"{sum(v.passed is True for v in one.verdicts)} of {len(one.verdicts)}",
+            "met": f"{tally(one.verdicts).met} of {len(one.verdicts)}",
             "weakest": "" if verdict is None else f"{label(verdict)}, {_percent(near)}",
             "gains": "the base" if one is comparison.base else _words(gains),
             "gives": "" if one is comparison.base else _words(losses),
-            "_status": "fail" if failed(one) else "pass",
+            "_status": tally(one.verdicts).role,
         })  # fmt: skip
     note = "Gains and losses are changes of the distance to the limit, in percent of the limit."
     return doc.table("Each design", columns, rows, note)

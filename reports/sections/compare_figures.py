@@ -8,15 +8,15 @@ import numpy as np
 
 from actuator_lti.quantities import ANALYSIS_QUANTITIES, drive_cases
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.sections.names import LOOPS
 
 if TYPE_CHECKING:
+    from analyses.responses import Curve
     from analyses.sensitivity import Sensitivity
     from analyses.variants import Compared, Comparison
-    from reports.figures import overlay as overlay_figure
-    from reports.figures import tornado as tornado_figure
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -48,27 +48,39 @@ def overlays(comparison: Comparison) -> Section:
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
     from analyses.responses import curve, frequency_grid
 
-    series: list[overlay_figure.Bode] = []
+    which = "closed loop" if closed else "open loop"
+    chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
+    top, bottom = chart.column(1.0, 1.0)
+    made: list[tuple[Curve, np.ndarray]] = []
     for one in drawn:
         result = one.loops.get(name)
         if result is None or (closed and not result.stable):
             continue
         grid = frequency_grid(result, 140)
-        made = curve(result.plain_response if closed else result.loop.plain_open, grid)
-        series.append({
-            "label": one.variant.name[:60], "frequency_hz": abscissa(made.frequency_hz),
-            "magnitude_db": rounded(made.magnitude_db - (_dc_db(result) if closed else 0.0)),
-            "phase_deg": rounded(made.phase_deg),
-        })  # fmt: skip
-    if not series:
+        response = curve(result.plain_response if closed else result.loop.plain_open, grid)
+        magnitude = response.magnitude_db - (_dc_db(result) if closed else 0.0)
+        label, look = one.variant.name[:60], _look(len(made))
+        top.curve(response.frequency_hz, magnitude, label, **look)
+        bottom.curve(response.frequency_hz, response.phase_deg, label, **look)
+        made.append((response, magnitude))
+    if not made:
         return []
-    which = "closed loop" if closed else "open loop"
-    data: overlay_figure.BodeData = {"kind": "bode", "series": series, "title": f"{title}, {which}"}
+    style.bound(top, [y for _, magnitude in made for y in magnitude], span=70.0, top_room=0.1)
+    style.phase_axis(bottom, [y for response, _ in made for y in response.phase_deg], span=450.0, room=0.05)
+    hertz = [response.frequency_hz for response, _ in made]
+    style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     return [doc.figure(
-        "overlay", data,
+        "overlay", chart,
         caption=f"{title}, {which}: the base and its variants.",
-        alt=f"Bode diagram of the {which} of the {name} loop of {len(series)} designs.",
+        alt=f"Bode diagram of the {which} of the {name} loop of {len(made)} designs.",
     )]  # fmt: skip
+
+
+def _look(k: int) -> style.Style:
+    """The first is the base and stands out."""
+    colour = style.INK if k == 0 else style.SERIES[(k - 1) % 7]
+    return {"colour": colour, "dash": k % 7, "width": 2.4 if k == 0 else 1.7}
 
 
 def _dc_db(result: Any) -> float:
@@ -79,24 +91,23 @@ def _dc_db(result: Any) -> float:
 
 
 def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
-    series: list[overlay_figure.Step] = []
-    for one in drawn:
-        step = one.loops[name].step if name in one.loops else None
-        if step is None:
-            continue
+    steps = [(one, one.loops[name].step) for one in drawn if name in one.loops]
+    shown = [(one.variant.name[:60], step) for one, step in steps if step is not None]
+    if not shown:
+        return []
+    chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
+    panel = chart.panel()
+    scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
+    for k, (label, step) in enumerate(shown):
         keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
         response = np.asarray(step.response)[keep] / step.final_value
-        series.append({
-            "label": one.variant.name[:60], "time_s": abscissa(np.asarray(step.time_s)[keep]),
-            "response": rounded(response),
-        })  # fmt: skip
-    if not series:
-        return []
-    data: overlay_figure.StepData = {"kind": "step", "series": series, "title": f"{title}, step"}
+        panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
+    panel.x.limits(0.0)
+    panel.y.label = "response to a unit step"
     return [doc.figure(
-        "overlay", data,
+        "overlay", chart,
         caption=f"{title}, unit step: the base and its variants.",
-        alt=f"Step responses of the {name} loop of {len(series)} designs.",
+        alt=f"Step responses of the {name} loop of {len(shown)} designs.",
     )]  # fmt: skip
 
 
@@ -157,13 +168,22 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
     near = limit is not None and min(ends) - 3 * abs(base - min(ends)) <= limit <= max(ends) + 3 * abs(
         max(ends) - base
     )
-    data: tornado_figure.Data = {
-        "label": words, "unit": name.unit if name else "", "base": base, "limit": limit if near else None,
-        "low_label": "parameter low", "high_label": "parameter high",
-        "bars": [{"label": _bar_label(bar), "low": bar.low, "high": bar.high} for bar in bars],
-    }  # fmt: skip
+    chart = Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
+    panel = chart.panel()
+    low: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
+    for k, bar in enumerate(bars):
+        panel.bar(float(k), base, bar.low, "parameter low", **low)
+        panel.bar(float(k), base, bar.high, "parameter high", colour=style.BLUE)
+    panel.rule_x(base, colour=style.INK, width=1.3)
+    if limit is not None and near:
+        panel.x.see([limit])
+        panel.rule_x(limit, "limit", colour=style.RED, width=1.4, dash=1)
+    panel.y.ticks = [(float(k), _bar_label(bar)) for k, bar in enumerate(bars)]
+    panel.y.limits(-0.6, max(len(bars), 1) - 0.4)
+    panel.y.reversed, panel.y.grid = True, False
+    panel.x.label = f"{words}, {name.unit}" if name and name.unit else words
     return doc.figure(
-        "tornado", data, caption=f"{words}: each parameter alone at both its ends.",
+        "tornado", chart, caption=f"{words}: each parameter alone at both its ends.",
         alt=f"Tornado chart of {words}; the strongest is {bars[0].path}.",
     )  # fmt: skip
 

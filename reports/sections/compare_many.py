@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from actuator_lti.verdict import Verdict
+from analyses.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, VerdictItem
 from reports.sections.compare_best import failed, nearness, weakest
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
 MANY = 60  # designs beside the base that one page shows
 _MOST_ROOM = 5
-_ORDER = {False: 0, None: 1, True: 2}
+_ORDER = {Verdict.NOT_MET: 0, Verdict.NOT_PROVEN: 1, Verdict.MET: 2}
 TABLE = "compare.csv"
 
 
@@ -67,7 +69,7 @@ def worst(comparison: Comparison) -> list[Block]:
         found = [(one, v) for one in whole.all for v in one.verdicts if v.id == wanted.id]
         one, verdict = min(found, key=lambda pair: _rank(pair[1]))
         made: VerdictItem = item(verdict)
-        met = sum(v.passed is True for _, v in found)
+        met = tally(v for _, v in found).met
         label = f"{made['label']}: met by {met} of {count} designs; the worst is {one.variant.name}"
         made["id"], made["label"] = f"worst/{made['id']}", label
         items.append(made)
@@ -76,7 +78,7 @@ def worst(comparison: Comparison) -> list[Block]:
 
 def _rank(verdict: RequirementVerdict) -> tuple[int, float]:
     near = nearness(verdict)
-    return _ORDER[verdict.passed], math.inf if near is None else near
+    return _ORDER[verdict.verdict], math.inf if near is None else near
 
 
 def shown_words(comparison: Comparison) -> str:
@@ -106,7 +108,7 @@ def _row(one: Compared, comparison: Comparison) -> list[object]:
     values = {v.id: v.value for v in one.verdicts}
     return [
         one.variant.name,
-        sum(v.passed is True for v in one.verdicts),
+        tally(one.verdicts).met,
         failed(one),
         None if verdict is None else verdict.id,
         None if verdict is None else 100.0 * near,

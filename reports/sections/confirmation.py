@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from analyses.validation.confirm import Confirmation
 from analyses.validation.release import AmplitudeMargin
@@ -12,11 +11,9 @@ from analyses.validation.result import Validation
 from analyses.validation.tolerance import allowed
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status
+from reports.figures import confirmation as confirmation_figure
 from reports.findings import Finding
 from reports.numbers import significant
-
-if TYPE_CHECKING:
-    from reports.figures import confirmation as confirmation_figure
 
 NEXT_TO_NOTHING = 0.01  # of the linear margin
 SHORT = {
@@ -81,7 +78,7 @@ def _figure(items: Sequence[Confirmation], released: Sequence[AmplitudeMargin]) 
         "Right: the same margins after release from rest at small, medium and large deviations, limits "
         "active, with and without dry friction."
     )
-    return doc.figure("confirmation", data, caption=caption, alt=caption)
+    return doc.figure("confirmation", confirmation_figure.draw(doc.plain(data)), caption=caption, alt=caption)
 
 
 def _allowed(items: Sequence[Confirmation]) -> float:

@@ -12,18 +12,10 @@ from reports.sections.margins import shown
 from reports.sections.names import LOOPS, figure_column
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.corners import Corner, Corners
     from analyses.loop_figures import LoopFigures
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.corners import corners
-
-    return section(corners(design))
 
 
 def section(result: Corners) -> Section:
@@ -58,7 +50,7 @@ def unmet(corner: Corner) -> str:
     doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
-    return ", ".join([*loops, *(one.id for one in corner.verdicts if one.passed is False)])
+    return ", ".join([*loops, *(one.id for one in corner.verdicts if not one.passes)])
 
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:

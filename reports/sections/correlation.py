@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from analyses.correlation.summary import summarise, worst_of
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import finding_table, result_input_table
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from analyses.correlation.closed_loop import CorrelationResult
     from analyses.correlation.compare import SignalComparison
     from analyses.correlation.summary import SignalSummary
-    from reports.figures import correlation_signal as correlation_signal_figure
 
 NAMES = {
     "angle": "Motor angle",
@@ -172,14 +172,16 @@ def signal_figure(signal: SignalComparison, first: str = "") -> Block:
     difference = signal.modelled - signal.measured
     rows = kept_rows([signal.measured, signal.modelled, difference])
     name = NAMES.get(signal.name, signal.name)
-    data: correlation_signal_figure.Data = {
-        "time_s": abscissa(signal.time_s[rows], 6),
-        "measured": rounded(signal.measured[rows]),
-        "modelled": rounded(signal.modelled[rows]),
-        "difference": rounded(difference[rows], 4),
-        "label": f"{name.lower()}, {signal.unit}",
-        "difference_label": f"difference, {signal.unit}",
-    }
+    time = signal.time_s[rows]
+    chart = Chart(width=style.WIDE, height=380.0)
+    upper, lower = chart.column(2.2, 1.0)
+    upper.curve(time, signal.measured[rows], "measured", colour=style.BLUE)
+    upper.curve(time, signal.modelled[rows], "model", colour=style.ORANGE, width=1.4, dash=1)
+    upper.y.label = f"{name.lower()}, {signal.unit}"
+    lower.rule_y(0.0)
+    lower.curve(time, difference[rows], colour=style.RED, width=1.1)
+    lower.y.label, lower.x.label = f"difference, {signal.unit}", "time, s"
+    lower.x.limits(time[0], time[-1])
     caption = f"{first}{name}: measured and model, relative error {100.0 * signal.relative_error:.3g} %"
     alt = f"{name} over time, measured and from the model, and the difference of the two"
-    return doc.figure("correlation_signal", data, caption=caption, alt=alt)
+    return doc.figure("correlation_signal", chart, caption=caption, alt=alt)

@@ -10,7 +10,6 @@ from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.limit_cycles import Confirmation, LimitCycles, Rest
 
 CAUSES = {
@@ -18,13 +17,6 @@ CAUSES = {
     "quantisation": "quantised output sensor",
     "motor-quantisation": "quantised motor encoder",
 }
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.limit_cycles import limit_cycles
-
-    return section(limit_cycles(design))
 
 
 def section(result: LimitCycles) -> Section:

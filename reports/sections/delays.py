@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from actuator_lti.delay_budget import DelayBudget
 from reports import document as doc
+from reports.charts import style
+from reports.charts.paint import HATCHES
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Row, Section
 from reports.sections.names import LOOPS, hertz
-
-if TYPE_CHECKING:
-    from reports.figures import delay_budget as delay_budget_figure
 
 PARTS = {
     "controller": "controller",
@@ -41,24 +40,51 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
         "One more "
         "sample: cost of one more period of computing delay, not included in the total."
     )
-    bars: list[delay_budget_figure.Bar] = [
-        {
-            "label": name,
-            "parts": [
-                {"name": label, "deg": -budget.items[key]}
-                for key, label in parts.items()
-                if abs(budget.items.get(key, 0.0)) > 0.05
-            ],
-        }
-        for name, budget in budgets.items()
-    ]
     caption = "Lag at the gain crossover of each loop, by cause. The rest to 180° is phase margin."
     blocks = [
-        doc.figure("delay_budget", {"bars": bars}, caption=caption, alt=f"Stacked bars. {caption}"),
+        doc.figure("delay_budget", chart(budgets), caption=caption, alt=f"Stacked bars. {caption}"),
         doc.table("Phase at the gain crossover", columns, rows, note),
     ]
     intro = "The phase at the gain crossover of each loop, divided into its causes."
     return doc.section("delays", "Delay budget", blocks, result=_result(budgets), intro=intro)
+
+
+def chart(budgets: Mapping[str, DelayBudget]) -> Chart:
+    """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
+    made = Chart(width=style.WIDE, height=70.0 + 48.0 * len(budgets), legend=True)
+    panel = made.panel()
+    parts = _parts(budgets)
+    bars = [
+        {words: -one.items[key] for key, words in parts.items() if abs(one.items.get(key, 0.0)) > 0.05}
+        for one in budgets.values()
+    ]
+    names = list(dict.fromkeys(name for bar in bars for name in bar))
+    for row, bar in enumerate(bars):
+        _bar(panel, float(row), bar, names)
+    panel.rule_x(180.0, colour=style.INK, width=1.2)
+    panel.rule_x(0.0, colour=style.INK)
+    panel.y.ticks = [(float(k), name) for k, name in enumerate(budgets)]
+    panel.y.limits(-0.6, len(bars) - 0.4)
+    panel.y.reversed, panel.y.grid = True, False
+    low, high = panel.x.span()
+    panel.x.limits(high=max(high * 1.13, 186.0))
+    steps = range(int(low // 30), int(panel.x.span()[1] // 30) + 1)
+    panel.x.ticks = [(30.0 * k, style.to_minus(f"{30 * k}")) for k in steps]
+    panel.x.label = "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
+    return made
+
+
+def _bar(panel: Panel, row: float, parts: Mapping[str, float], names: list[str]) -> None:
+    """Draw the parts of one loop and their sum."""
+    ends = {1: 0.0, -1: 0.0}
+    for name, deg in parts.items():
+        side, k = (1 if deg >= 0 else -1), names.index(name)
+        start, stop = ends[side], ends[side] + deg
+        panel.bar(row, start, stop, name, colour=style.SERIES[k % 7], hatch=HATCHES[k % 7])
+        if abs(deg) > 8:
+            panel.note(style.to_minus(f"{deg:.0f}°"), ((start + stop) / 2, row), pinned=True)
+        ends[side] = stop
+    panel.note(f"{sum(ends.values()):.1f}° in all", (ends[1], row))
 
 
 def _result(budgets: Mapping[str, DelayBudget]) -> str:

@@ -6,24 +6,16 @@ import math
 from typing import TYPE_CHECKING, Literal
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.duty import Duty, Heating
-    from reports.figures import duty as duty_figure
 
 _SHOWN = 400
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.duty import duty
-
-    return section(duty(design))
 
 
 def section(result: Duty) -> Section:
@@ -107,25 +99,29 @@ def _row(
 
 
 def _figure(result: Duty) -> Block:
-    every = max(1, len(result.time_s) // _SHOWN)
-    data: duty_figure.Data = {
-        "time_s": abscissa(result.time_s[::every]),
-        "current": rounded(result.current_A[::every]),
-        "rms": result.rms_A,
-        "continuous": result.continuous_A,
-        "heating": _heating(result.heating),
-    }
+    chart = Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel(title="One period of the motion")
+    every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
+    scale = style.time_axis(panel, last)
+    panel.curve(result.time_s[::every] * scale, result.current_A[::every], "current", **style.series(0))
+    panel.rule_y(result.rms_A, "rms of the duty", colour=style.BLUE, dash=1)
+    panel.y.see([result.rms_A])
+    if math.isfinite(result.continuous_A):
+        panel.y.see([result.continuous_A])
+        panel.rule_y(result.continuous_A, "continuous", colour=style.RED, dash=2)
+    panel.y.label = "current, A"
+    panel.x.limits(0.0, last * scale)
     caption = "Motor current over one period of the motion."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
-    return doc.figure("duty", data, caption=caption, alt=caption)
+        _winding(chart.panel(title="Winding"), result.heating)
+    return doc.figure("duty", chart, caption=caption, alt=caption)
 
 
-def _heating(heat: Heating | None) -> duty_figure.Heating | None:
-    if heat is None:
-        return None
-    return {
-        "time_s": abscissa(heat.time_s),
-        "temperature": rounded(heat.temperature_degC),
-        "limit": heat.limit_degC,
-    }
+def _winding(panel: Panel, heat: Heating) -> None:
+    scale = style.time_axis(panel, float(heat.time_s[-1]))
+    panel.curve(heat.time_s * scale, heat.temperature_degC, "winding", **style.series(1))
+    if math.isfinite(heat.limit_degC):
+        panel.y.see([heat.limit_degC])
+        panel.rule_y(heat.limit_degC, "limit", colour=style.RED, dash=1)
+    panel.y.label = "winding, °C"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import (
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
     from analyses.identification.electrical import ElectricalFit
     from analyses.identification.joint_model import JointModel
-    from reports.figures import curves as curves_figure
 
 LABELS = {
     "inertia": ("Inertia, all at the motor", "kg m²", "Mass", "kg"),
@@ -251,18 +251,13 @@ def scatter_table(model: JointModel, axis: str) -> Block:
 
 def _figure(model: JointModel, axis: str) -> Block:
     unit = "N" if axis == "linear" else "N m"
-    rows = np.arange(len(model.residual), dtype=float)
-    series: list[curves_figure.Series] = [
-        {"label": "residual", "x": rounded(rows), "y": rounded(model.residual, 4)}
-    ]
-    data: curves_figure.Data = {
-        "series": series,
-        "x_label": "row after decimation",
-        "y_label": f"residual, {unit}",
-    }
+    chart = Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel()
+    panel.curve(np.arange(len(model.residual)), model.residual, "residual")
+    panel.x.label, panel.y.label = "row after decimation", f"residual, {unit}"
     return doc.figure(
-        "curves",
-        data,
+        "residual",
+        chart,
         caption="Residual of the inverse dynamic model",
         alt="Residual of the drive force over the record",
     )

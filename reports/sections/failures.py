@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.numbers import short
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.failures import FailureCase, Failures
-    from reports.figures import failures as failures_figure
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -28,13 +27,6 @@ NAMES = {
     "oscillatory-command": "Oscillatory command",
 }
 _SHOWN = 400
-
-
-def of_design(design: Design) -> Section:
-    """Make the section of a report."""
-    from analyses.failures import failures
-
-    return section(failures(design))
 
 
 def section(result: Failures) -> Section:
@@ -71,12 +63,12 @@ def summary(result: Failures) -> str:
 def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
     columns = [
         doc.column("case", "Failure"),
-        doc.column("near", f"To {near}", format="ms:3"),
-        doc.column("stop", "To the stop", format="ms:3"),
+        doc.column("near", f"To {near}", "ms", format="ms:3"),
+        doc.column("stop", "To the stop", "ms", format="ms:3"),
         doc.column("seen", "Until detected", unit, format="sig:3", better=-1),
         doc.column("current", "Peak current", "A", format="sig:3", better=-1),
         doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3", better=-1),
-        doc.column("protected", "I²t acts at", format="ms:3"),
+        doc.column("protected", "I²t acts at", "ms", format="ms:3"),
         doc.column("words", "What happens"),
     ]
     note = f"No value: not within the {result.asked.watched_s:g} s watched."
@@ -98,29 +90,25 @@ def _row(case: FailureCase, scale: float, has_current: bool) -> Row:
 
 
 def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
-    series: list[failures_figure.Series] = []
     asked = result.asked
     stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
     last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
-    for case in result.cases:
-        if case.name == "oscillatory-command":
-            continue  # a band of ink; the table has its size
-        count = int(np.searchsorted(case.time_s, last))
+    shown = [case for case in result.cases if case.name != "oscillatory-command"]  # a band of ink
+    counts = [int(np.searchsorted(case.time_s, last)) for case in shown]
+    last = max(float(case.time_s[count - 1]) for case, count in zip(shown, counts, strict=True))
+    chart = Chart(width=style.WIDE, height=460.0, legend=True)
+    top, bottom = chart.column(1.2, 1.0)
+    per_s = style.time_axis(bottom, last)
+    for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
         keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
-        series.append(
-            {
-                "label": NAMES[case.name],
-                "time_s": abscissa(case.time_s[keep]),
-                "deflection": rounded(scale * case.deflection_rad[keep]),
-                "moment": rounded(case.moment_Nm[keep]),
-            }
-        )
-    data: failures_figure.Data = {
-        "series": series,
-        "unit": unit,
-        "load": load,
-        "stop": scale * asked.stop_rad,
-        "detection_s": asked.detection_s,
-    }
+        time = case.time_s[keep] * per_s
+        top.curve(time, scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
+        bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
+    top.rule_y(scale * asked.stop_rad, "stop", colour=style.RED, dash=1)
+    top.y.see([scale * asked.stop_rad])
+    for panel in (top, bottom):
+        panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
+    top.y.label, bottom.y.label = f"deflection, {unit}", f"moment, {load}"
+    bottom.x.limits(0.0, last * per_s)
     caption = "Deflection of the output and moment in the train after each failure but the oscillation."
-    return doc.figure("failures", data, caption=caption, alt=f"Two panels. {caption}")
+    return doc.figure("failures", chart, caption=caption, alt=f"Two panels. {caption}")

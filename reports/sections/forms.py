@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analyses.loop_figures import LoopFigures
 from analyses.responses import curve, frequency_grid
 from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
-from reports.sections.loop import bode_data, nyquist_hz
+from reports.sections.loop import nyquist_hz
+from reports.sections.loop_charts import both
 from reports.sections.margins import cells, evidence_notes, margin_row, response_row
 from reports.sections.names import FORMS, LOOPS, figure_column
-
-if TYPE_CHECKING:
-    from reports.figures import forms as forms_figure
 
 COLUMNS = [
     doc.column("loop", "Loop"),
@@ -80,14 +80,17 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
 
 def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
     """Make the overlaid open-loop Bode figures of all loops."""
-    panels: list[forms_figure.Panel] = []
+    chart = Chart(width=style.WIDE, height=400.0)
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
-        series = [
+        curves = [
             (FORMS[form], curve(result[name].loop.plain_open, grid))
             for form, result in forms.items()
             if name in result
         ]
-        panels.append({"title": LOOPS[name], **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
+        top, bottom = chart.column(1.0, 1.0, title=LOOPS[name])
+        both(curves, nyquist_hz(sampled), top, bottom, span=120.0)
+        top.rule_y(0.0, colour=style.INK)
+        bottom.rule_y(-180.0, colour=style.INK)
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."
-    return doc.figure("forms", {"panels": panels}, caption=caption, alt=f"Bode diagrams. {caption}")
+    return doc.figure("forms", chart, caption=caption, alt=f"Bode diagrams. {caption}")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports import document as doc
-from reports.document import rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
 from reports.numbers import show
 from reports.sections.identification_inputs import (
@@ -108,26 +109,13 @@ def response_figures(result: FrequencyResult) -> list[Block]:
         if signal not in lines.names:
             continue
         measured, _ = response(lines, signal, lines.names[0])
-        figures.append(
-            doc.figure(
-                "curves",
-                {
-                    "series": [
-                        {
-                            "label": "measured",
-                            "x": rounded(hertz),
-                            "y": rounded(np.abs(measured)),
-                            "style": "points",
-                        },
-                        {"label": "two-mass model", "x": rounded(hertz), "y": rounded(np.abs(model[k]))},
-                    ],
-                    "x_label": "frequency, Hz",
-                    "y_label": f"{label} over torque, rad/(N m)",
-                    "x_log": True,
-                    "y_log": True,
-                },
-                caption=f"Response of the {label} to the motor's torque: measured lines and the fitted model",
-                alt=f"Magnitude of {label} over motor torque against frequency, measured and fitted",
-            )
-        )
+        chart = Chart(width=style.WIDE, height=320.0)
+        panel = chart.panel()
+        panel.x.log = panel.y.log = True
+        panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
+        panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
+        panel.x.label, panel.y.label = "frequency, Hz", f"{label} over torque, rad/(N m)"
+        caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
+        alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
+        figures.append(doc.figure("response", chart, caption=caption, alt=alt))
     return figures

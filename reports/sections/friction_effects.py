@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from reports import document as doc
-from reports.document import abscissa
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, VerdictItem
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
@@ -14,7 +17,6 @@ if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
-    from reports.figures import hysteresis as hysteresis_figure
 
 
 LEFT = 1e-3  # of a step: an error that is spoken of
@@ -36,7 +38,7 @@ def section(result: FrictionEffects) -> Section:
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
     )
-    failed = any(item["passed"] is False for item in items)
+    failed = any(item["verdict"] == "not met" for item in items)
     words, more = _summary(result, fine, small)
     blocks += [doc.text(more)] if more else []
     return doc.section(
@@ -186,38 +188,37 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
 
 def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Block | None:
     """Make the loops and the waiting times."""
-    loops: list[hysteresis_figure.Loop] = []
-    waits: list[hysteresis_figure.Wait] = []
-    for point in result.points:
-        label, loop, threshold = f"load {point.load_Nm:g} {load}", point.hysteresis, point.threshold
-        if loop is not None:
-            error = fine * (loop.output_rad - loop.command_rad)
-            command = abscissa(fine * loop.command_rad)
-            loops.append({"label": label, "command": command, "error": abscissa(error)})
-        if threshold is not None and threshold.waiting:
-            waits.append(
-                {
-                    "label": label,
-                    "amplitude": abscissa([fine * w.amplitude_rad for w in threshold.waiting]),
-                    "predicted_ms": abscissa([1e3 * w.predicted_s for w in threshold.waiting]),
-                    "simulated_ms": [
-                        None if w.simulated_s is None else 1e3 * w.simulated_s for w in threshold.waiting
-                    ],
-                }
-            )
+    points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
+    loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
+    waits = [
+        (label, one.threshold.waiting) for label, one in points if one.threshold and one.threshold.waiting
+    ]
     if not loops:
         return None
-    data: hysteresis_figure.Data = {
-        "loops": loops,
-        "waits": waits,
-        "unit": small,
-        "error_unit": small,
-        "wait_unit": small,
-    }
+    chart = Chart(width=style.WIDE, height=330.0)
+    panel = chart.panel(title="Position error over a slow triangle of the command")
+    panel.by_point = True
+    for k, (label, loop) in enumerate(loops):
+        x, y = fine * loop.command_rad, fine * (loop.output_rad - loop.command_rad)
+        panel.curve(np.append(x, x[0]), np.append(y, y[0]), label, **style.series(k))
+    panel.rule_y(0.0)
+    panel.x.label, panel.y.label = f"command, {small}", f"output less command, {small}"
+    if waits:
+        panel = chart.panel(title="Wait before a small step moves the output")
+        panel.x.log = panel.y.log = True
+        panel.x.label, panel.y.label = f"step, {small}", "time to first motion, ms"
+    for k, (label, waiting) in enumerate(waits):
+        sizes = [fine * one.amplitude_rad for one in waiting]
+        seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
+        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
+        panel.curve(
+            sizes, [1e3 * one.predicted_s for one in waiting], f"{label}: predicted", **style.series(k)
+        )
+        panel.points(sizes, seen, f"{label}: simulated", **look)
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
-    return doc.figure("hysteresis", data, caption=caption, alt=caption)
+    return doc.figure("hysteresis", chart, caption=caption, alt=caption)
 
 
 def _summary(result: FrictionEffects, fine: float, small: str) -> tuple[str, str]:

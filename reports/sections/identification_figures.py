@@ -1,57 +1,61 @@
-"""The figures of an identified campaign, as data."""
+"""The figures of an identified campaign."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
     from analyses.identification.campaign import CampaignResult
     from analyses.identification.surface_fit import SurfaceFit
-    from reports.figures import identification_region as identification_region_figure
-    from reports.figures import identification_residuals as identification_residuals_figure
-    from reports.figures import identification_surface as identification_surface_figure
-    from reports.figures import identification_window as identification_window_figure
+    from analyses.records.record import Record
 
 NAMES = ("C0", "Cv", "CM")
 
 
 def surface_figure(fit: SurfaceFit) -> Block:
-    """Runs and fitted lines over speed."""
+    """Runs and fitted lines over speed, a line for each load; runs that were left out are ringed."""
+    chart = Chart(width=style.WIDE, height=380.0, legend=True)
+    panel = chart.panel()
     loads = np.array([p.load_Nm for p in fit.points])
-    levels: list[identification_surface_figure.Level] = []
-    for centre in _levels(loads):
+    line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
+    for k, centre in enumerate(_levels(loads)):
         here = [p for p in fit.points if abs(p.load_Nm - centre) <= 0.25]
         mean = float(np.mean([p.load_Nm for p in here]))
-        line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
-        levels.append(
-            {
-                "label": f"{mean:.2g} N m",
-                "speed_rad_s": rounded([p.speed_rad_s for p in here]),
-                "torque_mNm": rounded([1e3 * p.torque_Nm for p in here]),
-                "line_speed_rad_s": rounded(line),
-                "line_torque_mNm": rounded(1e3 * fit.predict_Nm(line, np.full(2, mean))),
-            }
-        )
+        label = f"{mean:.2g} N m"
+        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "osD^v+x"[k % 7], "size": 6.0}
+        panel.curve(line, 1e3 * fit.predict_Nm(line, np.full(2, mean)), label, **style.series(k))
+        panel.points(*_place(here), label, **look)
     named = {o.run for o in fit.outliers}
-    outliers = [
-        {"run": p.run, "speed_rad_s": p.speed_rad_s, "torque_mNm": 1e3 * p.torque_Nm}
-        for p in fit.points
-        if p.run in named
-    ]
+    for point in fit.points:
+        if point.run in named:
+            _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
+    panel.x.label, panel.y.label = "motor speed, rad/s", "friction torque at the motor, mN m"
+    panel.y.limits(low=0.0)
     return doc.figure(
         "identification_surface",
-        {"levels": levels, "outliers": outliers},
+        chart,
         caption="Friction torque of every run and the fitted surface, a line for each load",
         alt="Measured friction torque against motor speed at several loads, with straight fitted lines",
     )
+
+
+def _place(points: Sequence[Any]) -> tuple[list[float], list[float]]:
+    return [p.speed_rad_s for p in points], [1e3 * p.torque_Nm for p in points]
+
+
+def _ring(panel: Panel, at: tuple[float, float], words: str, size: float) -> None:
+    panel.points([at[0]], [at[1]], size=size, hollow=True, colour=style.RED, read=False)
+    panel.note(words, at)
 
 
 def _levels(loads: np.ndarray) -> list[float]:
@@ -65,43 +69,55 @@ def _levels(loads: np.ndarray) -> list[float]:
 
 def residual_figure(fit: SurfaceFit) -> Block:
     """Residuals over speed and load."""
+    chart = Chart(width=style.WIDE, height=310.0)
     named = {o.run for o in fit.outliers}
-    data: identification_residuals_figure.Data = {
-        "speed_rad_s": abscissa([p.speed_rad_s for p in fit.points]),
-        "load_Nm": abscissa([p.load_Nm for p in fit.points]),
-        "residual_uNm": abscissa(1e6 * fit.own_residuals_Nm),
-        "std_uNm": abscissa(1e6 * fit.residual_stds_Nm),
-        "outlier": [p.run in named for p in fit.points],
-        "run": [p.run for p in fit.points],
-    }
+    y, std = 1e6 * fit.own_residuals_Nm, 1e6 * fit.residual_stds_Nm
+    for x, label in (
+        ([p.speed_rad_s for p in fit.points], "motor speed, rad/s"),
+        ([p.load_Nm for p in fit.points], "load torque, N m"),
+    ):
+        panel = chart.panel()
+        panel.rule_y(0.0)
+        for at, middle, width in zip(x, y, std, strict=True):
+            ends = [middle - 2.0 * width, middle + 2.0 * width]
+            panel.curve([at, at], ends, colour=style.MUTED, width=0.9, read=False)
+        panel.points(x, y, "runs, with 2 standard deviations", size=5.0)
+        for at, value, point in zip(x, y, fit.points, strict=True):
+            if point.run in named:
+                _ring(panel, (at, float(value)), point.run, 13.0)
+        panel.x.label, panel.y.label = label, "residual, µN m"
     return doc.figure(
         "identification_residuals",
-        data,
+        chart,
         caption="Residuals of the runs less the most likely shared errors, with two standard deviations",
         alt="Residual torque of every run against speed and against load",
     )
 
 
 def region_figure(fit: SurfaceFit) -> Block:
-    """Joint 95 % regions of pairs of coefficients."""
+    """Joint 95 % regions of pairs of coefficients, in percent of their values."""
     from scipy.stats import chi2
 
     radius = float(np.sqrt(chi2.ppf(0.95, 2)))
-    pairs: list[identification_region_figure.Pair] = []
+    chart = Chart(width=style.WIDE, height=300.0)
     for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]
-        pairs.append(
-            {
-                "x_label": f"{NAMES[i]}, % from its value",
-                "y_label": f"{NAMES[j]}, %",
-                "whole": _ellipse(fit.covariance, i, j, scale, radius),
-                "random": _ellipse(fit.random_covariance, i, j, scale, radius),
-                "interval": abscissa(fit.half_widths[[i, j]] * scale),
-            }
-        )
+        panel = chart.panel()
+        panel.by_point = True
+        whole = _ellipse(fit.covariance, i, j, scale, radius)
+        random = _ellipse(fit.random_covariance, i, j, scale, radius)
+        panel.shape([whole], colour=style.BLUE, opacity=0.15)
+        panel.curve(*whole, "95 % region, all errors", colour=style.BLUE)
+        panel.curve(*random, "scatter of the runs only", colour=style.ORANGE, dash=1)
+        x, y = fit.half_widths[[i, j]] * scale
+        for sign in (-1.0, 1.0):
+            panel.rule_x(sign * x, dash=2)
+            panel.rule_y(sign * y, dash=2)
+        panel.points([0.0], [0.0], marker="+", size=10.0, colour=style.INK, read=False)
+        panel.x.label, panel.y.label = f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %"
     return doc.figure(
         "identification_region",
-        {"pairs": pairs},
+        chart,
         caption="Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone",
         alt="Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors",
     )
@@ -109,13 +125,13 @@ def region_figure(fit: SurfaceFit) -> Block:
 
 def _ellipse(
     covariance: np.ndarray, i: int, j: int, scale: np.ndarray, radius: float
-) -> identification_region_figure.Outline:
+) -> tuple[np.ndarray, np.ndarray]:
     part = covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(part)
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
     circle = np.vstack([np.cos(turn), np.sin(turn)])
     x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
-    return {"x": abscissa(x, 4), "y": abscissa(y, 4)}
+    return x, y
 
 
 def window_figures(result: CampaignResult) -> list[Block]:
@@ -125,22 +141,28 @@ def window_figures(result: CampaignResult) -> list[Block]:
     chosen = dict.fromkeys((len(points) - 1, 0, len(points) // 2))
     figures = []
     for k in chosen:
-        record, window = runs[points[k].run].record, points[k].window
-        shown = [name for name in ("speed", "current", "torque") if name in record.signals]
-        rows = kept_rows([record[name] for name in shown])
-        labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
-        data: identification_window_figure.Data = {
-            "time_s": abscissa(record.time_s[rows], 6),
-            "panels": [{"label": labels[name], "values": rounded(record[name][rows])} for name in shown],
-            "window": abscissa([window.start_s, window.stop_s], 6),
-        }
-        caption = (
-            f"Run {points[k].run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"
-        )
-        alt = f"Speed, current and torque of run {points[k].run} over time with the steady part shaded"
-        figures.append(doc.figure("identification_window", data, caption=caption, alt=alt))
-    return (
-        [figures[0], doc.details("The first and the middle run", figures[1:])]
-        if len(figures) > 1
-        else figures
-    )
+        run, window = points[k].run, points[k].window
+        chart = _window(runs[run].record, window.start_s, window.stop_s)
+        caption = f"Run {run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"
+        alt = f"Speed, current and torque of run {run} over time with the steady part shaded"
+        figures.append(doc.figure("identification_window", chart, caption=caption, alt=alt))
+    more = [doc.details("The first and the middle run", figures[1:])] if len(figures) > 1 else []
+    return [*figures[:1], *more]
+
+
+def _window(record: Record, start_s: float, stop_s: float) -> Chart:
+    """Draw each signal in a panel of its own, the steady part shaded."""
+    labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
+    shown = [name for name in labels if name in record.signals]
+    rows = kept_rows([record[name] for name in shown])
+    chart = Chart(width=style.WIDE, height=60.0 + 120.0 * len(shown))
+    panels = chart.column(*(1.0 for _ in shown))
+    for k, (panel, name) in enumerate(zip(panels, shown, strict=True)):
+        panel.curve(record.time_s[rows], record[name][rows], colour=style.SERIES[k % 7], width=1.1)
+        panel.band_x(start_s, stop_s, colour=style.RED, opacity=0.1)
+        for edge in (start_s, stop_s):
+            panel.rule_x(edge, colour=style.RED, width=1.2, dash=1)
+        panel.y.label = labels[name]
+    panels[-1].x.label = "time, s"
+    panels[-1].x.limits(record.time_s[rows][0], record.time_s[rows][-1])
+    return chart

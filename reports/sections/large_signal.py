@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.findings import Finding
+from reports.sections.amplitude_map import chart as map_chart
 from reports.sections.limits import words_of
 from reports.sections.names import figure_column
+from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -21,9 +24,6 @@ if TYPE_CHECKING:
     from analyses.large_signal.border import BorderCheck
     from analyses.large_signal.map import AmplitudeMap
     from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
-    from reports.figures import amplitude_bode as amplitude_bode_figure
-    from reports.figures import map as map_figure
-    from reports.figures import sawtooth as sawtooth_figure
 
 
 def section(result: LargeSignals) -> Section:
@@ -32,14 +32,13 @@ def section(result: LargeSignals) -> Section:
 
     design = result.design
     scale, unit = output_unit(design)
-    items = [_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
+    items = [*_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
     if result.border is not None and np.isfinite(result.border.predicted_rad).any():
         blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
-    failed = any(item["passed"] is False for item in items)
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear model "
         "holds. "
@@ -47,7 +46,7 @@ def section(result: LargeSignals) -> Section:
     )
     words = _result(result.bode, scale, unit)
     findings = [Finding(severity="info", text=words, where="large-signal")]
-    status: Status = "fail" if failed else "pass"
+    status: Status = tally(items).role
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, findings=findings
     )
@@ -101,8 +100,8 @@ def load_unit(design: Design) -> str:
     return "N" if design.axis == "linear" else "N m"
 
 
-def _border_verdict(border: BorderCheck | None) -> VerdictItem:
-    """Judge the simulated border against the smallest A_k."""
+def _border_verdict(border: BorderCheck | None) -> list[VerdictItem]:
+    """Judge the simulated border against the smallest A_k; a drive without limits has none."""
     from analyses.large_signal.border import TOLERANCE
 
     what = {
@@ -111,31 +110,26 @@ def _border_verdict(border: BorderCheck | None) -> VerdictItem:
     }
     common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
     if border is None:
-        return doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")
+        return [doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")]
     error = border.largest_error
     if error is None:
-        reason = "the design has no limit"
-        return doc.verdict(**common, value=None, distance=None, passed=None, reason=reason)
+        return []
     same, count = sum(border.same_limiter), len(border.same_limiter)
     reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
     reason += f"; without {border.left_out}" if border.left_out else ""
-    reason += f"; not judged: {border.reason}" if border.reason else ""
-    distance = 100.0 * (TOLERANCE - error)
-    return doc.verdict(**common, value=100.0 * error, distance=distance, passed=border.passed, reason=reason)
+    reason += f"; {border.reason}" if border.reason else ""
+    common |= {"distance": 100.0 * (TOLERANCE - error), "passed": border.passed}
+    return [doc.verdict(**common, value=100.0 * error, reason=reason)]
 
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
-    """Judge the rate-limit formulas, or say why they do not apply."""
+    """Judge the rate-limit formulas, where they apply."""
     from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
 
-    gain = max((abs(run.gain_error) for run in sawtooth.runs), default=None)
-    lag = max((abs(run.lag_error_deg) for run in sawtooth.runs), default=None)
-    reason = sawtooth.reason
-    if sawtooth.runs and not sawtooth.applicable:
-        reason = (
-            f"the formulas need Kv/w >= 50 (here {sawtooth.gain_over_frequency:.3g}) and a reversal "
-            f"within 1° of the period (here {sawtooth.reversal_deg:.3g}°); shown, not judged"
-        )
+    if not (sawtooth.runs and sawtooth.applicable):
+        return []
+    gain = max(abs(run.gain_error) for run in sawtooth.runs)
+    lag = max(abs(run.lag_error_deg) for run in sawtooth.runs)
     rows = (
         ("gain", "Sawtooth: difference of the fundamental from 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
         ("lag", "Sawtooth: difference of the lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
@@ -144,13 +138,12 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
         doc.verdict(
             f"validation-sawtooth-{key}",
             label,
-            value=None if error is None else scale * error,
+            value=scale * error,
             limit=scale * limit,
             unit=unit,
             comparison="<=",
-            distance=None if error is None or not sawtooth.applicable else scale * (limit - error),
-            passed=None if sawtooth.passed is None or error is None else error <= limit,
-            reason=reason,
+            distance=scale * (limit - error),
+            passed=error <= limit,
         )
         for key, label, error, limit, scale, unit in rows
     ]
@@ -158,39 +151,6 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
 
 def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
     """Make the map with the linear onset lines and the simulated border."""
-    from analyses.large_signal.classify import CAUSES, WAVEFORMS
-
-    shown, design = result.map, result.design
-    points: list[map_figure.Points] = [
-        {
-            "label": words,
-            "frequency_hz": abscissa(check.frequency_hz),
-            "amplitude": rounded(scale * check.simulated_rad),
-        }
-        for words, check in (
-            ("simulated, friction off", result.border),
-            ("simulated, friction on", result.border_with_friction),
-        )
-        if check is not None and np.isfinite(check.simulated_rad).any()
-    ]
-    onset: list[map_figure.Onset] = [
-        {"name": name, "label": words_of(name), "amplitude": rounded(scale * np.asarray(values), 4)}
-        for name, values in shown.onset_rad.items()
-        if np.isfinite(values).any()
-    ]
-    full = design.validation.full_deflection_rad
-    data: map_figure.Data = {
-        "frequency_hz": abscissa(shown.frequency_hz),
-        "amplitude": abscissa(scale * shown.amplitude_rad),
-        "causes": list(CAUSES),
-        "waveforms": list(WAVEFORMS),
-        "cause": shown.cause.tolist(),
-        "waveform": shown.waveform.tolist(),
-        "onset": onset,
-        "points": points,
-        "marks": [{"amplitude": full * scale, "label": "full\ndeflection"}],
-        "unit": unit,
-    }
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
         "waveform "
@@ -198,7 +158,7 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
-    return doc.figure("map", data, caption=caption, alt=_map_words(shown))
+    return doc.figure("map", map_chart(result, scale, unit), caption=caption, alt=_map_words(result.map))
 
 
 def _map_words(amplitude_map: AmplitudeMap) -> str:
@@ -243,39 +203,53 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
 
 def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> Block:
     """Make the amplitude Bode."""
-    series: list[amplitude_bode_figure.Series] = [
-        {
-            "label": f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})",
-            "gain_db": rounded(amplitude_bode.gain_db[k], 4),
-            "phase_deg": rounded(amplitude_bode.phase_deg[k], 4),
-        }
+    chart = Chart(width=style.WIDE, height=440.0)
+    gain, phase = chart.column(1.0, 1.0, width=1.45, title="Output over command")
+    both = (
+        (gain, amplitude_bode.linear_db, amplitude_bode.gain_db),
+        (phase, amplitude_bode.linear_deg, amplitude_bode.phase_deg),
+    )
+    for panel, linear, values in both:
+        look: style.Style = {"colour": style.MUTED, "width": 4.2, "opacity": 0.45}
+        panel.curve(amplitude_bode.frequency_hz, linear, "linear", **look)
         for k, (fraction, amplitude) in enumerate(
             zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
-        )
-    ]
-    data: amplitude_bode_figure.Data = {
-        "frequency_hz": abscissa(amplitude_bode.frequency_hz),
-        "series": series,
-        "linear": {
-            "gain_db": rounded(amplitude_bode.linear_db, 4),
-            "phase_deg": rounded(amplitude_bode.linear_deg, 4),
-        },
-        "against": {
-            "amplitude": abscissa(scale * amplitude_bode.all_amplitude_rad),
-            "minus3db_hz": rounded(amplitude_bode.minus3db_hz),
-            "minus90deg_hz": rounded(amplitude_bode.minus90deg_hz),
-            "linear_minus3db_hz": amplitude_bode.linear_minus3db_hz,
-            "linear_minus90deg_hz": amplitude_bode.linear_minus90deg_hz,
-            "unit": unit,
-            "full": full * scale,
-        },
-    }
+        ):
+            look = {**style.series(k), "marker": "os^Dv<>"[k % 7], "size": 4.4, "every": 6}
+            label = f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})"
+            panel.curve(amplitude_bode.frequency_hz, values[k], label, **look)
+    style.bound(gain, np.ravel(amplitude_bode.gain_db), span=45.0, top_room=0.12)
+    phases = style.known([*np.ravel(amplitude_bode.phase_deg), *amplitude_bode.linear_deg])
+    style.phase_axis(phase, [max(v, -360.0) for v in phases])
+    gain.rule_y(-3.0103, dash=1)
+    phase.rule_y(-90.0, dash=1)
+    style.frequency(phase, amplitude_bode.frequency_hz)
+    gain.y.label, phase.y.label = "gain of the fundamental, dB", "phase, deg"
+    _bandwidths(chart.panel(title="Bandwidth against amplitude"), amplitude_bode, scale, unit, full)
     caption = (
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
         "friction "
         "and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
     )
-    return doc.figure("amplitude_bode", data, caption=caption, alt=caption)
+    return doc.figure("amplitude_bode", chart, caption=caption, alt=caption)
+
+
+def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, full: float) -> None:
+    """Draw both bandwidths against amplitude, with the linear ones as levels."""
+    pairs = (
+        (result.minus3db_hz, result.linear_minus3db_hz, "−3 dB", style.GREEN, "o", 0),
+        (result.minus90deg_hz, result.linear_minus90deg_hz, "−90°", style.PURPLE, "D", 1),
+    )
+    panel.x.log = panel.y.log = True
+    for values, level, label, colour, marker, dash in pairs:
+        sizes = scale * result.all_amplitude_rad
+        panel.curve(sizes, values, label, colour=colour, marker=marker, size=5.0, dash=dash)
+        if level is not None and math.isfinite(level):
+            panel.y.see([level])
+            panel.rule_y(level, f"linear {style.hertz(level)}", colour=colour, dash=2)
+    panel.rule_x(full * scale, dash=2)
+    panel.x.label = f"command amplitude, {unit} (dotted: full deflection)"
+    panel.y.label = "frequency, Hz"
 
 
 def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block:
@@ -317,41 +291,57 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
     """Make the sawtooth, or say why there is none."""
+    from analyses.large_signal.sawtooth import FAST, REVERSAL_DEG
+
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s
-    data: sawtooth_figure.Data = {
-        "columns": [_sawtooth_column(run, sawtooth, scale, unit, load_unit(design)) for run in sawtooth.runs],
-        "rate_limit": limit,
-        "unit": unit,
-        "rate_unit": f"{unit}/s",
-    }
+    rows = 3 if sawtooth.has_current else 2
+    title = "Sawtooth: a sine faster than the rate limit"
+    chart = Chart(width=style.WIDE, height=160.0 + 130.0 * rows, title=title)
+    highest = 1.15 * scale * max(float(np.abs(run.reference_rad).max()) for run in sawtooth.runs)
+    current = max(float(np.abs(run.current_A).max()) for run in sawtooth.runs)
+    for run in sawtooth.runs:
+        head = f"load {run.load_Nm:g} {load_unit(design)}"
+        panels = chart.column(1.5, *(1.0,) * (rows - 1), title=head)
+        _sawtooth_column(panels, run, scale, unit)
+        panels[1].rule_y(limit, colour=style.RED, width=1.1, dash=1)
+        words = "rate limit" if run is sawtooth.runs[0] else ""
+        panels[1].rule_y(-limit, words, colour=style.RED, width=1.1, dash=1)
+        for panel, end in zip(panels, (highest, 1.5 * limit, 1.08 * current), strict=False):
+            panel.y.limits(-end, end)
+        panels[0].y.limits(high=2.6 * highest)  # room for the words
     caption = (
         f"A sine of {scale * sawtooth.amplitude_rad:.3g} {unit} at {sawtooth.frequency_hz:.3g} Hz, three "
         f"times faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated "
         "values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
     )
-    return [doc.figure("sawtooth", data, caption=caption, alt=caption)]
+    if not sawtooth.applicable:
+        caption += (
+            f" Not checked: they need Kv/w >= {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
+            f"reversal within {REVERSAL_DEG:g}° of the period (here {sawtooth.reversal_deg:.3g}°)."
+        )
+    return [doc.figure("sawtooth", chart, caption=caption, alt=caption)]
 
 
-def _sawtooth_column(
-    run: SawtoothRun, sawtooth: Sawtooth, scale: float, unit: str, load: str
-) -> sawtooth_figure.Load:
-    """Give the traces at one load."""
-    formula = run.formula
+def _sawtooth_column(panels: list[Panel], run: SawtoothRun, scale: float, unit: str) -> None:
+    """Draw the motion at one load, on panels of position, rate and (where there is one) current."""
+    formula, time = run.formula, run.time_s
     peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"
     impure = f"distortion {100.0 * run.distortion:.1f} % (12.1 %)"
     note = (
         f"peak {scale * run.peak_rad:.3g} {unit} ({peak}) · gain {run.gain:.3f} ({formula.gain:.3f})\n"
         f"lag {run.lag_deg:.1f}° ({formula.lag_deg:.1f}°) · {impure}"
     )
-    return {
-        "title": f"load {run.load_Nm:g} {load}",
-        "time_s": abscissa(run.time_s),
-        "reference": abscissa(scale * run.reference_rad, 4),
-        "output": rounded(scale * run.output_rad, 4),
-        "rate": rounded(scale * run.output_rate_rad_s, 4),
-        "command_rate": rounded(scale * run.speed_command_rad_s, 4),
-        "current": rounded(run.current_A, 4) if sawtooth.has_current else None,
-        "note": note,
-    }
+    panels[0].curve(time, scale * run.reference_rad, "command", colour=style.MUTED, dash=1)
+    panels[0].curve(time, scale * run.output_rad, "output", colour=style.BLUE)
+    panels[0].y.label = f"position, {unit}"
+    panels[0].note(note, corner="top left")
+    panels[1].curve(time, scale * run.speed_command_rad_s, "speed command", colour=style.MUTED, dash=1)
+    panels[1].curve(time, scale * run.output_rate_rad_s, "output rate", colour=style.GREEN)
+    panels[1].y.label = f"rate, {unit}/s"
+    if len(panels) > 2:
+        panels[2].curve(time, run.current_A, "motor current", colour=style.ORANGE)
+        panels[2].y.label = "motor current, A"
+    panels[-1].x.label = "time, s"
+    panels[-1].x.limits(time[0], time[-1])

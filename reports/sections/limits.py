@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 import numpy as np
 
@@ -12,30 +12,16 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.limiters import Onset
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.sections.names import hertz
-
-if TYPE_CHECKING:
-    from reports.figures import onset as onset_figure
 
 
 def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
     scale, unit = (1.0, "m") if design.axis == "linear" else (math.degrees(1.0), "deg")
-    series: list[onset_figure.Series] = [
-        {"label": LIMITERS[name].words, "amplitude": rounded(scale * np.asarray(values), 4)}
-        for name, values in border.each_rad.items()
-        if np.isfinite(values).any()
-    ]
-    full = design.validation.full_deflection_rad * scale
-    data: onset_figure.Data = {
-        "frequency_hz": abscissa(border.omega_rad_s / (2.0 * np.pi)),
-        "series": series,
-        "unit": unit,
-        "full_deflection": full,
-    }
     caption = (
         "Peak amplitude of a sine command, at the output, at which each limit is just reached. Below the "
         "lowest line "
@@ -43,7 +29,7 @@ def section(design: Design, border: Onset) -> Section:
     )
     rows = _rows(design, border, scale)
     blocks = [
-        doc.figure("onset", data, caption=caption, alt=caption),
+        doc.figure("onset", _chart(design, border, scale, unit), caption=caption, alt=caption),
         _table(rows, unit),
     ]
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
@@ -52,6 +38,34 @@ def section(design: Design, border: Onset) -> Section:
     return doc.section(
         "limits", "Validity of the linear model", blocks, result=words, intro=intro, findings=findings
     )
+
+
+def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
+    """Draw every limiter's line; below the lowest the linear model holds."""
+    chart = Chart(width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude")
+    panel = chart.panel()
+    hertz = border.omega_rad_s / (2.0 * np.pi)
+    lines = {name: scale * np.asarray(values) for name, values in border.each_rad.items()}
+    lines = {name: values for name, values in lines.items() if np.isfinite(values).any()}
+    lowest = np.min([np.where(np.isfinite(v), v, np.inf) for v in lines.values()], axis=0)
+    there = np.isfinite(lowest)
+    full = design.validation.full_deflection_rad * scale
+    top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
+    bottom = max(0.6 * min(lowest[there], default=0.1), top / 1e6)
+    panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
+    panel.y.limits(bottom, top)
+    style.frequency(panel, hertz)
+    if there.any():
+        x, y = hertz[there].tolist(), lowest[there].tolist()
+        floor = bottom * 1e-3
+        panel.shape([([*x, x[-1], x[0]], [*y, floor, floor])], colour=style.GREEN, opacity=0.1)
+    for k, (name, values) in enumerate(lines.items()):
+        values = np.where(np.isfinite(values), values, np.nan)
+        panel.curve(hertz, values, LIMITERS[name].words, **style.series(k))
+    panel.note("linear below the lowest line", corner="bottom left", colour=style.MUTED)
+    if full:
+        panel.rule_y(full, f"full deflection {full:g} {unit}", colour=style.INK, dash=2)
+    return chart
 
 
 def _result(rows: Sequence[_Linear], unit: str) -> str:

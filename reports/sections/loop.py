@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.quantities import AT_A_GLANCE
 from analyses.loop_figures import LoopFigures
-from analyses.responses import Curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
+from analyses.responses import curve, frequency_grid, nyquist_curve, response_at, sampled_step
 from reports import document as doc
-from reports.document import abscissa, rounded
 from reports.document_schema import Block, Section
 from reports.numbers import fixed, seconds, to_minus
 from reports.numbers import hertz as hertz_words
+from reports.sections import loop_charts
 from reports.sections.margins import (
     MEANING,
     by_itself_notes,
@@ -28,14 +26,6 @@ from reports.sections.margins import (
     worst_status,
 )
 from reports.sections.names import LOOPS, hertz
-
-if TYPE_CHECKING:
-    from reports.figures import bode as bode_figure
-    from reports.figures import closed_bode as closed_bode_figure
-    from reports.figures import nichols as nichols_figure
-    from reports.figures import nyquist as nyquist_figure
-    from reports.figures import sensitivity as sensitivity_figure
-    from reports.figures import step as step_figure
 
 FRAME = 1.6
 STEP_POINTS = 300
@@ -112,62 +102,31 @@ def _short(value: float | None, format: str) -> float | None:
     return round(value, int(places)) if kind == "fix" else float(f"{value:.{places}g}")
 
 
-def open_bode(title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "") -> Block:
+def open_bode(
+    title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "", small: bool = False
+) -> Block:
     """Make the open-loop Bode figure with every margin on it."""
-    margins = figures.margins
-    data: bode_figure.Data = {
-        **bode_data([("open loop", curve(figures.loop.plain_open, grid))]),
-        "loop": name,
-        "nyquist_hz": nyquist_hz(figures),
-        "gain_margins": [
-            {"frequency_hz": m.frequency_rad_s / (2.0 * math.pi), "db": m.db}
-            for m in margins.gain_margins
-            if math.isfinite(m.frequency_rad_s) and m.frequency_rad_s > 0
-        ],
-        "phase_margins": [
-            {"frequency_hz": m.frequency_rad_s / (2.0 * math.pi), "deg": m.deg}
-            for m in margins.phase_margins
-            if m.frequency_rad_s > 0
-        ],
-    }
+    open_loop = [("open loop", curve(figures.loop.plain_open, grid))]
+    chart = loop_charts.bode(open_loop, figures.margins, nyquist_hz(figures), name, small)
     caption = (
         f"{title}, open loop: gain margins at the phase crossovers (■), "
         "phase margins at the gain crossovers (●)."
     )
-    return doc.figure("bode", data, caption=caption, alt=_margin_words(title, figures), layout="half")
+    return doc.figure("bode", chart, caption=caption, alt=_margin_words(title, figures), layout="half")
 
 
 def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> Block:
     """Make the closed-loop Bode figure with the bandwidths."""
-    series = [("rotor free" if locked else "closed loop", curve(figures.plain_response, grid))]
+    curves = [("rotor free" if locked else "closed loop", curve(figures.plain_response, grid))]
     if locked is not None and locked.stable:
-        series.append(("rotor locked", curve(locked.plain_response, grid)))
-    band = _bandwidths(figures)
-    data: closed_bode_figure.Data = {
-        **bode_data(series),
-        "loop": name,
-        "nyquist_hz": nyquist_hz(figures),
-        "bandwidth": band,
-    }
-    corner, lag = _hz(band["minus3db_hz"]), _hz(band["minus90deg_hz"])
-    words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
-    return doc.figure("closed_bode", data, caption=words, alt=f"Bode diagram. {words}", layout="half")
-
-
-def _bandwidths(figures: LoopFigures) -> closed_bode_figure.Bandwidth:
-    """Give what is marked on the closed-loop figure; null where it is not known."""
+        curves.append(("rotor locked", curve(locked.plain_response, grid)))
     band = figures.bandwidth
-    dc_db = None if band is None else 20.0 * math.log10(abs(band.dc_gain))
-    return {
-        "minus3db_hz": None if band is None else finite(band.minus3db_hz),
-        "minus90deg_hz": None if band is None else finite(band.minus90deg_hz),
-        "resonance_hz": None if band is None else finite(band.resonance_hz),
-        "resonance_db": None if band is None else finite(band.resonance_peak_db),
-        "level_db": None if dc_db is None else dc_db - 20.0 * math.log10(math.sqrt(2.0)),
-        "dc_db": dc_db,
-    }
+    chart = loop_charts.closed_bode(curves, band, nyquist_hz(figures), name)
+    corner, lag = (_hz(band.minus3db_hz), _hz(band.minus90deg_hz)) if band else (_hz(None), _hz(None))
+    words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
+    return doc.figure("closed_bode", chart, caption=words, alt=f"Bode diagram. {words}", layout="half")
 
 
 def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
@@ -175,43 +134,28 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     margins, system = figures.margins, figures.loop.plain_open
     omega, points = nyquist_curve(system, grid, FRAME)
     closest = margins.modulus_frequency_rad_s
-    at = None
-    if closest is not None and math.isfinite(closest) and closest > 0:
-        value = response_at(system, np.array([closest]))[0]
-        at = [float(value.real), float(value.imag)]
+    there = closest is not None and math.isfinite(closest) and closest > 0
+    at = complex(response_at(system, np.array([closest]))[0]) if there else None
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     on_circle = response_at(system, np.array(phases)) if phases else np.empty(0, dtype=complex)
-    data: nyquist_figure.Data = {
-        "frequency_hz": abscissa(omega / (2.0 * np.pi)),
-        "real": rounded(points.real, 4),
-        "imag": rounded(points.imag, 4),
-        "modulus": margins.modulus_margin,
-        "modulus_point": at,
-        "gain_points": [-1.0 / m.ratio for m in margins.gain_margins if m.ratio > 0],
-        "phase_points": [[float(v.real), float(v.imag)] for v in on_circle],
-        "frame": FRAME,
-    }
+    chart = loop_charts.nyquist(omega / (2.0 * np.pi), points, margins, at, on_circle, FRAME)
     modulus = "withheld" if margins.modulus_margin is None else f"{margins.modulus_margin:.3f}"
     caption = (
         f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "
         "(modulus margin, 1 over the peak of S)."
     )
-    return doc.figure("nyquist", data, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
+    return doc.figure("nyquist", chart, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
 
 
 def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
     """Make the Nichols chart."""
-    open_loop = curve(figures.loop.plain_open, grid)
-    data: nichols_figure.Data = {
-        "frequency_hz": abscissa(open_loop.frequency_hz),
-        "magnitude_db": rounded(open_loop.magnitude_db),
-        "phase_deg": rounded(open_loop.phase_deg),
-    }
+    one = curve(figures.loop.plain_open, grid)
+    chart = loop_charts.nichols(one.frequency_hz, one.magnitude_db, one.phase_deg)
     caption = (
         f"{title}, Nichols chart: gain over phase. Inside the outlines about the critical points (+) the "
         "peak of S or of T exceeds 6 dB."
     )
-    return doc.figure("nichols", data, caption=caption, alt=f"{caption} {_margin_words(title, figures)}")
+    return doc.figure("nichols", chart, caption=caption, alt=f"{caption} {_margin_words(title, figures)}")
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> Block:
@@ -225,62 +169,43 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         and item.loop in (name, "every", None)
         and item.maximum is not None
     ]
-    data: sensitivity_figure.Data = {
-        "frequency_hz": abscissa(grid / (2 * np.pi)),
-        "s_db": rounded(_db(response_at(figures.loop.plain_sensitivity, grid)), 4),
-        "t_db": rounded(_db(response_at(figures.loop.plain_closed, grid)), 4),
-        "s_peak": _peak(peaks.sensitivity_db, peaks.sensitivity_rad_s),
-        "t_peak": _peak(peaks.complementary_db, peaks.complementary_rad_s),
-        "limit_db": min(limits, default=None),
-        "loop": name,
-        "nyquist_hz": nyquist_hz(figures),
-    }
+    s_db, t_db = (
+        _db(response_at(each, grid)) for each in (figures.loop.plain_sensitivity, figures.loop.plain_closed)
+    )
+    found = (
+        (finite(hertz(peaks.sensitivity_rad_s)), finite(peaks.sensitivity_db)),
+        (finite(hertz(peaks.complementary_rad_s)), finite(peaks.complementary_db)),
+    )
+    chart = loop_charts.sensitivity(grid / (2 * np.pi), s_db, t_db, found, min(limits, default=None), name)
     caption = (
         f"{title}: sensitivity S = 1/(1 + L), peak {fixed(peaks.sensitivity_db, 2)} dB, "
         f"and closed loop T = L/(1 + L), peak {fixed(peaks.complementary_db, 2)} dB."
     )
-    return doc.figure("sensitivity", data, caption=caption, alt=caption, layout="half")
+    return doc.figure("sensitivity", chart, caption=caption, alt=caption, layout="half")
 
 
-def step(title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "") -> Block:
+def step(
+    title: str,
+    loop_figures: LoopFigures,
+    locked: LoopFigures | None,
+    *,
+    name: str = "",
+    small: bool = False,
+) -> Block:
     """Make the step figure."""
     figures = loop_figures.step
     assert figures is not None
     end = None
     if locked is not None and locked.step is not None:
         end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
-    series = [_step_series("rotor free" if locked else "closed loop", loop_figures, end)]
+    responses = [_response("rotor free" if locked else "closed loop", loop_figures, end)]
     if locked is not None and locked.step is not None:
-        series.append(_step_series("rotor locked", locked, end))
-    data: step_figure.Data = {
-        "loop": name,
-        "time_s": series[0]["time_s"],
-        "series": series,
-        "final": finite(figures.final_value),
-        "rise": _rise(figures),
-        "settling_s": finite(figures.settling_time_s),
-        "overshoot_percent": finite(figures.overshoot_percent),
-        "held": loop_figures.loop.period_s is not None,
-    }
-    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
+        responses.append(_response("rotor locked", locked, end))
+    chart = loop_charts.step(responses, figures, loop_figures.loop.period_s is not None, name, small)
+    caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:
         caption += " With the rotor free, back-EMF keeps it from settling within the time shown."
-    return doc.figure("step", data, caption=caption, alt=f"Step response. {caption}", layout="half")
-
-
-def bode_data(series: Sequence[tuple[str, Curve]]) -> bode_figure.Curves:
-    """Give the curves of a Bode figure, on the grid of the first."""
-    return {
-        "frequency_hz": abscissa(series[0][1].frequency_hz),
-        "series": [
-            {
-                "label": label,
-                "magnitude_db": rounded(loop_figures.magnitude_db),
-                "phase_deg": rounded(loop_figures.phase_deg),
-            }
-            for label, loop_figures in series
-        ],
-    }
+    return doc.figure("step", chart, caption=caption, alt=f"Step response. {caption}", layout="half")
 
 
 def nyquist_hz(figures: LoopFigures) -> float | None:
@@ -288,7 +213,7 @@ def nyquist_hz(figures: LoopFigures) -> float | None:
     return None if figures.loop.period_s is None else 0.5 / figures.loop.period_s
 
 
-def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> step_figure.Series:
+def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> loop_charts.Response:
     """Give a step response, cut where nothing happens any more and thinned."""
     figures = loop_figures.step
     assert figures is not None
@@ -307,21 +232,7 @@ def _step_series(label: str, loop_figures: LoopFigures, end_s: float | None = No
     time, response = time[::stride], response[::stride]
     if end_s is not None and time[-1] < end_s:
         time, response = np.append(time, end_s), np.append(response, response[-1])
-    return {"label": label, "time_s": abscissa(time), "response": rounded(response)}
-
-
-def _rise(figures: Any) -> list[float] | None:
-    """Give the times at which the response first has 10 and 90 % of its final value."""
-    part = np.asarray(figures.response) / figures.final_value
-    if not (part >= 0.9).any():
-        return None
-    start = float(figures.time_s[int(np.argmax(part >= 0.1))])
-    return [start, start + float(figures.rise_time_s)]
-
-
-def _peak(db: float | None, omega_rad_s: float | None) -> sensitivity_figure.Peak | None:
-    known = finite(db)
-    return None if known is None else {"db": known, "frequency_hz": finite(hertz(omega_rad_s))}
+    return label, time, response
 
 
 def _db(values: np.ndarray) -> np.ndarray:

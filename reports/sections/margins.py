@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TypedDict, cast
 
 from actuator_lti.quantities import Quantity
+from actuator_lti.verdict import Verdict
 from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
 from reports import document as doc
@@ -82,8 +83,9 @@ def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = Non
     ) + evidence_meaning(named)
     status = worst_status([loop_figures.sound for loop_figures in figures.values()])
     return doc.section(
-        "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status
-    )
+        "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status,
+        verdict=Verdict.NOT_PROVEN if status == "warn" else None,
+    )  # fmt: skip
 
 
 def result(figures: Mapping[str, LoopFigures]) -> str:

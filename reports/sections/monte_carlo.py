@@ -7,12 +7,13 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, Status, VerdictItem
 from reports.sections.margins import finite
 
 if TYPE_CHECKING:
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
-    from reports.figures import distribution as distribution_figure
 
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
@@ -65,7 +66,7 @@ def section(result: MonteCarloResult, at_least: float | None = None) -> Section:
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
         doc.fact("Parameters that vary", ", ".join(result.paths)),
     ]))  # fmt: skip
-    failed = any(item["passed"] is False for item in items)
+    failed = any(item["verdict"] == "not met" for item in items)
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
         "case in "
@@ -185,37 +186,54 @@ def _words(name: str) -> str:
 
 def _figures(result: MonteCarloResult) -> list[Block]:
     """Draw the distribution behind every requirement, three a figure."""
-    panels = [panel for odds in result.odds if odds.id != "all" for panel in _panels(result, odds)]
+    shown = [
+        (odds, result.columns[name])
+        for odds in result.odds
+        if odds.id != "all"
+        for name in odds.columns
+        if len(result.columns[name].counts) >= 2  # the same in every sample: nothing to draw
+    ]
     blocks = []
-    for first in range(0, len(panels), 3):
-        part = panels[first : first + 3]
-        names = ", ".join(panel["label"] for panel in part)
+    for first in range(0, len(shown), 3):
+        part = shown[first : first + 3]
+        chart = Chart(width=style.WIDE * len(part) / 3.0, height=250.0, legend=True)
+        for odds, column in part:
+            _histogram(chart.panel(title=_words(column.name)), result, odds, column)
+        names = ", ".join(_words(column.name) for _, column in part)
         blocks.append(
             doc.figure(
-                "distribution", {"panels": part}, caption=f"Distribution within the tolerances: {names}.",
+                "distribution", chart, caption=f"Distribution within the tolerances: {names}.",
                 alt=f"Histograms of {names} with nominal design, worst case and limit.",
             )
         )  # fmt: skip
     return blocks
 
 
-def _panels(result: MonteCarloResult, odds: Odds) -> list[distribution_figure.Histogram]:
-    """Give the columns that a requirement looks at."""
-    case = _case(result, odds)
-    panels: list[distribution_figure.Histogram] = []
-    for name in odds.columns:
-        column = result.columns[name]
-        if len(column.counts) < 2:
-            continue  # the same in every sample: nothing to draw
-        alone = len(odds.columns) == 1
-        panels.append({
-            "label": _words(name), "unit": "" if column.unit == "1" else column.unit,
-            "edges": [e for e in column.edges if math.isfinite(e)], "counts": list(column.counts),
-            "nominal": finite(result.nominal.get(name)),
-            "worst": finite(case.value) if case is not None and alone else None,
-            "minimum": odds.minimum, "maximum": odds.maximum,
-        })  # fmt: skip
-    return panels
+def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: ColumnStatistics) -> None:
+    """Fill the counts under a line; mark limits, nominal design and worst case, each with its own dash."""
+    edges, counts = [e for e in column.edges if math.isfinite(e)], column.counts
+    x = [edges[0], *(e for edge in edges[1:-1] for e in (edge, edge)), edges[-1]]
+    y = [float(c) for count in counts for c in (count, count)]
+    panel.shape([([x[0], *x, x[-1]], [0.0, *y, 0.0])], colour=style.SKY, opacity=0.45)
+    panel.curve(x, y, colour=style.BLUE, width=1.3, read=False)
+    panel.y.limits(0.0, 1.35 * max(counts))
+    case, alone = _case(result, odds), len(odds.columns) == 1
+    nominal = finite(result.nominal.get(column.name))
+    worst = finite(case.value) if case is not None and alone else None
+    for name, value, colour, dash in (("nominal", nominal, style.INK, 0), ("worst", worst, style.ORANGE, 1)):
+        if value is not None:
+            panel.x.see([value])
+            panel.rule_x(value, label=name, colour=colour, dash=dash, width=1.7)
+    known = [*edges, *style.known((nominal, worst))]
+    low, high = min(known), max(known)
+    width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), "" if column.unit == "1" else column.unit
+    for name, value in (("minimum", odds.minimum), ("maximum", odds.maximum)):
+        if value is not None and low - 2 * width <= value <= high + 2 * width:
+            panel.x.see([value])
+            panel.rule_x(value, label="limit", colour=style.RED, dash=2, width=1.7)
+        elif value is not None:
+            panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.RED)
+    panel.x.label, panel.y.ticks, panel.x.grid = unit, [], False
 
 
 def _worst_table(result: MonteCarloResult) -> Block:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from analyses.requirements import RequirementVerdict, all_pass
+from actuator_lti.verdict import Verdict
+from analyses.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Section, Status, VerdictItem
 from reports.sections.names import QUANTITIES
@@ -14,43 +15,26 @@ from reports.sections.names import QUANTITIES
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> Section:
     """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
-        none = "The design file states no requirement."
+        none = "The design states no requirements."
         return doc.section("verdicts", "Requirements", [], result=none, status="info")
     intro = (
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
     items = [item(verdict, load_unit) for verdict in verdicts]
-    status: Status = "pass" if all_pass(tuple(verdicts)) else "fail"
+    status: Status = tally(verdicts).role
     return doc.section(
-        "verdicts", "Requirements", [doc.verdicts(items)], result=result(items), intro=intro, status=status
+        "verdicts", "Requirements", [doc.verdicts(items)], result=result(verdicts), intro=intro, status=status
     )
 
 
-def result(items: Sequence[VerdictItem]) -> str:
-    """Say how many requirements are met, and which are not."""
-    failed = [item["label"] for item in items if item["passed"] is False]
-    unjudged = sum(item["passed"] is None for item in items)
-    rest = f" {unjudged} cannot be judged." if unjudged else ""
-    if failed:
-        return f"{counted(len(failed), len(items))} not met: {'; '.join(failed)}.{rest}"
-    met = len(items) - unjudged
-    if not unjudged and met > 1:
-        return f"All {met} requirements are met."
-    return f"{counted(met, len(items))} met.{rest}"
-
-
-def counted(count: int, total: int) -> str:
-    """Say "1 of 9 requirements is", "2 of 9 requirements are", "The requirement is" (of one).
-
-    Examples
-    --------
-    >>> counted(1, 9), counted(2, 9), counted(1, 1)
-    ('1 of 9 requirements is', '2 of 9 requirements are', 'The requirement is')
-    """
-    if count == total == 1:
-        return "The requirement is"
-    return f"{count} of {total} requirement{'s' if total != 1 else ''} {'is' if count == 1 else 'are'}"
+def result(verdicts: Sequence[RequirementVerdict]) -> str:
+    """Say how many requirements are met, and which are not, or not proven."""
+    said = [f"{tally(verdicts).words('requirements')}."]
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        names = [label(one) + (" (waived)" if one.waiver else "") for one in verdicts if one.verdict == word]
+        said += [f"{word.capitalize()}: {'; '.join(names)}."] if names else []
+    return " ".join(said)
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:
@@ -71,11 +55,12 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:
         comparison=comparison,
         unit="" if requirement.unit == "1" else requirement.unit,
         distance=verdict.distance,
-        passed=verdict.passed,
+        passed=None,
         source=source,
         reason=reason,
+        waiver=verdict.waiver.words if verdict.waiver else "",
     )
-    return {**made, "loop": verdict.loop, "quantity": requirement.quantity}
+    return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
 
 
 def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.numbers import significant
@@ -18,7 +19,15 @@ from reports.sections.limits import words_of
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.specification import Specification
-    from reports.figures import torque_speed as torque_speed_figure
+
+
+BOUND_COLOURS = {
+    "voltage limit": style.RED,
+    "drive signal at its limit": style.RED,
+    "peak current": style.ORANGE,
+    "continuous current": style.BROWN,
+    "speed limit": style.BLUE,
+}
 
 
 def section(result: Specification) -> Section:
@@ -119,45 +128,57 @@ def _planes(result: Specification) -> list[Block]:
     for one in result.capabilities:
         load = one.figures.load_Nm
         moves = [move for move in result.manoeuvres if move.load_Nm == load]
-        paths: list[torque_speed_figure.Path] = []
-        for move in moves:
+        title = f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}"
+        chart = Chart(width=style.WIDE, height=400.0, title=title, legend=True)
+        panel = chart.panel()
+        panel.by_point = True
+        widest, top = fast * _fastest(result, moves), strong * _top(result, moves)
+        panel.x.limits(-0.02 * widest, widest)
+        panel.y.limits(-1.12 * top, 1.25 * top)
+        panel.rule_y(0.0)
+        for k, move in enumerate(moves):
             fold = np.where(move.speed_rad_s < 0.0, -1.0, 1.0)
             speed, torque = fast * fold * move.speed_rad_s, strong * fold * move.torque_Nm
             # a reversal is a jump of the folded path: leave a gap there
             torque = np.where(np.diff(fold, prepend=fold[0]) != 0.0, np.nan, torque)
-            paths.append(
-                {"label": _short(move.name), "speed": abscissa(speed, 4), "torque": rounded(torque, 4)}
-            )
-        wanted = f"steady motion at {load:g} "
-        data: torque_speed_figure.Data = {
-            "bounds": [_curve(curve.name, curve, fast, strong) for curve in result.plane.bounds],
-            "demands": [
-                _curve(curve.name, curve, fast, strong)
-                for curve in result.plane.demands
-                if curve.name.startswith(wanted)
-            ],
-            "paths": paths,
-            "title": f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}",
-            "speed_label": speed_label,
-            "torque_label": torque_label,
-            "top": strong * _top(result, moves),
-            "fast": fast * _fastest(result, moves),
-        }
+            look: style.Style = {"colour": style.SERIES[(k + 2) % 7], "dash": k % 7, "width": 1.5}
+            panel.curve(speed, torque, _short(move.name), **look)
+        for bound in result.plane.bounds:
+            inside = (0.97 * widest, 1.2 * top)
+            _bound(panel, bound.name, fast * bound.speed_rad_s, strong * bound.torque_Nm, inside)
+        wanted = [
+            each for each in result.plane.demands if each.name.startswith(f"steady motion at {load:g} ")
+        ]
+        for k, each in enumerate(wanted):
+            panel.curve(
+                fast * each.speed_rad_s, strong * each.torque_Nm, each.name, colour=style.INK, width=1.5,
+                dash=2, marker="os^D"[k % 4], size=5.0, every=8,
+            )  # fmt: skip
+        panel.x.label, panel.y.label = speed_label, torque_label
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
             "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "
             "backward motion is turned over."
         )
-        blocks.append(doc.figure("torque_speed", data, caption=caption, alt=caption))
+        blocks.append(doc.figure("torque_speed", chart, caption=caption, alt=caption))
     return blocks
 
 
-def _curve(label: str, curve: Any, fast: float, strong: float) -> torque_speed_figure.Line:
-    return {
-        "label": label,
-        "speed": abscissa(fast * curve.speed_rad_s, 4),
-        "torque": abscissa(strong * curve.torque_Nm, 4),
-    }
+def _bound(
+    panel: Panel, name: str, speed: np.ndarray, torque: np.ndarray, inside: tuple[float, float]
+) -> None:
+    """Draw one bound in both halves, named once."""
+    look: style.Style = {"colour": BOUND_COLOURS.get(name, style.INK), "width": 1.3, "dash": 1}
+    if speed[0] == speed[-1]:
+        panel.rule_x(speed[0], name, **look)
+        return
+    panel.curve(speed, torque, read=False, **look)
+    if torque[0] == torque[-1]:
+        panel.curve(speed, -torque, read=False, **look)
+    seen = np.flatnonzero((speed < inside[0]) & (torque < inside[1]))
+    if seen.size:
+        k = seen[seen.size // 2]
+        panel.note(name, (float(speed[k]), float(torque[k])), colour=look["colour"])
 
 
 def _short(name: str) -> str:

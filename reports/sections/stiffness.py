@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports import document as doc
-from reports.document import abscissa, rounded
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Status
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.stiffness import AtRest, Check, Stiffness, StiffnessCurve
-    from reports.figures import stiffness as stiffness_figure
 
 STATES = {
     "powered": "powered, command held",
@@ -45,7 +45,7 @@ def section(result: Stiffness) -> Section:
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status: Status = "info" if not result.checks else "pass" if result.agrees else "fail"
+    status: Status = "info" if not result.checks else "pass" if result.passed else "fail"
     return doc.section(
         "stiffness",
         "Stiffness",
@@ -64,27 +64,29 @@ def _result(result: Stiffness, unit: str) -> str:
     least, at = powered.least
     static = powered.static_Nm_rad
     words = f"{static:.4g} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-    return f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz."
+    words = f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz"
+    if result.checks:
+        most = max(check.difference for check in result.checks)
+        said = "confirms" if result.passed else "does not confirm"
+        words += f"; an injected moment {said} it (relative difference up to {most:.1e})"
+    return f"{words}."
 
 
 def _figure(result: Stiffness, unit: str) -> list[Block]:
     shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
     if not shown:
         return []
-    data: stiffness_figure.Data = {
-        "frequency_hz": abscissa(shown[0].frequency_hz),
-        "series": [
-            {
-                "label": STATES[curve.state],
-                "size": rounded(np.abs(curve.stiffness_Nm_rad)),
-                "phase_deg": rounded(np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad)))),
-            }
-            for curve in shown
-        ],
-        "unit": unit,
-    }
+    chart = Chart(width=style.WIDE, height=420.0)
+    top, bottom = chart.column(1.2, 1.0)
+    top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
+    phases = [np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad))) for curve in shown]
+    for k, (curve, phase) in enumerate(zip(shown, phases, strict=True)):
+        top.curve(curve.frequency_hz, np.abs(curve.stiffness_Nm_rad), STATES[curve.state], **style.series(k))
+        bottom.curve(curve.frequency_hz, phase, STATES[curve.state], **style.series(k))
+    style.frequency(bottom, shown[0].frequency_hz)
+    style.phase_axis(bottom, np.concatenate(phases))
     caption = "Dynamic stiffness of the output, powered and unpowered."
-    return [doc.figure("stiffness", data, caption=caption, alt=f"Two panels. {caption}")]
+    return [doc.figure("stiffness", chart, caption=caption, alt=f"Two panels. {caption}")]
 
 
 def _table(result: Stiffness, unit: str) -> Block:
@@ -95,7 +97,7 @@ def _table(result: Stiffness, unit: str) -> Block:
         doc.column("at", "at", "Hz", format="sig:4"),
     ]
     rows = [_row(curve) for curve in result.curves]
-    note = "No static value: the output comes back to its place, or does not move at all."
+    note = "Infinite: the output comes back to its place, or does not move at all."
     return doc.table("Stiffness by state", columns, rows, note)
 
 
@@ -104,7 +106,7 @@ def _row(curve: StiffnessCurve) -> Row:
     moves = math.isfinite(least)
     return {
         "state": STATES[curve.state],
-        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else None,
+        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else "infinite",
         "least": least if moves else None,
         "at": at if moves else None,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,9 @@ from analyses.validation.tolerance import allowed
 from reports import document as doc
 from reports.document import abscissa, rounded
 from reports.document_schema import Block, Row, Section
+from reports.figures import overlay_sweep as overlay_sweep_figure
+from reports.figures import rest_sweep as rest_sweep_figure
 from reports.numbers import significant
-
-if TYPE_CHECKING:
-    from reports.figures import overlay_sweep as overlay_sweep_figure
-    from reports.figures import rest_sweep as rest_sweep_figure
 
 NAMES = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 
@@ -119,7 +117,8 @@ def _overlay(name: str, loop: LoopValidation) -> Block:
         f"difference. Up to a third of the Nyquist frequency ({third:.4g} Hz, dotted) it is at most "
         f"{significant(gain, 2)} dB and {significant(phase, 2)} deg."
     )
-    return doc.figure("overlay_sweep", data, caption=caption, alt=caption)
+    chart = overlay_sweep_figure.draw(doc.plain(data))
+    return doc.figure("overlay_sweep", chart, caption=caption, alt=caption)
 
 
 def _panel(title: str, linear: Any, measured: Any) -> overlay_sweep_figure.Response:
@@ -237,6 +236,6 @@ def _from_rest(sweep: RestSweep, axis: str) -> Section:
         "include the reversals."
     )
     intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."
-    block = doc.figure("rest_sweep", data, caption=caption, alt=caption)
+    block = doc.figure("rest_sweep", rest_sweep_figure.draw(doc.plain(data)), caption=caption, alt=caption)
     result = f"The describing function of dry friction {agrees}."
     return doc.section("from-rest", "From rest: effect of dry friction", [block], result=result, intro=intro)

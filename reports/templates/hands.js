@@ -351,7 +351,7 @@
   // --- showing -------------------------------------------------------------------------------------------
   const chart = (name) => find(`[data-chart="${name}"] .chart`);
   const tell = (name, type, detail) => chart(name).dispatchEvent(new CustomEvent(type, { detail }));
-  // a requirement as found: its value (NaN: none), and whether it is met (null: not judged)
+  // a requirement as found: its value (NaN: none), and whether it is met (null: not proven)
   const judged = (found) => data.requirements.map((item, k) => {
     const loop = found.loops[item.loop];
     if (item.loop && (!loop || !loop.figures)) return { item, value: NaN, met: null };
@@ -424,18 +424,18 @@
   };
   const state = () => {
     const line = find(".state"), all = judged(now), was = judged(before), total = all.length;
-    const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met }) => met === null);
+    const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met, words }) => met === null && words !== "…");
     const unstable = data.loops.filter((name) => now.loops[name].figures && now.loops[name].figures[STABLE] !== 1);
     const unknown = data.loops.filter((name) => now.loops[name].n === DOUBT), words = [];
     if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
     if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
-    if (fails.length && !changes().length) words.push(`${fails.length} of ${total} requirements ${fails.length === 1 ? "is" : "are"} not met as designed.`);
-    else if (fails.length) words.push(`${fails.length} of ${total} requirements now ${fails.length === 1 ? "fails" : "fail"} (as designed: ${old.length}).`);
-    else if (total > open.length) words.push(total === 1 ? "The requirement is met." : open.length ? `${total - open.length} of ${total} requirements are met.` : `All ${total} requirements are met.`);
-    if (open.length && !unknown.length) words.push(`${open.length} cannot be judged now.`);
+    const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
+    const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
+    if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}.`);
+    else if (!data.apart.length) words.push("The design states no requirements.");
     if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
     if (refused) words.push(refused);
-    line.className = `state ${unstable.length || fails.length || unknown.length ? "fail" : "pass"}`;
+    line.className = `state ${unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
     line.textContent = words.filter(Boolean).join(" ");
     line.dataset.failing = fails.length;
     demands(all, was);
@@ -460,7 +460,7 @@
       row.dataset.loop = item.loop || "";
       row.dataset.value = value;
       row.dataset.met = met;
-      last.append(html("span", `mark ${met === null ? "none" : met ? "pass" : "fail"}`, met === null ? "not judged" : met ? "met" : was[k].met === false ? "not met" : "now not met"));
+      last.append(html("span", `mark ${met === null ? "warn" : met ? "pass" : "fail"}`, met === null ? "not proven" : met ? "met" : was[k].met === false ? "not met" : "now not met"));
       row.append(th, html("td", "left", placed(item)), html("td", "right", `${limit(item)} ${item.unit}`), html("td", "right", found(was[k])), cellNow, last);
       return row;
     });

@@ -224,17 +224,21 @@ def called(given: list[str]) -> None:
 @cache
 def small_report() -> bytes:
     from reports import document as doc
+    from reports.charts.chart import Chart
 
     columns = [doc.column("a", "A", "deg", format="sig:3"), doc.column("b", "B")]
     rows = [{"a": 1.5, "b": {"text": "x", "status": "pass"}, "_status": "fail"}, {"a": None, "b": True}]
     verdict = doc.verdict(
         "i", "I", value=1.0, limit=2.0, unit="dB", distance=1.0, passed=True, comparison="<="
     )
-    curve = {"label": "k", "x": [1.0, 2.0, None], "y": [0.0, -3.0, 1.0], "style": "points"}
-    drawn = {"series": [curve], "x_label": "x", "y_label": "y", "levels": [{"y": 1.0, "label": "l"}]}
-    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "passed": True}
+    drawn = Chart(width=300.0)
+    panel = drawn.panel()
+    panel.points([1.0, 2.0, None], [0.0, -3.0, 1.0], "k")
+    panel.rule_y(1.0, label="l")
+    panel.note("n", corner="top left")
+    near = {"limit": 6.0, "comparison": ">=", "distance": 1.5, "verdict": "met"}
     glance = {
-        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "passed": True},
+        "kind": "glance", "more": 2, "weakest": {"label": "l", "words": "w", "status": "pass"},
         "loops": [{
             "loop": "Position", "anchor": "a", "stable": {"text": "yes", "status": "pass"},
             "figures": [{"label": "Gain margin", "value": 7.5, "unit": "dB", "format": "fix:2", **near}],

@@ -82,8 +82,8 @@ def test_a_validation_that_crashes_leaves_the_linear_report(tmp_path, monkeypatc
 
 
 def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, capsys) -> None:
-    def draw(name: str, *arguments: object, **named: object) -> str:
-        return broken() if name == "nyquist" else '<svg viewBox="0 0 9 9"></svg>'
+    def draw(block: dict, *arguments: object, **named: object) -> str:
+        return broken() if block["figure"] == "nyquist" else '<svg viewBox="0 0 9 9"></svg>'
 
     monkeypatch.setattr("reports.drawing.draw_svg", draw)
     assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3

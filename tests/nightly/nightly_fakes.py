@@ -14,6 +14,7 @@ from reports.nightly.code_version import CodeVersion
 from reports.nightly.figures import digest
 from reports.nightly.job import Job
 from reports.nightly.night import Settings, Study
+from reports.verdict_summary import role
 
 CODE = CodeVersion(sources="s", libraries={"numpy": "2"}, commit="c" * 40)
 BUILD = "nightly_fakes:build"
@@ -21,18 +22,21 @@ INLINE = Settings(workers=0, build=BUILD)
 
 
 def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
-    """A small report: one requirement on ``margin`` (at least ``limit``) and a table of margins."""
+    """A small report: one requirement on ``margin`` (not proven where ``unknown``) and a table of margins."""
     name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
+    unknown = bool(payload.get("unknown"))
     item = verdict(
         id=str(payload.get("requirement", "GM")),
         label=str(payload.get("label", "gain margin")),
-        value=margin,
+        value=None if unknown else margin,
         limit=limit,
         comparison="≥",
         unit="dB",
-        distance=margin - limit,
-        passed=margin >= limit,
+        distance=None if unknown else margin - limit,
+        passed=None if unknown else margin >= limit,
         source="test",
+        reason="not determined" if unknown else "",
+        waiver=str(payload.get("waiver", "")),
     )
     rows = [
         {"loop": loop, "phase_margin": 40.0 + margin + k, "crossover": 100.0 * (k + 1)}
@@ -49,9 +53,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
         design={"name": name, "revision": str(payload.get("revision", "A"))},
         provenance={"version": "0", "commit": None, "time": None},
         sections=[
-            section(
-                "verdicts", "Requirements", [verdicts([item])], status="pass" if item["passed"] else "fail"
-            ),
+            section("verdicts", "Requirements", [verdicts([item])], status=role(item)),
             section("margins", "Margins", [table("Margins", columns, rows)]),
         ],
     )

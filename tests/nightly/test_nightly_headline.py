@@ -21,7 +21,7 @@ def change(figure: str, before: float, after: float, **more) -> Change:
 
 PHASE = Verdict(
     id="PM/position", label="Position loop: phase margin", value=55.3, limit=">= 45", unit="deg",
-    distance=10.3, relative=0.23, passed=True,
+    distance=10.3, relative=0.23, verdict="met",
 )  # fmt: skip
 COMPARISON = Comparison(
     changes=(

@@ -183,12 +183,34 @@ def test_machine_files_say_what_the_page_says(nights) -> None:
     summary = json.loads((nights.site / "summary.json").read_text())
     assert summary["schema"] == "actuator-lti/nightly"
     assert summary["exit_status"] == 1
-    assert summary["counts"] == {"broken": 1, "fail": 1, "regression": 0, "pass": 1}
+    assert summary["counts"] == {"broken": 1, "fail": 1, "unproven": 0, "regression": 0, "pass": 1}
     root = ElementTree.parse(nights.site / "junit.xml").getroot()
     assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
     failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
     assert failed == ["GM gain margin"]
     assert "✗ failing" in (nights.site / "summary.md").read_text()
+
+
+def test_what_is_not_proven_fails_the_night_unless_it_is_waived(nights) -> None:
+    waiver = {"unknown": True, "waiver": "waived 2026-11-22: bench"}
+    night = nights(job("doubt", unknown=True), job("waived", **waiver))
+    assert (night.exit_status, [d.state for d in night.designs]) == (1, ["unproven", "pass"])
+    summary = json.loads((nights.site / "summary.json").read_text())
+    doubt, waived = sorted(summary["designs"], key=lambda one: one["name"])
+    assert (doubt["state"], doubt["requirements"][0]["verdict"]) == ("unproven", "not proven")
+    assert (waived["state"], waived["requirements"][0]["waiver"]) == ("pass", waiver["waiver"])
+    cases = {
+        (c.get("classname"), c.get("name")): c
+        for c in ElementTree.parse(nights.site / "junit.xml").iter("testcase")
+    }
+    assert cases["doubt", "GM gain margin"].find("failure").get("type") == "not proven"
+    assert (
+        cases["waived", "GM gain margin"].find("skipped").get("message")
+        == f"not determined; {waiver['waiver']}"
+    )
+    page = (nights.site / "index.html").read_text()
+    assert "not proven" in page
+    assert nights(job("waived", **waiver)).exit_status == 0
 
 
 def test_old_reports_go_and_old_figures_stay(nights) -> None:

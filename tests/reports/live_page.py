@@ -99,7 +99,7 @@ def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
         if id in [each["id"] for each in apart]:
             continue
         value, met = ours[id, item["loop"]]
-        assert met == {True: "true", False: "false", None: "null"}[item["passed"]], item
+        assert met == {"met": "true", "not met": "false", "not proven": "null"}[item["verdict"]], item
         if item["value"] is not None and math.isfinite(item["value"]):
             assert float(value) == pytest.approx(item["value"], rel=1e-9, abs=1e-9), item
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from actuator_lti.errors import InputError
+from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.numbers import fixed, show, significant
-from reports.verdict_summary import summary, verdict_words
+from reports.verdict_summary import verdict_lines, verdict_of, verdict_words
 
 
 def made(**changes: Any) -> dict[str, Any]:
@@ -38,19 +39,48 @@ def made(**changes: Any) -> dict[str, Any]:
 
 
 def test_verdicts_are_counted_wherever_they_stand() -> None:
-    counts = {"failed": 1, "not_judged": 1, "total": 3}
-    assert made()["verdict"] == {"passed": False, **counts, "parts": {"requirements": counts}}
+    counts = {"met": 1, "not_met": 1, "not_proven": 1, "waived": 0}
+    assert made()["verdict"] == {"verdict": "not met", "passed": False, "parts": {"requirements": counts}}
 
 
 def test_checks_and_requirements_are_told_apart() -> None:
     check = doc.verdict("d", "D", value=1.0, limit=2.0, unit="", distance=1.0, passed=True)
     parts = [*made()["sections"], doc.section("two", "Two", [doc.verdicts([check], what="checks")])]
-    result = summary(block for part in parts for block in doc.walk(part))
-    assert (result["failed"], result["total"]) == (1, 4)
+    result = verdict_of(parts, "report")
     assert verdict_words(result) == [
-        "1 of 3 requirements not met, 1 not judged",
-        "1 of 1 checks by simulation passed",
+        "1 of 3 requirements met, 1 not met, 1 not proven",
+        "1 of 1 checks by simulation met",
     ]
+
+
+@pytest.mark.parametrize(
+    ("passed", "waiver", "word", "lines"),
+    [
+        ((True, None), "", "not proven", [("1 of 2 requirements met, 1 not proven", "warn")]),
+        ((True, None), "waived", "met", [("1 of 2 requirements met, 1 waived", "pass")]),
+        ((None,), "waived", "met", [("0 of 1 requirements met, 1 waived", "info")]),
+        ((None, False), "waived", "not met", [("0 of 2 requirements met, 1 not met, 1 waived", "fail")]),
+        ((), "", "met", [("the design states no requirements", "info")]),
+    ],
+)
+def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
+    passed: tuple[bool | None, ...], waiver: str, word: str, lines: list[tuple[str, str]]
+) -> None:
+    items = [
+        doc.verdict(f"v{k}", "V", value=None, limit=2.0, unit="", distance=None, passed=one,
+                    waiver=waiver if one is None else "")
+        for k, one in enumerate(passed)
+    ]  # fmt: skip
+    result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
+    assert (result["verdict"], result["passed"]) == (word, word == "met")
+    assert verdict_lines(result) == lines
+
+
+def test_a_section_that_is_not_proven_makes_its_report_so() -> None:
+    part = doc.section("margins", "Margins", [], status="warn", verdict=Verdict.NOT_PROVEN)
+    result = verdict_of([part], "report")
+    assert (result["verdict"], result["unproven_sections"]) == ("not proven", ["Margins"])
+    assert verdict_of([part], "compare")["verdict"] == "met"
 
 
 def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
@@ -74,7 +104,7 @@ def test_a_document_survives_writing_and_reading() -> None:
         ("[" * 100_000, "nested too deeply"),
         ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
         ("[]", "schema must be"),
-        (json.dumps({"schema": doc.SCHEMA, "version": 2, "sections": []}), "version = 2"),
+        (json.dumps({"schema": doc.SCHEMA, "version": 1, "sections": []}), "version = 1"),
         (
             json.dumps(made(sections=[doc.section("x", "X", [{"kind": "magic"}])])),
             r"sections\[1\].blocks\[1\].*'magic' found using 'kind'",
@@ -100,10 +130,9 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
 @pytest.mark.parametrize(
     "change",
     [
-        {"passed": True, "failed": 0},
-        {"total": 4},
-        {"not_judged": 0},
-        {"parts": {"requirements": {"failed": 0, "not_judged": 1, "total": 3}}},
+        {"passed": True},
+        {"verdict": "not proven"},
+        {"parts": {"requirements": {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}}},
     ],
 )
 def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str, Any], tmp_path) -> None:

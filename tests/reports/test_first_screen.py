@@ -125,7 +125,7 @@ def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> Non
     document = design_report(replace(design, requirements=tuple(strict)))
     assert document["sections"][0]["status"] == "fail"
     result = glance(document)["weakest"]
-    assert result["passed"] is False
+    assert result["status"] == "fail"
     assert result["label"] == "Velocity loop: phase margin"  # 73.7 of 90: 18 % beyond
     assert "18 % beyond its limit" in result["words"]
 

@@ -16,7 +16,7 @@ from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Requirement
 from analyses.held_loops import constant_load, held_loop
 from analyses.loop_figures import all_loop_figures
-from analyses.requirements import all_pass, evaluate_requirements
+from analyses.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
 from reports.cli.app import build
 
@@ -64,7 +64,7 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert current.judged.margins.phase_margin_deg == pytest.approx(expected, abs=1e-6)
     asked = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
     verdicts = evaluate_requirements(replace(design, requirements=(asked,)), figures)
-    assert all_pass(verdicts)
+    assert tally(verdicts).passes
     found = {verdict.loop: verdict for verdict in verdicts}
     assert found["current"].value == pytest.approx(expected, abs=1e-6)
     assert "with the rotor held" in found["current"].reason

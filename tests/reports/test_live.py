@@ -15,8 +15,12 @@ import numpy as np
 import pytest
 from built_report import HOSTILE, SEEN
 
+from analyses.responses import Curve
 from reports import document as doc
+from reports.charts import style
+from reports.charts.chart import Chart
 from reports.html import page as page_of
+from reports.sections.loop_charts import both
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -29,23 +33,25 @@ def document() -> dict[str, Any]:
     """Make a document with a Bode figure, a Nyquist figure and curves over time."""
     f = np.geomspace(0.1, 1000.0, 240)
     w = 2.0 * np.pi * f
-    magnitude, phase = 20.0 * np.log10(GAIN / w), -90.0 - np.degrees(w * DELAY_S)
+    phase = -90.0 - np.degrees(w * DELAY_S)
     response = GAIN / (1j * w) * np.exp(-1j * w * DELAY_S)
     near = np.abs(response) < 3.0
-    bode = {
-        "loop": "current",
-        "frequency_hz": f,
-        "series": [{"label": "open loop", "magnitude_db": magnitude, "phase_deg": phase}],
-    }
-    nyquist = {
-        "loop": "current",
-        "frequency_hz": f[near],
-        "real": response.real[near],
-        "imag": response.imag[near],
-    }
+    bode = Chart(width=430.0, height=410.0, loop="current")
+    top, bottom = bode.column(1.15, 1.0)
+    both([("open loop", Curve(w, response, phase))], None, top, bottom, span=100.0)
+    nyquist = Chart(width=430.0, height=430.0, loop="current")
+    panel = nyquist.panel()
+    panel.equal = panel.by_point = True
+    panel.curve(response.real[near], response.imag[near], "L", parameter=f[near])
+    panel.x.limits(-2.6, 1.25)
+    panel.y.limits(-1.6, 1.6)
+    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     t = np.linspace(0.0, 2.0, 41)
-    series = [{"label": "parabola", "x": t, "y": t**2}, {"label": HOSTILE, "x": t, "y": 3.0 - t}]
-    curves = {"series": series, "x_label": "time, s", "y_label": "angle, deg"}
+    curves = Chart(width=900.0, height=320.0)
+    panel = curves.panel()
+    panel.curve(t, t**2, "parabola", **style.series(0))
+    panel.curve(t, 3.0 - t, HOSTILE, **style.series(1))
+    panel.x.label, panel.y.label = "time, s", "angle, deg"
     rows = [{"_loop": "current", "_hz": CROSSOVER_HZ, "what": "gain crossover"}]
     blocks = [
         doc.table("Crossings", [doc.column("what", "Crossing")], rows),

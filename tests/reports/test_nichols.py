@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from reports.figures import nichols, style
-from reports.figures.nichols import Data
+from reports.charts import style
+from reports.sections.loop_charts import nichols
 
 
 def chart(phase_deg: list[float], gain_db: list[float]) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
-    data: Data = {"frequency_hz": [1.0, 10.0], "magnitude_db": gain_db, "phase_deg": phase_deg}
-    panel = nichols.draw(data).columns[0].panels[0]
+    made = nichols(np.array([1.0, 10.0]), np.array(gain_db), np.array(phase_deg))
+    panel = made.columns[0].panels[0]
     curves: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"S": [], "T": [], "+": []}
     for item in panel.items:
         if getattr(item, "x", None) is not None:

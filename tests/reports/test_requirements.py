@@ -10,10 +10,10 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.design import with_values
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
 from analyses.drive_figures import drive_figures
-from analyses.requirements import all_pass, evaluate_requirements
+from analyses.requirements import evaluate_requirements, tally
 
 
 def with_requirement(design: Design, **keys: Any) -> Design:
@@ -28,7 +28,7 @@ def amber() -> Design:
 
 def test_every_shipped_requirement_is_met_with_its_distance(amber: Design) -> None:
     verdicts = evaluate_requirements(amber)
-    assert all_pass(verdicts)
+    assert tally(verdicts).passes
     by_id = {verdict.id: verdict for verdict in verdicts}
     assert len(by_id) == len(verdicts) == 12
     margins = stability_margins(assemble_loops(amber).velocity.open_loop)
@@ -40,30 +40,30 @@ def test_every_shipped_requirement_is_met_with_its_distance(amber: Design) -> No
 def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
     wanted = with_requirement(amber, quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
     (verdict,) = evaluate_requirements(wanted)
-    assert verdict.passed is False
+    assert verdict.verdict == "not met"
     assert verdict.distance == pytest.approx(verdict.value - 30.0)
-    assert not all_pass((verdict,))
+    assert tally((verdict,)).verdict == "not met"
 
 
 def test_a_maximum_counts_the_other_way(amber: Design) -> None:
     wanted = with_requirement(amber, quantity="overshoot", unit="%", maximum=5.0, loop="velocity")
     (verdict,) = evaluate_requirements(wanted)
-    assert verdict.passed is False
+    assert verdict.verdict == "not met"
     assert verdict.distance == pytest.approx(5.0 - verdict.value)
 
 
 def test_exactly_at_the_limit_is_met(amber: Design) -> None:
     value = stability_margins(assemble_loops(amber).position.open_loop).phase_margin_deg
     wanted = with_requirement(amber, quantity="phase_margin", unit="deg", minimum=value, loop="position")
-    assert evaluate_requirements(wanted)[0].passed is True
+    assert evaluate_requirements(wanted)[0].verdict == "met"
 
 
 def test_an_unstable_loop_meets_nothing(amber: Design) -> None:
     broken = with_values(amber, {"control.velocity.gain": 5.0})
     wanted = with_requirement(broken, quantity="overshoot", unit="%", maximum=1e9, loop="every")
     verdicts = {verdict.loop: verdict for verdict in evaluate_requirements(wanted)}
-    assert verdicts["current"].passed is True
-    assert verdicts["velocity"].passed is False
+    assert verdicts["current"].verdict == "met"
+    assert verdicts["velocity"].verdict == "not met"
     assert "unstable" in verdicts["velocity"].reason
 
 
@@ -75,13 +75,26 @@ def test_a_lower_gain_margin_counts_by_its_size() -> None:
     )
 
 
-def test_a_loop_that_the_design_lacks_is_not_judged() -> None:
+def test_a_loop_that_the_design_lacks_is_not_proven() -> None:
     design = load_design("ctms-motor-position")
     wanted = with_requirement(design, quantity="gain_margin", unit="dB", minimum=6.0, loop="current")
     (verdict,) = evaluate_requirements(wanted)
-    assert verdict.passed is None
+    assert verdict.verdict == "not proven"
     assert verdict.reason == "the design has no current loop"
-    assert all_pass((verdict,))
+    assert not tally((verdict,)).passes
+
+
+def test_a_waiver_makes_what_is_not_proven_grey_and_nothing_else(amber: Design) -> None:
+    design = load_design("ctms-motor-position")
+    waiver = Waiver(requirement="r", reason="the voltage drive has none", date="2026-11-22")
+    lacking = with_requirement(design, quantity="gain_margin", unit="dB", minimum=6.0, loop="current")
+    (verdict,) = evaluate_requirements(replace(lacking, waivers=(waiver,)))
+    assert (verdict.verdict, verdict.role, verdict.passes) == ("not proven", "info", True)
+    assert verdict.waiver.words == "waived 2026-11-22: the voltage drive has none"
+    assert tally((verdict,)).words("requirements") == "0 of 1 requirements met, 1 waived"
+    wanted = with_requirement(amber, quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
+    (missed,) = evaluate_requirements(replace(wanted, waivers=(waiver,)))
+    assert (missed.verdict, missed.waiver, missed.passes) == ("not met", None, False)
 
 
 @pytest.mark.parametrize(

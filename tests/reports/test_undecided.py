@@ -25,4 +25,4 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(
     monkeypatch.setattr(loop_figures, "all_loop_figures", undecided)
     assert main(["margins", "ilr33-amber"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("UNDECIDED  ilr33-amber: stability not known: Current loop.")
+    assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")

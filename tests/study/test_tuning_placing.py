@@ -93,7 +93,7 @@ def test_a_requirement_that_only_a_notch_meets():
     notch = tuned.design.controller.velocity.filters[-1]
     assert notch.kind == "notch"
     assert notch.frequency_rad_s / (2 * np.pi) == pytest.approx(700.0, rel=0.3)
-    assert all(v.passed for v in tuned.confirmed)
+    assert all(v.verdict == "met" for v in tuned.confirmed)
 
 
 def test_no_smaller_change_of_two_gains_meets_the_requirements():

@@ -188,7 +188,7 @@ def test_best_and_worst_are_marked_in_the_right_direction(compared):
 
 
 def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
-    assert [v.id for v in compared.variants[3].verdicts if v.passed is False] == ["output-rate"]
+    assert [v.id for v in compared.variants[3].verdicts if v.verdict == "not met"] == ["output-rate"]
 
 
 def test_requirements_are_rows_and_designs_are_columns(compared):
@@ -203,8 +203,8 @@ def test_requirements_are_rows_and_designs_are_columns(compared):
     rate = next(row for row in table["rows"] if row["what"].startswith("Drive: output rate"))
     assert [rate[f"d{k}"]["status"] for k in range(5)] == ["pass"] * 4 + ["fail"]
     count = 5 * len(compared.base.verdicts)
-    wanted = f"1 of {count} verdicts fails: slower gear, Drive: output rate at 8 N m."
-    assert made["verdicts"]["result"] == wanted
+    wanted = f"{count - 1} of {count} requirements met, 1 not met, over 5 designs. "
+    assert made["verdicts"]["result"] == f"{wanted}Not met: slower gear, Drive: output rate at 8 N m."
 
 
 def test_more_designs_than_fit_a_screen_make_more_tables_each_with_the_base(compared):

@@ -16,7 +16,7 @@ from analyses.duty import Asked, duty
 from analyses.duty.run import heating
 from nonlinear import Drive
 from reports.cli.main import main
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections.duty import section
 
 HOT = {
@@ -112,7 +112,7 @@ def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
 def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
     made = section(duty(with_overrides(load_design("fin"), HOT)))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
-    assert "Winding" in draw_svg("duty", figure["data"], page=False)
+    assert "Winding" in draw_svg(figure, page=False)
     assert main(["duty", "joint", "--amplitude", "10 deg", "--load", "20", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["rms_A"] < told["continuous_A"] == 6.0

@@ -20,7 +20,7 @@ from analyses.failures.cases import _followed_most_hz, cases_of
 from analyses.failures.rig import Rig
 from nonlinear import commands, simulate
 from reports.cli.main import main
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections.failures import section
 from tests.loops.two_mass import drive_d
 
@@ -135,7 +135,7 @@ def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
     result = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
     made = section(result)
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
-    assert "Lost sensor" in draw_svg("failures", figure["data"], page=False)
+    assert "Lost sensor" in draw_svg(figure, page=False)
     assert "until it is detected" in made["result"]
     assert main(["failures", "fin", "--stop", "25 deg", "--load", "4", "--duration", "0.2", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

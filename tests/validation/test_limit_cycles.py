@@ -91,10 +91,10 @@ def test_a_drive_with_too_much_gain_hunts_and_says_so(capsys: pytest.CaptureFixt
     changes = ["--set", "control.position.gain=300 1/s"]
     assert main(["cycles", "fin", *changes, "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
-    assert any(one["hunting"] for one in told["steps"])
-    border = next(one for one in told["foreseen"] if one["with_friction"])
-    assert not border["attracting"]
-    assert border["simulated_amplitude"] == pytest.approx(border["amplitude"], rel=0.15)
+    assert any(one["settling"]["hunting"] for one in told["rests"])
+    border = next(one for one in told["confirmations"] if one["cycle"]["with_friction"])
+    assert not border["cycle"]["stable"]
+    assert border["ratio"] == pytest.approx(1.0, rel=0.15)
 
 
 def test_section_and_refusal() -> None:

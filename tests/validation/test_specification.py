@@ -20,7 +20,7 @@ from analyses.specification.plane import torque_speed_plane
 from nonlinear import commands, simulate
 from nonlinear.on_the_bench import on_the_bench
 from reports import document as doc
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section
 from reports.sections import large_signal as large_section
 from reports.sections import specification as specification_section
@@ -112,12 +112,12 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
     ]
     made = doc.document(title="t", subtitle="", design={}, provenance={}, sections=sections)
     again = doc.loads(doc.dumps(made))
-    assert again["verdict"]["failed"] == 0
+    assert again["verdict"]["verdict"] != "not met"
     names = [block["figure"] for block in doc.figures(again)]
     assert {"map", "amplitude_bode", "torque_speed"} <= set(names)
     assert ("sawtooth" in names) == name.startswith("ilr33")
     for block in doc.figures(again):
-        svg = draw_svg(block["figure"], block["data"], page=False)
+        svg = draw_svg(block, page=False)
         assert svg.startswith("<svg")
         assert "nan" not in svg.lower().replace("nano", "")
 

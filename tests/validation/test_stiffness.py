@@ -21,7 +21,7 @@ from analyses.stiffness import (
     stiffness_curves,
 )
 from reports.cli.main import main
-from reports.figures.registry import draw_svg
+from reports.drawing import draw_svg
 from reports.sections.stiffness import section
 from tests.loops.two_mass import drive_d, drive_e
 
@@ -82,9 +82,9 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
     result = stiffness(load_design(name))
     assert len(result.checks) == 3
     assert max(check.difference for check in result.checks) < 1e-6
-    assert result.agrees
+    assert result.passed
     wrong = replace(result.checks[0], foreseen_Nm_rad=1.00001 * result.checks[0].foreseen_Nm_rad)
-    assert not replace(result, checks=(wrong,)).agrees
+    assert not replace(result, checks=(wrong,)).passed
 
 
 @pytest.mark.parametrize("play", [0.0, 2e-4, 3e-3])
@@ -122,14 +122,14 @@ def test_at_rest_dry_friction_holds_a_small_moment() -> None:
 def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["stiffness", "fin", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["agrees"] is True
+    assert told["passed"] is True
     assert [curve["state"] for curve in told["curves"]] == ["powered", "shorted", "open"]
-    assert told["lost_motion"]["play"] == 1.5e-3
+    assert told["lost_motion"]["play_rad"] == 1.5e-3
     assert main(["stiffness"]) == 0
-    assert "static inf" in capsys.readouterr().out
+    assert "infinite" in capsys.readouterr().out
     part = section(stiffness(load_design("fin")))
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
-    assert "<svg" in draw_svg("stiffness", figure["data"], page=False)
+    assert "<svg" in draw_svg(figure, page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
 
 
@@ -157,4 +157,4 @@ def test_a_slow_tick_ends_the_curve_below_nyquist() -> None:
     assert abs(open_winding.stiffness_Nm_rad[0]) == pytest.approx(inertia * w**2, rel=1e-3)
     made = section(stiffness(design))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
-    assert "unpowered" in draw_svg("stiffness", figure["data"], page=False)
+    assert "unpowered" in draw_svg(figure, page=False)

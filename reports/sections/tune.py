@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_lti.atomic import write_text
+from actuator_lti.design import write_design
 from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Section, VerdictItem
 
 if TYPE_CHECKING:
     from analyses.tuning import BindingRequirement, TuningResult
-    from reports.figures import trade_off as trade_off_figure
 
 GAIN_COLUMNS = [
     doc.column("path", "Gain"),
@@ -66,6 +70,14 @@ def section(result: TuningResult) -> Section:
     return doc.section(
         "tuning", title, blocks, result=summary(result), status="pass" if result.feasible else "fail"
     )
+
+
+def write(result: TuningResult, folder: Path | None) -> list[str]:
+    """Write the tuned design into the folder."""
+    if folder is None:
+        return []
+    write_text(folder / "tuned.toml", write_design(result.design))
+    return [str(folder / "tuned.toml")]
 
 
 def summary(result: TuningResult) -> str:
@@ -148,7 +160,7 @@ def confirmed(result: TuningResult) -> Block:
         {
             "label": v.id, "value": v.value, "unit": "" if v.requirement.unit == "1" else v.requirement.unit,
             "limit": v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum,
-            "met": v.passed is True, "_status": "pass" if v.passed is True else "fail",
+            "met": v.verdict == "met", "_status": v.role,
         }
         for v in result.confirmed
     ]  # fmt: skip
@@ -164,18 +176,29 @@ def _curve(result: TuningResult) -> Block:
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
     margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
-    data: trade_off_figure.Data = {
-        "title": "What the position loop can trade",
-        "points": [
-            {"bandwidth_hz": p.bandwidth_hz, "phase_margin_deg": p.phase_margin_deg, "feasible": p.feasible}
-            for p in result.trade_off
-        ],
-        "bandwidth_min_hz": next(iter(width), None),
-        "phase_margin_min_deg": max(margin, default=None),
-        "chosen": None,
-    }
+    chart = Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
+    panel = chart.panel()
+    x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
+    panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
+    for ok, marker, colour, label in (
+        (True, "o", style.GREEN, "all other requirements met"),
+        (False, "x", style.RED, "another requirement fails"),
+    ):
+        chosen = [(a, b) for a, b, p in zip(x, y, result.trade_off, strict=True) if p.feasible is ok]
+        if chosen:
+            xs, ys = zip(*chosen, strict=True)
+            panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
+    required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1}
+    if width and width[0] is not None:
+        panel.x.see([width[0]])
+        panel.rule_x(width[0], label="required", **required)
+    if margin:
+        panel.y.see([max(margin)])
+        panel.rule_y(max(margin), label="required", **required)
+    panel.x.label = "bandwidth of the position loop, Hz"
+    panel.y.label = "smallest phase margin of all loops, deg"
     return doc.figure(
-        "trade_off", data,
+        "trade_off", chart,
         caption="Position bandwidth against the phase margin that every loop keeps at its worst corner.",
         alt=f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth.",
     )  # fmt: skip

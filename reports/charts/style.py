@@ -65,7 +65,9 @@ def known(values: Iterable[float | None]) -> list[float]:
     return [value for value in values if value is not None and math.isfinite(value)]
 
 
-def frequency(panel: Panel, ends: Sequence[float] | None = None, label: str = "frequency, Hz") -> None:
+def frequency(
+    panel: Panel, ends: Sequence[float] | np.ndarray | None = None, label: str = "frequency, Hz"
+) -> None:
     """Make x a logarithmic frequency."""
     panel.x.log, panel.x.label = True, label
     if ends is not None:

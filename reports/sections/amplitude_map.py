@@ -1,16 +1,19 @@
-"""Amplitude over frequency: which limit acts, what the output looks like, and the linear onset lines."""
+"""The map of amplitude over frequency: which limit acts, what the output looks like, where each sets in."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.drive.signals import LIMITERS
-from reports.figures import style
-from reports.figures.style import Chart, Panel, Values
+from reports.charts import style
+from reports.charts.style import Chart, Panel
+
+if TYPE_CHECKING:
+    from analyses.large_signal import LargeSignals
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
@@ -31,65 +34,28 @@ GLYPHS: dict[str, style.Style] = {
 EVERY = 2  # a glyph in every second column
 
 
-class Onset(TypedDict):
-    """Where a limit is first reached, linear loop."""
-
-    name: str
-    label: str
-    amplitude: Values
-
-
-class Points(TypedDict):
-    """Points of their own."""
-
-    frequency_hz: Values
-    amplitude: Values
-    label: str
-
-
-class Mark(TypedDict):
-    """A level of amplitude."""
-
-    amplitude: float
-    label: str
-
-
-class Data(TypedDict):
-    """Indices of causes and waveforms, one row an amplitude."""
-
-    frequency_hz: list[float]
-    amplitude: list[float]
-    unit: str
-    causes: list[str]
-    waveforms: list[str]
-    cause: list[list[int]]
-    waveform: list[list[int]]
-    onset: list[Onset]
-    points: list[Points]
-    marks: list[Mark]
-
-
-def draw(data: Data) -> Chart:
+def chart(result: LargeSignals, scale: float, unit: str) -> Chart:
     """Draw regions, glyphs and lines."""
-    chart = Chart(
+    from analyses.large_signal.classify import CAUSES, WAVEFORMS
+
+    made = Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
     )
-    panel = chart.panel()
-    x, y = np.array(data["frequency_hz"]), np.array(data["amplitude"])
+    panel, shown = made.panel(), result.map
+    x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)
     panel.x.log = panel.y.log = True
     panel.x.limits(xe[0], xe[-1])
     panel.y.limits(ye[0], ye[-1])
     panel.x.grid = panel.y.grid = False
-    panel.x.label, panel.y.label = "command frequency, Hz", f"command amplitude, {data['unit']}"
-    cause, waveform = np.array(data["cause"]), np.array(data["waveform"])
-    _regions(panel, data["causes"], cause, xe, ye)
-    _glyphs(panel, data["waveforms"], waveform, x, y)
-    _lines(panel, data)
-    for mark in data["marks"]:
-        panel.rule_y(mark["amplitude"], mark["label"], dash=4, width=0.8)
-    _names(panel, data["causes"], cause, x, y)
-    return chart
+    panel.x.label, panel.y.label = "command frequency, Hz", f"command amplitude, {unit}"
+    _regions(panel, CAUSES, shown.cause, xe, ye)
+    _glyphs(panel, WAVEFORMS, shown.waveform, x, y)
+    _lines(panel, result, scale)
+    full = scale * result.design.validation.full_deflection_rad
+    panel.rule_y(full, "full\ndeflection", dash=4, width=0.8)
+    _names(panel, CAUSES, shown.cause, x, y)
+    return made
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
@@ -106,7 +72,7 @@ def _runs(row: np.ndarray) -> Iterator[tuple[int, int, int]]:
         yield int(row[a]), a, b
 
 
-def _regions(panel: Panel, names: list[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
+def _regions(panel: Panel, names: Sequence[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
     """Fill the points of each cause."""
     boxes: dict[str, list[Any]] = {}
     for k, row in enumerate(cause):
@@ -118,7 +84,7 @@ def _regions(panel: Panel, names: list[str], cause: np.ndarray, xe: np.ndarray, 
             panel.shape(rings, colour=COLOURS[name], opacity=0.28)
 
 
-def _glyphs(panel: Panel, names: list[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+def _glyphs(panel: Panel, names: Sequence[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
     """Mark the waveform in every second column; a sine has no mark."""
     shown = np.zeros_like(waveform, dtype=bool)
     shown[:, ::EVERY] = True
@@ -130,17 +96,22 @@ def _glyphs(panel: Panel, names: list[str], waveform: np.ndarray, x: np.ndarray,
             panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
 
 
-def _lines(panel: Panel, data: Data) -> None:
+def _lines(panel: Panel, result: LargeSignals, scale: float) -> None:
     """Draw A_k(w) of every limiter, and the amplitudes at which the simulator first limits."""
-    for line in data["onset"]:
-        look: style.Style = {"colour": COLOURS[line["name"]], "dash": LINES[line["name"]], "width": 2.3}
-        panel.curve(data["frequency_hz"], line["amplitude"], line["label"], **look)
-    for k, points in enumerate(data["points"]):
+    for name, values in result.map.onset_rad.items():
+        values = scale * np.asarray(values)
+        if np.isfinite(values).any():
+            look: style.Style = {"colour": COLOURS[name], "dash": LINES[name], "width": 2.3}
+            limited = np.where(np.isfinite(values), values, np.nan)
+            panel.curve(result.map.frequency_hz, limited, LIMITERS[name].words, **look)
+    found = (("friction off", result.border), ("friction on", result.border_with_friction))
+    there = [(words, one) for words, one in found if one is not None and np.isfinite(one.simulated_rad).any()]
+    for k, (words, one) in enumerate(there):
         look = {"colour": style.INK, "marker": "Dv"[k % 2], "size": 7.0, "hollow": True}
-        panel.points(points["frequency_hz"], points["amplitude"], points["label"], **look)
+        panel.points(one.frequency_hz, scale * one.simulated_rad, f"simulated, {words}", **look)
 
 
-def _names(panel: Panel, names: list[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+def _names(panel: Panel, names: Sequence[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
     """Write the name of each region into its middle."""
     for k, name in enumerate(names):
         mask = cause == k

@@ -1,0 +1,49 @@
+"""What is asked of the corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import TYPE_CHECKING, Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import Option, given
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Where the corners lie; the viscous factor is on motor and load (grease in the cold)."""
+
+    hot_degC: Annotated[
+        float, Option(words="Winding and magnets when hot; the winding's limit, or 120.", metavar="DEGC")
+    ]
+    cold_degC: Annotated[float, Option(words="Winding and magnets when cold; -40.", metavar="DEGC")]
+    supply_V: Annotated[float, Option(words="The low supply; 0.8 of limits.voltage.", metavar="V")]
+    cold_viscous: Annotated[
+        float, Option(words="Factor on viscous friction in the cold; 1.", metavar="FACTOR")
+    ] = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no corner."""
+        if not -273.15 < self.cold_degC < self.hot_degC < 1000.0:
+            raise InputError(f"cold {self.cold_degC:g}, hot {self.hot_degC:g} degC: allowed: cold below hot")
+        if not 0.0 < self.supply_V < inf:
+            raise InputError(f"low supply {self.supply_V:g} V: must be positive")
+        if not 1.0 <= self.cold_viscous <= 1e3:
+            raise InputError(f"cold viscous factor {self.cold_viscous:g}: allowed: 1 to 1000")
+
+    @classmethod
+    def of(cls, design: Design, **chosen: float | None) -> Asked:
+        """What is chosen; else the winding's own limit (or 120 degC), -40 degC, and 0.8 of the supply."""
+        limit = design.temperature.winding_limit_degC if design.temperature else HOT_DEGC
+        usual = {
+            "hot_degC": limit if isfinite(limit) else HOT_DEGC,
+            "cold_degC": COLD_DEGC,
+            "supply_V": SUPPLY_SHARE * design.limits.voltage_V,
+        }
+        return cls(**given(usual, chosen))

@@ -1,0 +1,70 @@
+"""What is asked of the failure cases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import TYPE_CHECKING, Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import Option, given
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+NEAR_SHARE = 0.1  # of the full deflection: the deflection asked for where none is stated
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Deflections and times at which the failure cases are judged; the run of a case ends at the stop."""
+
+    stop_rad: Annotated[
+        float,
+        Option(
+            words='Mechanical stop, such as "25 deg"; the full deflection.', metavar="ANGLE", kind="output"
+        ),
+    ]
+    deflection_rad: Annotated[
+        float,
+        Option(
+            words='Deflection to which times are given, such as "2 deg"; stop/10.',
+            metavar="ANGLE", kind="output",
+        ),
+    ]  # fmt: skip
+    detection_s: Annotated[
+        float, Option(words="Seconds from the failure to its detection; 0.1.", metavar="S")
+    ] = 0.1
+    watched_s: Annotated[
+        float, Option(words="How long each failure is followed; 1.", metavar="S", flag="duration")
+    ] = 1.0
+    load_Nm: Annotated[
+        float,
+        Option(
+            words='Moment that pushes the output forward from the start, such as "4 N*m"; none.',
+            metavar="LOAD", kind="load",
+        ),
+    ] = 0.0  # fmt: skip
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be answered."""
+        for name in ("stop_rad", "deflection_rad", "detection_s", "watched_s"):
+            if not 0.0 < getattr(self, name) < inf:
+                raise InputError(f"{name} = {getattr(self, name)}: must be positive")
+        if self.deflection_rad > self.stop_rad:
+            raise InputError(
+                f"deflection {self.deflection_rad:g}: must not be beyond the stop, {self.stop_rad:g}"
+            )
+        if self.detection_s > self.watched_s:
+            raise InputError(
+                f"detection {self.detection_s:g} s: must not be after {self.watched_s:g} s, the end"
+            )
+        if not isfinite(self.load_Nm):
+            raise InputError(f"load {self.load_Nm}: must be finite")
+
+    @classmethod
+    def of(cls, design: Design, **chosen: float | None) -> Asked:
+        """What is chosen; the rest from [failure] of the design; else its full deflection is the stop."""
+        stated = vars(design.failure) if design.failure is not None else {}
+        made = given({"stop_rad": design.validation.full_deflection_rad}, stated, chosen)
+        return cls(**{"deflection_rad": NEAR_SHARE * made["stop_rad"], **made})

@@ -1,0 +1,94 @@
+"""What is asked of one motion: the command, the load, what is left out, what is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import Option
+
+KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
+PERIODIC = ("sine", "triangle", "stepped-sine")
+USUAL_CYCLES = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """A motion; amplitude and bias in the unit of the command of the outermost loop."""
+
+    command: Annotated[str | None, Option(words=f"One of {KINDS}; default step.", metavar="KIND")] = None
+    amplitude: Annotated[
+        float,
+        Option(
+            words="Peak, for the outermost loop: deg at the output (mm on a linear axis), deg/s (mm/s) of a "
+            "speed drive, A, V; a ramp: per second; 1."
+        ),
+    ] = 1.0
+    frequency: Annotated[
+        float, Option(words="Frequency; the first of a chirp or a set; 1.", metavar="HZ")
+    ] = 1.0
+    to: Annotated[
+        float | None, Option(words="Last frequency of a chirp or set; ten times the first.", metavar="HZ")
+    ] = None
+    count: Annotated[int, Option(words="Number of frequencies of a stepped or multisine; 10.")] = 10
+    cycles: Annotated[
+        int | None, Option(words="Periods played of a sine or triangle, or of each of a stepped sine (5).")
+    ] = None
+    seed: Annotated[int, Option(words="Seed of the phases of a multisine; 0.")] = 0
+    start: Annotated[float, Option(words="Time at which the command begins; 0.", metavar="S")] = 0.0
+    duration: Annotated[
+        float | None, Option(words="Duration; 1, or that of a stepped sine or a record.", metavar="S")
+    ] = None
+    bias_rate: Annotated[
+        float, Option(words="Ramp added underneath: the amplitude's unit per second; 0.")
+    ] = 0.0
+    load: Annotated[
+        float,
+        Option(
+            words='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
+            metavar="LOAD", kind="load",
+        ),
+    ] = 0.0  # fmt: skip
+    load_slope: Annotated[
+        float,
+        Option(words="Load torque per rad of output angle, added to the design's; 0.", metavar="N_m/rad"),
+    ] = 0.0
+    load_file: Annotated[
+        Path | None,
+        Option(words="Load torque over time: s (of the run, or the record's), N m.", metavar="CSV"),
+    ] = None
+    record: Annotated[
+        Path | None, Option(words="Recorded command: s, and the amplitude's unit.", metavar="CSV")
+    ] = None
+    held: Annotated[
+        bool, Option(words="The record is a log of changes: each value holds until the next.")
+    ] = False
+    csv: Annotated[Path | None, Option(words="Write every row as CSV.", metavar="FILE")] = None
+    parquet: Annotated[Path | None, Option(words="Write Parquet.", metavar="FILE")] = None
+    plot: Annotated[Path | None, Option(words="Write a plot as SVG.", metavar="SVG")] = None
+    every: Annotated[int, Option(words="Keep every N-th tick; 1.", metavar="N")] = 1
+    no_friction: Annotated[bool, Option(words="Leave the dry friction out.")] = False
+    no_limits: Annotated[bool, Option(words="Leave all limits out.")] = False
+    energy: Annotated[bool, Option(words="Say where the electrical energy went.")] = False
+
+    def __post_init__(self) -> None:
+        """Refuse options that contradict each other."""
+        if self.record is not None and self.command not in (None, "recorded"):
+            raise InputError(f"--record and --command {self.command}: one of them; a record is a command")
+        if self.held and self.record is None:
+            raise InputError("--held: needs --record CSV")
+        if self.command == "recorded" and self.record is None:
+            raise InputError("--command recorded: needs --record CSV")
+        if self.start < 0.0 or not self.start < float("inf"):
+            raise InputError(f"--start {self.start:g}: must be 0 or later")
+        if self.cycles is not None and self.command not in PERIODIC:
+            raise InputError(f"--cycles {self.cycles}: allowed with --command {', '.join(PERIODIC)}")
+        if self.cycles is not None and self.cycles < 1:
+            raise InputError(f"--cycles {self.cycles}: must be at least 1")
+
+    @property
+    def files(self) -> list[str]:
+        """What is written."""
+        return [str(path) for path in (self.csv, self.parquet, self.plot) if path is not None]

@@ -1,0 +1,142 @@
+"""Command and load of one motion, and the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from actuator_lti.bounds import TONES
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
+from nonlinear import Trajectory, commands, loads, simulate
+from nonlinear.commands import Command
+from nonlinear.loads import LoadMoment
+from nonlinear.records import read_columns
+from nonlinear.trajectory import COMMAND_UNITS
+
+USUAL_S = 1.0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion that was asked for, and its rows."""
+
+    design: Design
+    asked: Asked
+    run: Trajectory
+
+
+def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None) -> Motion:
+    """Simulate one motion, and write its rows where that is asked for.
+
+    Raises
+    ------
+    InputError
+        For a command that does not fit the run, or a load that would not act in it.
+    """
+    unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
+    duration = _played_s(asked)
+    command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
+    seconds = _run_s(command, duration)
+    if asked.start >= seconds > 0.0 and asked.start > 0.0:
+        raise InputError(
+            f"--start {asked.start:g}: the run ends at {seconds:g} s; allowed: less, or --duration"
+        )
+    run = simulate(
+        design,
+        command,
+        seconds,
+        _load(asked, seconds),
+        bias=commands.ramp(asked.bias_rate / per_SI) if asked.bias_rate else None,
+        friction_on=not asked.no_friction,
+        limits_on=not asked.no_limits,
+        energy=asked.energy,
+        record_every=asked.every,
+        progress=progress,
+    )
+    if asked.csv is not None:
+        run.to_csv(asked.csv)
+    if asked.parquet is not None:
+        run.to_parquet(asked.parquet)
+    return Motion(design, asked, run)
+
+
+def _played_s(asked: Asked) -> float | None:
+    """Duration that plays so many periods, else the one given; that of a stepped sine is its own."""
+    if asked.cycles is None or asked.command == "stepped-sine" or asked.frequency <= 0.0:
+        return asked.duration
+    needed = asked.start + asked.cycles / asked.frequency
+    if asked.duration is not None and abs(asked.duration - needed) > 1e-9 * needed:
+        raise InputError(
+            f"--cycles {asked.cycles}, --duration {asked.duration:g}: {asked.cycles} periods take"
+            f" {needed:g} s; allowed: one of the two options"
+        )
+    return needed
+
+
+def _run_s(command: Command, wanted_s: float | None) -> float:
+    """Duration of the run: what is wanted, else that of the command where it has one."""
+    tabled = command.kind in ("stepped_sine", "recorded", "sampled")
+    if wanted_s is None:
+        return command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
+    if command.kind == "stepped_sine" and 0.0 < wanted_s < command.end_s * (1.0 - 1e-9):
+        raise InputError(
+            f"--duration {wanted_s:g}: the stepped sine takes {command.end_s:.6g} s;"
+            " allowed: that or more, or fewer --count or --cycles"
+        )
+    return wanted_s
+
+
+def _command(design: Design, asked: Asked, duration: float, unit: str, scale: float) -> Command:
+    """The command; ``scale`` is the unit of its amplitude in SI."""
+    peak, start, frequency, count = asked.amplitude * scale, asked.start, asked.frequency, asked.count
+    period, kind = design.controller.period_s, asked.command or "step"
+    last = asked.to if asked.to is not None else 10.0 * frequency
+    if asked.record is not None:
+        return commands.recorded(asked.record, unit=unit, held=asked.held).later(start)
+    if kind == "hold" and start > 0.0:
+        raise InputError(f"--start {start:g}: a hold is there from the first tick on; use --command step")
+    if kind in ("stepped-sine", "multisine"):
+        if count < 1 or frequency <= 0.0 or last <= 0.0:
+            raise InputError(f"--count {count}, --frequency {frequency:g}, --to {last:g}: must be positive")
+        TONES.check(count)
+        grid = np.geomspace(frequency, last, count).tolist()
+        if kind == "stepped-sine":
+            cycles = USUAL_CYCLES if asked.cycles is None else asked.cycles
+            return commands.stepped_sine(peak, grid, cycles, period, settle_cycles=0).later(start)
+        return commands.multisine(peak, grid, duration - start, period, seed=asked.seed).later(start)
+    simple = {
+        "hold": lambda: commands.hold(peak),
+        "step": lambda: commands.step(peak, start),
+        "ramp": lambda: commands.ramp(peak, start),
+        "sine": lambda: commands.sine(peak, frequency, start_s=start),
+        "triangle": lambda: commands.triangle(peak, frequency, start),
+        "chirp": lambda: commands.chirp(peak, frequency, last, duration - start, start_s=start),
+    }
+    if kind not in simple:
+        raise InputError(f"--command {kind}: must be one of {KINDS}")
+    return simple[kind]()
+
+
+def _load(asked: Asked, duration: float) -> LoadMoment:
+    """The load; its file is on the clock of the record, whose first row is put at the start."""
+    moment = loads.proportional(asked.load_slope, asked.load)
+    if asked.load_file is None:
+        return moment
+    times, values = read_columns(asked.load_file, (0, 1))
+    shift = asked.start - _begins_s(asked.record)
+    if not (times[0] + shift < duration and times[-1] + shift >= 0.0):
+        span = f"its rows are from {times[0]:g} to {times[-1]:g} s, the run from {0.0 - shift:g}"
+        clock = " on the record's clock" if shift else ""
+        raise InputError(f"{span} to {duration - shift:g} s{clock}: no load would act", str(asked.load_file))
+    series = loads.series(times + shift, values, where=str(asked.load_file)).series
+    return replace(moment, series=series)
+
+
+def _begins_s(record: Path | None) -> float:
+    """The first time of a recorded command: where the run's clock has its zero."""
+    return 0.0 if record is None else float(read_columns(record, (0,))[0][0])

@@ -1,0 +1,64 @@
+"""How a request of an analysis is asked for: each field says it beside itself, in ``Annotated``.
+
+The command line, its help and the list of commands are loops over these fields. The flag is the field's name
+without its unit; the default that of the dataclass, or of ``Request.of(design, ...)``, which sees the design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+
+Kind = Literal["plain", "output", "load"]
+UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """A field as an option of a command.
+
+    Attributes
+    ----------
+    words : str
+        What it is, and its default where the design gives it.
+    metavar : str
+        What stands for the value in the help.
+    flag : str
+        The option, without dashes; the field's name without its unit where empty.
+    kind : {"plain", "output", "load"}
+        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without.
+    """
+
+    words: str
+    metavar: str = ""
+    flag: str = ""
+    kind: Kind = "plain"
+
+
+def options(request: type) -> dict[str, tuple[Any, Option]]:
+    """Type and option of every field of a request, by field.
+
+    Examples
+    --------
+    >>> from analyses.duty.asked import Asked
+    >>> {name: option.flag or flag(name) for name, (_, option) in options(Asked).items()}["amplitude_rad"]
+    'amplitude'
+    """
+    result = {}
+    for name, hint in get_type_hints(request, include_extras=True).items():
+        if get_origin(hint) is Annotated:
+            kind, *more = get_args(hint)
+            result[name] = (kind, next(one for one in more if isinstance(one, Option)))
+    return result
+
+
+def flag(name: str) -> str:
+    """The flag of a field: its name without the unit."""
+    ending = next((unit for unit in UNITS if name.endswith(unit)), "")
+    return name.removesuffix(ending).replace("_", "-")
+
+
+def given(*layers: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by field, the later ones before the earlier ones; None is no value."""
+    return {name: value for layer in layers for name, value in layer.items() if value is not None}

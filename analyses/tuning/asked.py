@@ -1,0 +1,89 @@
+"""What is asked of tuning, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from analyses.request import Option
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design, Requirement
+
+Aim = Literal["least-change", "reserve"]
+
+
+@dataclass(frozen=True)
+class TuningSettings:
+    """What tuning is to do.
+
+    Attributes
+    ----------
+    requirements : tuple of Requirement
+        In place of those of the design on the same figure of the same loop.
+    rounded : bool
+        Round the gains to the steps of the motion controller's objects, where the drive is that controller.
+    curve, check : bool
+        Whether the trade-off curve and the nonlinear check are wanted.
+    aim : {"least-change", "reserve"}
+        The least change of the design that meets every requirement, or the largest common distance to all
+        (up to 30 % of each limit).
+    place : tuple of str
+        What may be added where gains alone do not meet the requirements: `ELEMENTS`.
+    """
+
+    requirements: tuple[Requirement, ...] = ()
+    rounded: bool = True
+    curve: bool = True
+    check: bool = True
+    aim: Aim = "least-change"
+    place: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Requirements and elements as texts; `of` reads them."""
+
+    require: Annotated[
+        list[str] | None,
+        Option(
+            words='In place of that of the design: "position.bandwidth>=30 Hz"; repeatable.',
+            metavar="LOOP.QUANTITY>=LIMIT",
+        ),
+    ] = None
+    aim: Annotated[
+        Aim,
+        Option(
+            words="The least change of the design that meets every requirement, or the largest distance to "
+            "all limits (up to 30 %); least-change."
+        ),
+    ] = "least-change"
+    place: Annotated[
+        list[str] | None,
+        Option(
+            words="What may be added where gains alone do not do: notch, lowpass, feedforward; "
+            "the fewest that do are kept.",
+            metavar="ELEMENT,...",
+        ),
+    ] = None
+    rounded: Annotated[
+        bool,
+        Option(words="Round to the steps of the motion controller's objects.", flag="round/--no-round"),
+    ] = True
+    curve: Annotated[bool, Option(words="Trade-off curve.", flag="curve/--no-curve")] = True
+
+    @classmethod
+    def of(cls, design: Design, **chosen: Any) -> TuningSettings:
+        """The settings of `analyses.tuning.tune`.
+
+        Raises
+        ------
+        InputError
+            For a requirement that cannot be read.
+        """
+        from analyses.tuning.asked_requirement import read_requirement
+
+        asked = cls(**chosen)
+        wanted = tuple(read_requirement(words, design) for words in asked.require or ())
+        elements = tuple(word.strip() for words in asked.place or () for word in words.split(","))
+        return TuningSettings(wanted, asked.rounded, asked.curve, aim=asked.aim, place=elements)

@@ -1,0 +1,191 @@
+"""Every analysis of a design, declared once: what it asks, what answers, which section shows the answer.
+
+Commands with their help, options and exit status, ``--json``, ``--out``, the report's ``--also`` and the page
+of commands are loops over `ANALYSES`. Nothing is imported before it is asked for but the requests.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.tree import Tree
+from analyses.corners.asked import Asked as CornersAsked
+from analyses.duty.asked import Asked as DutyAsked
+from analyses.failures.asked import Asked as FailuresAsked
+from analyses.motion.asked import Asked as MotionAsked
+from analyses.tuning.asked import Asked as TuningAsked
+
+if TYPE_CHECKING:
+    from actuator_lti.design import Design
+    from reports.document_schema import Section
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """A question to a design.
+
+    Attributes
+    ----------
+    name : str
+        Of the command and of the section's module in `reports.sections`, whose ``section(result)`` shows it.
+    group : str
+        Panel of the help in which the command stands.
+    words : str
+        The command's help; its first paragraph stands in the list.
+    request : type or None
+        Dataclass of what is asked, its fields annotated (`analyses.request`); None: nothing.
+    function : str
+        ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
+        result says ``passed``, that is the exit status.
+    also : bool
+        Whether a report has the section where it is asked for (``--also``).
+    doing : str
+        What the bar says while the function works, which then takes ``progress``.
+    out : str
+        Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
+    """
+
+    name: str
+    group: str
+    words: str
+    request: type | None = None
+    function: str = ""
+    also: bool = False
+    doing: str = ""
+    out: str = ""
+
+    def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
+        """What the function is given beside the design: nothing, or the request with what is chosen."""
+        if self.request is None:
+            return ()
+        made = getattr(self.request, "of", None)
+        values = {name: value for name, value in chosen.items() if value is not None}
+        return (made(design, **values) if made else self.request(**values),)
+
+    def run(self, design: Design, *asked: Any, **more: Any) -> Any:
+        """Ask."""
+        package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
+        return getattr(import_module(package), name)(design, *asked, **more)
+
+    def section(self, result: Any) -> Section:
+        """Show."""
+        made: Section = self._shown.section(result)
+        return made
+
+    def data(self, result: Any) -> Any:
+        """The result as plain data: what the section's module says (``data``), else by its names."""
+        from reports.as_json import as_json
+
+        return getattr(self._shown, "data", as_json)(result)
+
+    def write(self, result: Any, folder: Path | None) -> list[str]:
+        """Write what goes with the result (``write`` of the section's module); the files."""
+        written: list[str] = getattr(self._shown, "write", lambda _result, _folder: [])(result, folder)
+        return written
+
+    @property
+    def _shown(self) -> ModuleType:
+        return import_module(f"reports.sections.{self.name}")
+
+
+ANALYSES = (
+    Analysis(
+        name="stiffness",
+        group="Linear loops",
+        words="""
+        Dynamic and static stiffness and lost motion, checked by an injected moment.
+
+        The exit status is 1 where the simulator does not confirm the linear stiffness.
+        """,
+    ),
+    Analysis(
+        name="corners",
+        group="Linear loops",
+        also=True,
+        request=CornersAsked,
+        words="""
+        Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
+
+        Resistance and torque constant follow \\[temperature] of the design, or copper and NdFeB. The
+        exit status is 1 where a requirement is not met, or a loop not stable, at any corner.
+        """,
+    ),
+    Analysis(
+        name="simulate",
+        group="Nonlinear checks",
+        request=MotionAsked,
+        function="analyses.motion.motion",
+        doing="simulating",
+        words="""
+        Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.
+        """,
+    ),
+    Analysis(
+        name="failures",
+        group="Nonlinear checks",
+        also=True,
+        request=FailuresAsked,
+        words="""
+        Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
+
+        Prints for each failure the time to a stated deflection and to the mechanical stop, the
+        deflection until the failure is detected, the largest current and the largest moment in the
+        train. What is not given comes from \\[failure] of the design.
+        """,
+    ),
+    Analysis(
+        name="duty",
+        group="Nonlinear checks",
+        also=True,
+        request=DutyAsked,
+        words="""
+        Hold a duty cycle against continuous current, overload protection (I2t) and winding
+        temperature.
+
+        The duty is a sine under a load, for a share of the time; what is not given comes from
+        \\[duty]. The temperature needs thermal_resistance and thermal_time in \\[temperature], the
+        protection limits.peak_time. The exit status is 1 where the drive cannot do the duty for ever.
+        """,
+    ),
+    Analysis(
+        name="cycles",
+        group="Nonlinear checks",
+        also=True,
+        function="analyses.limit_cycles.limit_cycles",
+        words="""
+        Foresee limit cycles of play and of a quantised output sensor, and seek them in the simulator.
+
+        Each is foreseen by describing function in the exact sampled loop, then the simulator is
+        started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
+        waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+    Analysis(
+        name="tune",
+        group="Variants and history",
+        request=TuningAsked,
+        function="analyses.tuning.tune",
+        doing="tuning",
+        out="out/tune",
+        words="""
+        Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
+
+        By default the least change of the design. With --place also a notch, a low-pass, feed-forward
+        where gains alone do not do, as in
+
+        actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
+
+        The result is confirmed by certified margins, nominal and at each requirement's worst corner.
+
+        Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements
+        cannot be met.
+        """,
+    ),
+)
+BY_NAME = {one.name: one for one in ANALYSES}
+FURTHER = tuple(one.name for one in ANALYSES if one.also)
+"""Sections that a report has only where they are asked for, as they take their time."""

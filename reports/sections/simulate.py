@@ -1,0 +1,229 @@
+"""One motion: what happened in numbers, and its figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.atomic import write_text
+from actuator_lti.design.control import Stage
+from actuator_lti.tree import Tree
+from analyses.conduct import conduct
+from analyses.motion import Motion
+from nonlinear import Trajectory
+from nonlinear.trajectory import COMMAND_UNITS
+from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart, Panel
+from reports.charts.svg import paper_svg
+from reports.document_schema import Block, Row, Section, Status
+from reports.sections.thinning import kept_rows
+
+Signals = list[tuple[str, npt.NDArray[np.float64]]]
+LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
+
+
+def section(result: Motion) -> Section:
+    """Make the section from `analyses.motion.motion`."""
+    run, ended = result.run, conduct(result.run)
+    detail = f" ({ended.detail})" if ended.detail else ""
+    blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
+    figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
+    status: Status = "info" if ended.status == "ok" else "warn"
+    words = f"{run.time_s.size} rows, status {ended.status}{detail}"
+    return doc.section("simulate", "Motion", [figure, *blocks], result=words, status=status)
+
+
+def data(result: Motion) -> Tree:
+    """What happened in numbers, without the rows."""
+    return {**summary(result.run), "files": result.asked.files}
+
+
+def write(result: Motion, folder: Path | None) -> list[str]:
+    """Write the plot that is asked for; all files of the motion."""
+    if result.asked.plot is not None:
+        write_text(result.asked.plot, paper_svg(chart_of(result.run), "f"))
+    return result.asked.files
+
+
+def _table(run: Trajectory) -> Block:
+    """Largest and last values: outputs in the unit of the command line, motor speeds in rpm as well."""
+    unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
+    rows: list[Row] = []
+    for name, value in summary(run).items():
+        if name.startswith(("largest_command", "largest_error")):
+            rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
+        elif isinstance(value, float):
+            rows += _in_words(name, value)
+    events = f"stick-slip events (at most {run.events_per_tick} in one tick)"
+    rows.append({"what": events, "value": run.events, "unit": ""})
+    return doc.table("What happened", COLUMNS, rows)
+
+
+COLUMNS = [
+    doc.column("what", "What"),
+    doc.column("value", "Value", format="short:6"),
+    doc.column("unit", "Unit"),
+]
+UNITS = (
+    ("_rad_s", 1.0, "rad/s"), ("_m_s", 1.0, "m/s"), ("_rad", 180.0 / np.pi, "deg"), ("_m", 1e3, "mm"),
+    ("_A", 1.0, "A"), ("_V", 1.0, "V"), ("_s", 1.0, "s"),
+)  # fmt: skip
+
+
+def _in_words(name: str, value: float) -> list[Row]:
+    """A figure as people read it.
+
+    Examples
+    --------
+    >>> [row["unit"] for row in _in_words("largest_motor_speed_rad_s", 100.0)]
+    ['rad/s', 'rpm']
+    """
+    ending, factor, unit = next((one for one in UNITS if name.endswith(one[0])), ("", 1.0, ""))
+    what = name.removesuffix(ending).replace("_", " ")
+    more: list[Row] = [{"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}] if unit == "rad/s" else []
+    return [{"what": what, "value": value * factor, "unit": unit}, *more]
+
+
+def _limits(run: Trajectory) -> Block:
+    columns = [
+        doc.column("name", "Limit"),
+        doc.column("limit", "Value", format="short:6"),
+        doc.column("unit", "Unit"),
+        doc.column("share", "Acts, of the time", "%", format="short:3"),
+        doc.column("first", "First at", "s", format="short:6"),
+    ]
+    rows = [
+        {
+            "name": name,
+            "limit": use.limit if np.isfinite(use.limit) else "none",
+            "unit": use.unit if np.isfinite(use.limit) else "",
+            "share": 100.0 * use.fraction,
+            "first": use.first_time_s,
+        }
+        for name, use in run.limits.items()
+    ]
+    return doc.table("Limits", columns, rows)
+
+
+def _energy(run: Trajectory) -> Block:
+    assert run.energy is not None
+    values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
+    rows = [
+        {
+            "what": name.removesuffix("_J").replace("_", " "),
+            "value": value,
+            "unit": "J" if "_J" in name else "",
+        }
+        for name, value in values.items()
+    ]
+    return doc.table("Where the electrical energy went", COLUMNS, rows)
+
+
+def chart_of(run: Trajectory) -> Chart:
+    """Position, speed, current and voltage on one time axis, thinned with the peaks kept."""
+    linear = run.axis == "linear"
+    angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
+    command: dict[Stage, Signals] = {run.stage: [("command", run.reference_rad)]}
+    speed = [("speed", run.motor_speed_rad_s), *_scaled(command.get("velocity", []), run.ratio)]
+    if run.stage == "position" and run.speed_command_rad_s.any():
+        speed.append(("commanded", run.speed_command_rad_s))
+    current = [("current", run.current_A), *command.get("current", [])]
+    if run.stage in ("position", "velocity") and run.current_command_A.any():
+        current.append(("commanded", run.current_command_A))
+    position = _scaled([("output", run.output_angle_rad), *command.get("position", [])], angle)
+    parts: list[tuple[str, Signals, str]] = [
+        (f"output position, {unit}", position, ""),
+        (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, "speed"),
+        *([("motor current, A", current, "current")] if run.current_A.any() else []),
+        ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], "voltage"),
+    ]
+    rows = kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
+    chart = Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
+    panels = chart.column(*(1.0 for _ in parts))
+    scale = style.time_axis(panels[-1], float(run.time_s[rows][-1]))
+    time = run.time_s[rows] * scale
+    for panel, (label, signals, limiter) in zip(panels, parts, strict=True):
+        panel.y.label = label
+        for start, stop in spans(run.limit_active(limiter), run.time_s) if limiter else []:
+            panel.band_x(start * scale, stop * scale, f"{limiter} limit acts", colour=style.RED)
+        # the command lies under the response: drawn last in the list, first on the paper
+        for k, (name, values) in reversed(list(enumerate(signals))):
+            panel.curve(time, values[rows], name, width=2.0 if k == 0 else 1.5, **style.series(k))
+        if limiter and np.isfinite(run.limits[limiter].limit):
+            _limit(panel, run.limits[limiter].limit, max(np.abs(v[rows]).max() for _, v in signals))
+    panels[-1].x.limits(time[0], time[-1])
+    return chart
+
+
+def _scaled(signals: Signals, factor: float) -> Signals:
+    return [(name, factor * values) for name, values in signals]
+
+
+def _limit(panel: Panel, limit: float, peak: float) -> None:
+    """Draw both signs of the limit where it lies within reach of the signals."""
+    if limit > 4.0 * peak:
+        panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
+        return
+    panel.y.see([-limit, limit])
+    for sign in (1.0, -1.0):
+        panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
+
+
+def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> list[list[float]]:
+    """From when to when something was active; spans that a figure cannot tell apart are joined.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> spans(np.array([False, True, True, False]), np.arange(4.0))
+    [[1.0, 3.0]]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], active.astype(np.int8), [0]))))
+    end = float(time_s[-1]) + (float(time_s[1]) if time_s.size > 1 else 0.0)
+    times = np.append(time_s, end)
+    gap = LONGEST_GAP_S * end
+    out: list[list[float]] = []
+    for start, stop in zip(times[edges[::2]], times[edges[1::2]], strict=True):
+        if out and start - out[-1][1] < gap:
+            out[-1][1] = float(stop)
+        else:
+            out.append([float(start), float(stop)])
+    return out
+
+
+def summary(run: Trajectory) -> Tree:
+    """What happened, in numbers (for ``--json``)."""
+    limits = {
+        name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
+        for name, u in run.limits.items()
+    }
+    angle = "m" if run.axis == "linear" else "rad"
+    si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
+    ended = conduct(run)
+    out = {
+        "design": run.design_name,
+        "status": ended.status,
+        "status_detail": ended.detail,
+        "rows": run.time_s.size,
+        "period_s": run.period_s,
+        f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),
+        "commanded": run.stage,
+        f"largest_command_{si}": np.abs(run.reference_rad).max(),
+        f"largest_error_{si}": np.abs(run.reference_rad - run.followed).max(),
+        f"final_output_{angle}": run.output_angle_rad[-1],
+        f"largest_motor_speed_{angle}_s": np.abs(run.motor_speed_rad_s).max(),
+        "largest_current_A": np.abs(run.current_A).max(),
+        "rms_current_A": np.sqrt(np.mean(run.current_A**2)),
+        "largest_voltage_V": np.abs(run.voltage_V).max(),
+        "limits": limits,
+        "events": run.events,
+        "events_per_tick": run.events_per_tick,
+        "stick_fraction": run.stick_fraction,
+        "parameters_hash": run.parameters_hash,
+    }
+    if run.energy is not None:
+        out["energy"] = {**vars(run.energy), "relative_error": run.energy.relative_error}
+    return out

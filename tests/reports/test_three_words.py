@@ -1,0 +1,94 @@
+"""Met, not met, not proven: the same words, counts and exit status wherever a requirement is judged."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from actuator_lti.design import design_hash, load_design, read_design_text, write_design
+from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.errors import InputError
+from reports.cli.main import main
+
+HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
+WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
+
+
+def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> Design:
+    """A drive that states no thermal resistance: the temperature of its winding cannot be judged."""
+    return replace(load_design("ilr33-amber"), requirements=requirements, waivers=waivers)
+
+
+def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call: str) -> tuple[int, str]:
+    path.write_text(write_design(design), encoding="utf-8")
+    code = main([call[0], str(path), *call[1:]])
+    return code, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("waivers", "code", "head", "word"),
+    [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")],
+)
+def test_margins_and_report_say_the_same(
+    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    design, path = asking(*waivers), tmp_path / "d.toml"
+    made = status(path, design, capsys, "margins")
+    assert (made[0], made[1].startswith(f"{head}  ")) == (code, True)
+    assert f"0 of 1 requirements met, 1 {'waived' if waivers else 'not proven'}" in made[1]
+    made = status(path, design, capsys, "margins", "--json")
+    data = json.loads(made[1])
+    assert (made[0], data["verdict"], data["passed"]) == (code, word, code == 0)
+    (item,) = data["verdicts"]
+    assert item["verdict"] == "not proven"
+    assert item["waiver"] == ("waived 2026-11-22: the motor is outside" if waivers else "")
+    folder = tmp_path / "out"
+    call = ("report", "--no-validation", "--quiet", "--out", str(folder))
+    made = status(path, design, capsys, *call)
+    assert (made[0], made[1].startswith(f"{head}  ")) == (code, True)
+    document = json.loads((folder / "report.json").read_text())
+    counts = {"met": 0, "not_met": 0, "not_proven": 0 if waivers else 1, "waived": len(waivers)}
+    assert document["verdict"]["parts"]["requirements"] == counts
+    page = (folder / "report.html").read_text()
+    assert f'<p class="overall {"info" if waivers else "warn"}">' in page
+    assert ("the motor is outside" in page) is bool(waivers)
+
+
+def test_a_design_without_requirements_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = status(tmp_path / "d.toml", asking(requirements=()), capsys, "margins")
+    assert code == 0
+    assert "The design states no requirements." in said
+
+
+def test_a_waiver_is_read_written_and_hashed_where_there_is_one() -> None:
+    bare, waived = asking(), asking(WAIVED)
+    assert read_design_text(write_design(waived), "again").waivers == (WAIVED,)
+    assert design_hash(waived) != design_hash(bare)
+    day = write_design(waived).replace('date = "2026-11-22"', "date = 2026-11-22")
+    assert read_design_text(day, "again").waivers == (WAIVED,)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"requirement": "cold"}, "waiver.requirement = .*cold.*: allowed: each once: a requirement's id"),
+        ({"reason": " "}, "waiver.hot.reason"),
+        ({"date": "yesterday"}, "waiver.hot.date = .*yesterday.*: allowed: a day, YYYY-MM-DD"),
+    ],
+)
+def test_a_waiver_that_waives_nothing_is_refused(change: dict[str, str], words: str) -> None:
+    text = write_design(asking(replace(WAIVED, **change)))
+    with pytest.raises(InputError, match=words):
+        read_design_text(text, "d.toml")
+
+
+def test_one_waiver_holds_for_a_requirement_on_every_loop_and_for_a_check() -> None:
+    check = replace(WAIVED, requirement="validation-border")
+    design = read_design_text(write_design(asking(WAIVED, check)), "d.toml")
+    assert design.waiver_of("hot/velocity") == WAIVED
+    assert design.waiver_of("validation-border") == check
+    assert design.waiver_of("validation-sawtooth-gain") is None
