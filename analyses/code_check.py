@@ -1,22 +1,21 @@
-"""Margins of the compiled code: the injected sweep and the margins in time, run on the emitted C.
+"""Predictions held against the compiled code: its own derivative, its steps and runs beside the margins.
 
 The C of an export is compiled with the options of its README and put in the simulator's place; then every
-small-signal prediction of the linear loops is measured on it as `analyses.validation` measures it.
+prediction is judged on it as `analyses.validation` judges it.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.validation import QUICK, Settings, validate
-from analyses.validation.ledger import Entry
-
-SETTINGS: Settings = replace(QUICK, large_signals=False, rest_frequencies=2)
+from actuator_lti.verdict import Verdict
+from analyses.validation import CHECKS, validate
+from analyses.validation.row import Row
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class CodeCheck:
 
     Attributes
     ----------
-    entries : tuple of Entry
+    entries : tuple of Row
         Predictions that are judged, with what the compiled code shows.
     compiler : str
         Command and options; empty where nothing was run.
@@ -33,29 +32,27 @@ class CodeCheck:
         Why nothing was measured; empty where it was.
     """
 
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[Row, ...] = ()
     compiler: str = ""
     reason: str = ""
 
     @property
-    def failed(self) -> tuple[Entry, ...]:
+    def failed(self) -> tuple[Row, ...]:
         """Predictions that the compiled code does not meet."""
-        return tuple(entry for entry in self.entries if entry.passed is False)
+        return tuple(entry for entry in self.entries if entry.verdict is Verdict.NOT_MET)
 
-    def largest(self, *quantities: str) -> Entry | None:
+    def largest(self, *quantities: str) -> Row | None:
         """The entry of these quantities with the largest difference; ``None`` where none is measured."""
-        known = [e for e in self.entries if e.quantity in quantities and e.difference is not None]
-        return max(known, key=lambda e: abs(e.difference or 0.0), default=None)
+        known = [e for e in self.entries if e.name in quantities]
+        return max(known, key=lambda e: e.error, default=None)
 
 
-def check_code(design: Design, settings: Settings = SETTINGS) -> CodeCheck:
+def check_code(design: Design) -> CodeCheck:
     """Measure the small-signal predictions of a design on the emitted C.
 
     Parameters
     ----------
     design : Design
-    settings : Settings
-        Extent of the measurement.
 
     Returns
     -------
@@ -77,12 +74,9 @@ def check_code(design: Design, settings: Settings = SETTINGS) -> CodeCheck:
                 compile_files(run_sources(), path.name, "this machine", flags, command=[compiler])
             )
             with borrowed(path):
-                validation = validate(design, settings)
+                validation = validate(design, CHECKS)
         except (InputError, NumericalError) as error:
             return CodeCheck(reason=str(error))
-    # an unstable loop is a finding on the design: nothing is measured of it, so the code misses nothing
-    judged = (entry for entry in validation.ledger if entry.passed is not None)
-    entries = tuple(entry for entry in judged if entry.quantity != "stability")
-    if not entries:
+    if not validation.rows:
         return CodeCheck(reason="; ".join(validation.notes) or "nothing is judged of this design")
-    return CodeCheck(entries, " ".join([Path(compiler).name, *FLAGS]))
+    return CodeCheck(validation.rows, " ".join([Path(compiler).name, *FLAGS]))

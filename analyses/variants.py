@@ -20,8 +20,8 @@ from analyses.engine import Engine
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import RequirementVerdict, evaluate_requirements
 from analyses.study import Study, Variant
-from analyses.validation import QUICK, validate
-from analyses.validation.ledger import Entry
+from analyses.validation import CHECKS, validate
+from analyses.validation.row import Row
 from analyses.variant_figures import FigureName, LargeSignal, figure_names, large_signal, small_signal
 from analyses.variant_store import Store, address
 
@@ -69,7 +69,7 @@ class Found:
     moved_by : mapping of str to tuple of Contribution
         For each difference the changed keys one at a time, the strongest first; what is left over is
         their interaction (or a key without a number).
-    ledger : tuple of Entry
+    checks : tuple of Row
         Of the validator: each prediction beside what the simulator shows; empty where not asked for.
     untested : str
         Why the validator could not test this design.
@@ -80,7 +80,7 @@ class Found:
     changed: tuple[Changed, ...] = ()
     differences: dict[str, float] = field(default_factory=dict)
     moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
-    ledger: tuple[Entry, ...] = ()
+    checks: tuple[Row, ...] = ()
     untested: str = ""
 
 
@@ -260,16 +260,16 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     loops = assemble_loops(variant.design)
     result = all_loop_figures(loops, certify=True)
     figures = {**small_signal(variant.design, result), **plan.figures(variant.design, loops)}
-    ledger, untested = _ledger(variant.design) if tested else ((), "")
+    checks, untested = _checked(variant.design) if tested else ((), "")
     verdicts = evaluate_requirements(variant.design, result)
-    return Found(figures=figures, verdicts=verdicts, ledger=ledger, untested=untested)
+    return Found(figures=figures, verdicts=verdicts, checks=checks, untested=untested)
 
 
-def _ledger(design: Design) -> tuple[tuple[Entry, ...], str]:
-    """The validator's ledger, or why there is none."""
+def _checked(design: Design) -> tuple[tuple[Row, ...], str]:
+    """The validator's checks, or why there are none."""
 
     try:
-        return validate(design, QUICK).ledger, ""
+        return validate(design, CHECKS).rows, ""
     except (InputError, NumericalError) as error:
         return (), str(error)
 

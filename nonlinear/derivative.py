@@ -214,9 +214,11 @@ class _Bench:
         """Every column by the step that serves the response best, and the error that is left in it."""
         n, z = self.moved.size, np.exp(1j * GRID)
         rough = np.stack([column for column, _ in self._columns(self.scale, ROUGH, None)], axis=1)
-        left, right = sensitivities(*_split(rough, n), z)
-        sway = self.kick * np.max(np.abs(right[:, :n]), axis=0)  # of each number in a sine of the kick's size
-        seen = None
+        forced = sensitivities(*_split(rough, n), z)[1]
+        sway = self.kick * np.max(
+            np.abs(forced[:, :n]), axis=0
+        )  # of each number in a sine of the kick's size
+        seen: tuple[Floats, Floats] | None = None
         for _ in range(PASSES):
             chosen = self._columns(np.where(np.isfinite(sway) & (sway > 0.0), sway, self.scale), FINE, seen)
             parts = _split(np.stack([column for column, _ in chosen], axis=1), n)
@@ -231,7 +233,7 @@ class _Bench:
             period_s=self.setup.base_ticks * tick_s,
             hold_s=self.hold * tick_s,
             states=names_of(self.moved),
-            stated_error=float(np.max(np.einsum("zi,ik,zk->z", seen[0], off, right))),
+            stated_error=float(np.max(np.einsum("zi,ik,zk->z", left / size[:, None], off, right))),
             places=self.moved,
         )
 

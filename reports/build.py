@@ -137,24 +137,16 @@ def _further(one: Analysis, design: Design) -> doc.Section:
     return one.section(one.run(design, *one.asked(design, {})))
 
 
-def validation_sections(
-    design: Design, progress: Progress | None = None, *, timing: bool = True
-) -> list[doc.Section]:
-    """Put the linear predictions to the simulator; a design that cannot be tested says why.
-
-    Parameters
-    ----------
-    timing : bool
-        Whether the section says how long it took, which is another text every time.
-    """
+def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
+    """Put the predictions to the simulator; a design that cannot be tested says why."""
     from analyses.isolation import attempt, isolated
     from analyses.validation import validate
     from reports.sections.validation import section
 
-    title = "Linear predictions against simulation"
+    title = "Predictions against simulation"
     with isolated() as missing:
         try:
-            made = attempt(title, lambda: section(validate(design, progress=progress), timing=timing), [])
+            made = attempt(title, lambda: section(validate(design, progress=progress)), [])
         except InputError as error:
             made = [doc.section("validation", title, [doc.text(f"Not tested: {error}")], status="warn")]
     return [*made, *notices(missing, "validation")]

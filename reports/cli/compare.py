@@ -91,7 +91,7 @@ def compare(
     )
     with progress("drawing figures", quiet=quiet) as drawing:
         page, data = write_pages(made, out, "compare", progress=drawing, beside={TABLE: table_text(result)})
-    untrue = any(entry.passed is False for one in result.all for entry in one.ledger)
+    untrue = any(row.verdict is Verdict.NOT_MET for one in result.all for row in one.checks)
     passed = bool(made["verdict"]["passed"] and not result.refused and not untrue)
     if as_json:
         print_json(made)

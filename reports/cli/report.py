@@ -100,4 +100,4 @@ def _validated(drive: Design, quiet: bool) -> list[Section]:
     from reports.cli.progress import progress
 
     with progress(f"validating {drive.name}", quiet=quiet) as validating:
-        return validation_sections(drive, validating, timing=False)
+        return validation_sections(drive, validating)

@@ -12,7 +12,7 @@ from reports.sections.validation import section
 
 def validated() -> list[dict[str, Any]]:
     """Give the sections of a quick validation of ilr33-amber."""
-    return section(validate(load_design("ilr33-amber"), QUICK), timing=False)
+    return section(validate(load_design("ilr33-amber"), QUICK))
 
 
 class Built(NamedTuple):

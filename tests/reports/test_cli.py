@@ -86,7 +86,7 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
         "from nonlinear.native import kernel_name; from reports.build import design_report;"
         "from reports.html import page; from reports.sections.validation import section;"
         "design = load_design('ilr33-amber');"
-        "page(design_report(design, section(validate(design, QUICK), timing=False)));"
+        "page(design_report(design, section(validate(design, QUICK))));"
         "heavy = {'control', 'matplotlib', 'scipy.signal', 'scipy.stats', 'pandas'};"
         "heavy |= {'numba'} if kernel_name() == 'C library' else set();"
         "print(sorted(heavy & set(sys.modules)))"

@@ -6,16 +6,16 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from built_report import Built
-
-from actuator_lti import load_design
 from analyses.validation.borders import Border
 from analyses.validation.release import AmplitudeMargin
+from built_report import Built
+from reports.sections.confirmation import _remark
+
+from actuator_lti import load_design
 from reports import document as doc
 from reports.build import design_report
 from reports.findings import Finding, gathered
 from reports.sections.answer import weakest
-from reports.sections.confirmation import _remark
 
 
 def glance(document: dict[str, Any]) -> dict[str, Any]:

@@ -1,1 +1,0 @@
-"""Figures: each draws from the plain data of a report's JSON and computes nothing."""

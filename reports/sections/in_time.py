@@ -1,0 +1,165 @@
+"""Predictions shown in time: the injected sweep, one small step, runs on either side of each margin."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from actuator_lti.verdict import Verdict
+from analyses.validation import Validation
+from analyses.validation.bench_sweep import BenchSweep
+from analyses.validation.by_amplitude import AmplitudeMargin
+from analyses.validation.in_time import MarginShown, StepShown
+from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
+from reports.document_schema import Block, Row, Section, Status
+from reports.sections.names import LOOPS
+
+KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
+
+
+def sections(validation: Validation) -> list[Section]:
+    """Make the section of the sweep and that of steps and margins, as far as there are any."""
+    made = []
+    if validation.sweeps:
+        made.append(_injection(list(validation.sweeps.values())))
+    if validation.steps or validation.margins:
+        made.append(_in_time(validation))
+    return made
+
+
+def _injection(sweeps: Sequence[BenchSweep]) -> Section:
+    """What an analyser on the bench would see of every loop."""
+    blocks = [_sweep(sweep) for sweep in sweeps]
+    intro = (
+        "A sine is added at the break point of the simulated drive, which starts in the steady state of that "
+        "sine; fundamentals are correlated over whole periods."
+    )
+    words = "What a frequency-response analyser would see of every loop."
+    return doc.section("injection", "Frequency response by injection", blocks, result=words, intro=intro)
+
+
+def _sweep(sweep: BenchSweep) -> Block:
+    chart = Chart(width=style.WIDE, height=400.0)
+    top, bottom = chart.column(1.1, 1.0)
+    phase = np.degrees(np.unwrap(np.angle(sweep.linear)))
+    seen = phase + np.degrees(np.angle(sweep.open_loop / sweep.linear))
+    for panel, linear, found in (
+        (top, 20.0 * np.log10(np.abs(sweep.linear)), 20.0 * np.log10(np.abs(sweep.open_loop))),
+        (bottom, phase, seen),
+    ):
+        panel.curve(sweep.frequency_hz, linear, "linear loop", colour=style.BLUE)
+        panel.points(sweep.frequency_hz, found, "simulated", size=5.0, hollow=True, colour=style.ORANGE)
+    style.phase_axis(bottom, phase.tolist())
+    style.frequency(bottom)
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    off = float(np.nanmax(np.abs(sweep.open_loop / sweep.linear - 1.0)))
+    caption = f"{LOOPS[sweep.loop]}, open: linear (line), simulated (circles); largest difference {off:.1e}."
+    return doc.figure("injected_sweep", chart, caption=caption, alt=caption)
+
+
+def _in_time(validation: Validation) -> Section:
+    """Steps, runs beside the margins, margins by amplitude."""
+    blocks: list[Block] = []
+    for name in validation.figures:
+        if name in validation.steps:
+            blocks.append(_step(validation.steps[name]))
+        if name in validation.margins:
+            blocks.append(_margin(validation.margins[name]))
+    if validation.amplitude_margins:
+        blocks.append(_by_amplitude(validation.amplitude_margins))
+    rows = [shown.row for shown in validation.steps.values()]
+    rows += [row for shown in validation.margins.values() for row in shown.rows]
+    met = sum(row.verdict is Verdict.MET for row in rows)
+    status: Status = "pass" if met == len(rows) else "fail"
+    intro = (
+        "On the operating motion: one small step, sample by sample, and the drive started on its critical "
+        "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
+        "factor."
+    )
+    result = f"{met} of {len(rows)} runs go as predicted."
+    return doc.section(
+        "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status
+    )
+
+
+def _step(shown: StepShown) -> Block:
+    chart = Chart(width=style.HALF, height=240.0)
+    panel = chart.panel()
+    scale = style.time_axis(panel, float(shown.time_s[-1]))
+    some = slice(None, None, max(1, shown.time_s.size // 400))
+    few = slice(None, None, max(1, shown.time_s.size // 40))
+    panel.curve(scale * shown.time_s[some], shown.linear[some], "linear", colour=style.BLUE)
+    look: style.Style = {"size": 4.5, "hollow": True, "colour": style.ORANGE}
+    panel.points(scale * shown.time_s[few], shown.simulated[few], "simulated", **look)
+    panel.y.label = "response to a unit step"
+    caption = (
+        f"{LOOPS[shown.place]}: small step on the operating motion; largest difference {shown.row.error:.1e} "
+        f"of its height, {shown.row.because.split(', of ')[-1]}."
+    )
+    return doc.figure("small_step", chart, caption=caption, alt=caption, layout="half")
+
+
+def _margin(shown: MarginShown) -> Block:
+    chart = Chart(width=style.HALF, height=240.0)
+    panel = chart.panel()
+    last = max(float(shown.inside[0][-1]), float(shown.outside[0][-1]))
+    scale = style.time_axis(panel, last)
+    for (time_s, size), words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
+        some = slice(None, None, max(1, time_s.size // 600))
+        panel.curve(scale * time_s[some], size[some], words, **style.series(k))
+    panel.rule_y(0.0)
+    panel.y.label = "critical mode"
+    decibel = 20.0 * math.log10(shown.ratio)
+    caption = (
+        f"{LOOPS[shown.place]}: gain margin {decibel:.2f} dB at {shown.frequency_hz:.4g} Hz. The run inside "
+        "dies out, the run outside grows, each by the predicted factor."
+    )
+    return doc.figure("margin_runs", chart, caption=caption, alt=caption, layout="half")
+
+
+def _by_amplitude(items: Sequence[AmplitudeMargin]) -> Block:
+    columns = [
+        doc.column("loop", "Loop"),
+        doc.column("kind", "Varied"),
+        doc.column("size", "Released from"),
+        doc.column("friction", "Dry friction"),
+        doc.column("linear", "Linear margin", format="sig:4"),
+        doc.column("value", "Oscillation lasts from", format="sig:3"),
+        doc.column("unit", "Unit"),
+        doc.column("limiter", "Limit acting"),
+        doc.column("remark", ""),
+    ]
+    rows = [_released(item) for item in items]
+    return doc.details(
+        "Margins from small, medium and large deviations",
+        [doc.table("Margins by amplitude", columns, rows)],
+    )
+
+
+def _released(item: AmplitudeMargin) -> Row:
+    delay = item.kind == "delay"
+    unit = "ms" if delay else "dB"
+    remark = ""
+    if item.value is None:
+        remark = f"no oscillation lasts up to {_shown(item.furthest, item):.3g} {unit}"
+    elif item.value == (0.0 if delay else 1.0):
+        remark = "the nominal drive oscillates"
+    return {
+        "loop": item.loop,
+        "kind": KINDS[item.kind],
+        "size": f"{100.0 * item.part:.0f} % of full range",
+        "friction": "on" if item.friction_on else "off",
+        "linear": _shown(item.linear, item),
+        "value": None if item.value is None else _shown(item.value, item),
+        "unit": unit,
+        "limiter": item.limiter,
+        "remark": remark,
+    }
+
+
+def _shown(value: float, item: AmplitudeMargin) -> float:
+    return 1e3 * value * item.period_s if item.kind == "delay" else 20.0 * math.log10(value)
