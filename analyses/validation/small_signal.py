@@ -240,10 +240,8 @@ def _lever(ratio: float) -> float:
 def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:
     """Gain limits with all loops closed, up and down, and the computing delay at the voltage."""
     assert place.critical is not None
-    for name, gain, outward in (
-        ("gain_margin_up", exact.gain_upper, 1),
-        ("gain_margin_down", exact.gain_lower, -1),
-    ):
+    gains = (("gain_margin_up", exact.gain_upper, 1), ("gain_margin_down", exact.gain_lower, -1))
+    for name, gain, outward in gains if place.figures is None else ():  # else they are among the loop's own
         if 0.0 < gain < np.inf:
             yield _gain_row(place, name, gain, _angle_on_circle(place.critical(gain)), outward)
     if exact.delay_s is not None and np.isfinite(exact.delay_s) and place.delayed is not None:

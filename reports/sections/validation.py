@@ -26,7 +26,7 @@ MORE = {
     "outside_the_margin": "run just outside the gain margin",
 }
 PLACES = {"command": "Command to output", "load": "Load torque to output", "drive": "Numbers of the design"}
-NOISE = 1e-10  # of the value: a smaller difference changes with the order in which sums are taken
+NOISE = 1e-9  # of the value: a smaller error changes with the order in which sums are taken
 
 
 def section(validation: Validation) -> list[Section]:
@@ -68,8 +68,8 @@ def summary(validation: Validation) -> Section:
     blocks += [doc.remark(note) for note in validation.notes]
     intro = (
         "Every prediction is held against the derivative of the running simulator, taken on its compiled "
-        "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands. What "
-        "is large, starts from rest, or is shaken by counts is a finding of its own."
+        "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands. "
+        "What is large, starts from rest, or is shaken by counts is a finding of its own."
     )
     status: Status = {"met": "pass", "not met": "fail", "not proven": "warn"}[validation.verdict]  # type: ignore[assignment]
     return doc.section(
@@ -168,7 +168,7 @@ def table(rows: Sequence[Check], caption: str) -> Block:
 def row_of(row: Check) -> Row:
     """One check as a row; seconds as ms; without the digits that are noise of the last bit."""
     scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, "" if row.unit == "1" else row.unit)
-    error = 0.0 if row.error < NOISE * abs(row.predicted or 1.0) else row.error
+    error = max(row.error, NOISE * abs(row.predicted or 1.0))
     return {
         "quantity": quantity_name(row),
         "predicted": _rounded(row.predicted, scale, 12),

@@ -19,7 +19,7 @@ from analyses.validation.conditional import (
     saturation_ratio,
     step_threshold,
 )
-from analyses.validation.sweep import settling_ticks_of
+from analyses.validation.settling import settling_ticks_of
 from nonlinear import commands, simulate
 from reports.sections.conditional import section
 

@@ -30,7 +30,7 @@ from analyses.validation.conditional import (
     step_rows,
     step_threshold,
 )
-from analyses.validation.sweep import settling_ticks_of
+from analyses.validation.settling import settling_ticks_of
 from tests.validation.random_drives import full_drive
 
 
