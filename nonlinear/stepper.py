@@ -64,6 +64,10 @@ class Stepper:
         """A number of the state by its name in the layout, without ``S_`` or ``ES_``."""
         return float(self.s[_place(name)])
 
+    def start_value(self, name: str) -> float:
+        """The same of the state that the row begins in."""
+        return float(self.start[_place(name)])
+
     def begin(self, ticks: int = 1, **state: float) -> None:
         """Run so many ticks from the start with some numbers of the state replaced, by their names."""
         self.put(self.start)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil, copysign, inf, isfinite
+from math import ceil, inf, isfinite
+from typing import Any
 
 from actuator_lti.design.model import Command, CurrentLoop, Design, Instruments, Limits, VelocityLoop
 from analyses.validation.row import Row, judged
@@ -19,6 +20,11 @@ from nonlinear.stepper import Stepper
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it
 LIFTED = Limits(voltage_V=inf)
+
+
+def _only(**limits: Any) -> Limits:
+    """These limits, the others lifted."""
+    return replace(LIFTED, **limits)
 
 
 def controller_rows(design: Design, model: Design) -> Iterator[Row]:
@@ -47,7 +53,7 @@ class _Pair:
         """A row of the design on the bench, at rest, with these limits alone."""
         bare = replace(self.design, limits=limits, supply=None, command=Command(), instruments=Instruments())
         rows = Rows.of(replace(bare, **changes))  # type: ignore[arg-type]
-        rows["torque_filters"] = rows["command_filters"] = 0.0  # their gain at once is that of small signals
+        rows["torque_filters"] = 0.0  # their gain at once is that of small signals
         return rows
 
     @property
@@ -102,7 +108,7 @@ def _clamps(pair: _Pair) -> Iterator[Row]:
         limit, own = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
         if not isfinite(min(limit, own)):
             continue
-        rows = pair.rows(replace(LIFTED, **{attribute: own}))
+        rows = pair.rows(_only(**{attribute: own}))
         size = _ask(pair, stage, min(limit, own))
         found = _pushed(rows, pair, stage, size).value(OUTPUT[signal])
         words = f"a {stage or 'direct'} command far beyond it"
@@ -119,7 +125,7 @@ def _rates(pair: _Pair) -> Iterator[Row]:
         if not isfinite(min(limit, own)):
             continue
         period = every(pair.design, stage or producer_of(pair, signal)) * pair.design.controller.period_s
-        rows = pair.rows(replace(LIFTED, **{attribute: own}))
+        rows = pair.rows(_only(**{attribute: own}))
         size = _ask(pair, stage, min(limit, own) * period)
         found = _pushed(rows, pair, stage, size).value(OUTPUT[signal]) / period
         unit = f"{pair.speed_unit}^2" if signal == "w_ref" else "A/s"
@@ -151,7 +157,7 @@ def _windup(pair: _Pair, stage: str) -> Iterator[Row]:
     gain = _loop(pair.model, stage)[1]
     T = every(pair.model, stage) * pair.model.controller.period_s
     asked = OVER * limit / gain
-    rows = pair.rows(replace(LIFTED, **{attribute: ours}))
+    rows = pair.rows(_only(**{attribute: ours}))
     found = _pushed(rows, pair, stage, asked).value(f"{stage.upper()}_INTEGRATOR")
     integral = gain * T / model.integral_time_s * asked
     wanted = 0.0
@@ -164,10 +170,9 @@ def _windup(pair: _Pair, stage: str) -> Iterator[Row]:
         wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * (
             limit - gain * asked - integral - extra
         )
-    row = judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
+    yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
                  unit="A" if attribute == "peak_current_A" else "V",
                  condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
-    yield row
 
 
 def _overload(pair: _Pair) -> Iterator[Row]:
@@ -179,7 +184,7 @@ def _overload(pair: _Pair) -> Iterator[Row]:
     Ts = pair.design.controller.period_s
     kept = {name: getattr(own, name) for name in
             ("peak_current_A", "continuous_current_A", "peak_time_s", "release", "overload")}  # fmt: skip
-    drive = Stepper(pair.rows(replace(LIFTED, **kept)))
+    drive = Stepper(pair.rows(_only(**kept)))
     drive.begin(CURRENT=own.continuous_current_A)
     yield pair.judged("overload_time", float(tau), Ts / drive.value("OVERLOAD"), "s", "continuous current")
     drive.begin(OVERLOAD=2.0)
@@ -200,7 +205,7 @@ def _supply(pair: _Pair) -> Iterator[Row]:
     if supply is None or own is None:
         return
     Ts, U_s = pair.model.controller.period_s, pair.model.limits.voltage_V
-    rows = pair.rows(replace(LIFTED, voltage_V=pair.design.limits.voltage_V), supply=own)
+    rows = pair.rows(_only(voltage_V=pair.design.limits.voltage_V), supply=own)
     rows["brake_voltage"] = inf
     drive = Stepper(rows)
 
@@ -221,7 +226,9 @@ def _supply(pair: _Pair) -> Iterator[Row]:
     yield pair.judged("bus_voltage", wanted, bus(braking), "V", f"{-braking:.4g} A fed back")
     if supply.brake_voltage_V is not None:
         drive.change("brake_voltage", own.brake_voltage_V or inf)
-        yield pair.judged("brake_voltage", supply.brake_voltage_V, bus(1e3 * braking), "V", "fed back at once")
+        yield pair.judged(
+            "brake_voltage", supply.brake_voltage_V, bus(1e3 * braking), "V", "fed back at once"
+        )
 
 
 def _profile(pair: _Pair) -> Iterator[Row]:
@@ -235,7 +242,7 @@ def _profile(pair: _Pair) -> Iterator[Row]:
     keys = ("rate_rad_s", "acceleration_rad_s2", "jerk_rad_s3")
     columns = ("profile_range", "profile_rate", "profile_acceleration")
     first = 1 if outermost == "position" else 0
-    rows = pair.rows(command=own)
+    rows = pair.rows(command=replace(own, filter_time_s=0.0))
     for n, key in enumerate(keys[: 3 - first]):
         limit, there = float(getattr(model, key)), float(getattr(own, key))
         if not isfinite(min(limit, there)):
@@ -248,7 +255,11 @@ def _profile(pair: _Pair) -> Iterator[Row]:
         drive = Stepper(alone)
         drive.command(FAR * min(limit, there) * T)
         drive.begin()
-        read = {0: drive.value("PROFILE"), 1: drive.value("PROFILE_SPEED"), 2: drive.value("PROFILE_SPEED") / T}
+        read = {
+            0: drive.value("PROFILE"),
+            1: drive.value("PROFILE_SPEED"),
+            2: drive.value("PROFILE_SPEED") / T,
+        }
         unit = f"{angle}/s" + ("", "^2", "^3")[n]
         name = f"command_{key.split('_')[0]}"
         yield pair.judged(name, limit, read[n + first], unit, "first update of a large command")
@@ -271,11 +282,10 @@ def _jerk(pair: _Pair, rows: Rows, T: float) -> Row:
 
 def _feedforward(pair: _Pair) -> Iterator[Row]:
     """Feed-forward of dry friction, over the first update of a moving command."""
-    wanted = pair.model.controller.position_loop.friction_feedforward
-    if "position" not in stages_of(pair.design):
+    model, own = (one.controller.position for one in (pair.model, pair.design))
+    if model is None or own is None or not (model.friction_feedforward or own.friction_feedforward):
         return
-    if not (wanted or pair.design.controller.position_loop.friction_feedforward):
-        return
+    wanted = model.friction_feedforward
     rows = pair.rows()
     rows["acceleration_feedforward"] = 0.0
     for side in (1.0, -1.0):
@@ -312,11 +322,13 @@ def _counts(pair: _Pair) -> Iterator[Row]:
         yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
         return
     drive = Stepper(_turned(rows, 0.5 * quantum * scale))
-    angle = "OUTPUT" if behind and rows.value("elastic_drive") else "ANGLE"
-    drive.begin(**{angle: 1.5 * quantum * (1.0 if angle == "OUTPUT" else scale)})
+    if behind and rows.value("elastic_drive"):
+        drive.begin(OUTPUT=1.5 * quantum)
+    else:
+        drive.begin(ANGLE=1.5 * quantum * scale)
     span = design.encoder.difference_samples * velocity.every * design.controller.period_s
     seen = drive.value("FILTERED_SPEED") / rows.value("filter_coefficient") * span / scale
-    yield pair.judged(name, quantum, copysign(seen, quantum), unit, "measured speed")
+    yield pair.judged(name, quantum, seen, unit, "measured speed")
 
 
 def _turned(rows: Rows, angle_rad: float) -> Rows:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import copysign, isfinite, tanh
 
 import numpy as np
@@ -111,7 +112,7 @@ def speeds_of(design: Design, direction: int) -> list[float]:
     fast = FAST * top if isfinite(top) else 1.0
     points = [point.speed_rad_s for point in design.friction.map(direction)]
     if points:
-        middles = [0.5 * (a + b) for a, b in zip(points, points[1:], strict=False)]
+        middles = [0.5 * (a + b) for a, b in pairwise(points)]
         return [*middles, 1.5 * points[-1] or fast]
     bent = [design.friction.smoothing_speed_rad_s] if design.friction.law == "tanh" else []
     return [fast, SLOW * fast, *bent]
@@ -164,7 +165,8 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     unit = torque_unit(design)
     condition = f"at {speed:.4g} {'m/s' if unit == 'N' else 'rad/s'} under {load:g} {unit}"
     J = design.motor_side_inertia_kgm2 if elastic else design.inertia_kgm2
-    floor, behind = ULPS * J * float(np.spacing(abs(speed))) / Ts, 0.0
+    unbalanced = max(1.0, Ts / J)  # the exponential of a tick is scaled by its largest entry
+    floor, behind = ULPS * J * unbalanced * float(np.spacing(abs(speed))) / Ts + _weight_rounding(model), 0.0
     if design.coupling is not None:
         W, coupling = abs(speed) / N_c, design.coupling
         stretch = float(np.spacing(max(abs(motion.twist_rad), Ts * W)))
@@ -185,7 +187,7 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
 
 
 def _at_rest(model: Design, load: float) -> tuple[float, float, float, float]:
-    """What a standing drive predicts: twist, torque that balances, and motor friction forward and backward."""
+    """What a standing drive predicts: twist, torque that balances, motor friction forward and backward."""
     moment, friction = load + float(model.load.moment_Nm(0.0)), model.friction
     passed = 1.0 if model.load.path == "back-drivable" else 0.0
     twist, pushed = 0.0, -passed * moment / model.total_ratio
@@ -204,7 +206,7 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
     rows, unit = Rows.of(mechanics(design)), torque_unit(design)
     for load in loads_of(design):
         twist, middle, ahead, back = _at_rest(model, load)
-        if ahead + back == 0.0:
+        if ahead + back <= 2.0 * _weight_rounding(model):
             continue
         rows["load"], rows["twist_start"] = load, twist
         rows["angle_start"], rows["voltage_start"] = design.ratio_to_coupling * twist, middle
@@ -215,12 +217,29 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
             def moves(torque: float, drive: Stepper = drive, side: int = side) -> bool:
                 drive.command(torque)
                 drive.begin()
-                return drive.value("SPEED") * side > 0.0 or drive.value("DIRECTION") == side
+                turned = drive.value("ANGLE") - drive.start_value("ANGLE")  # it may stand again by now
+                return drive.value("SPEED") * side > 0.0 or turned * side > 0.0
 
             found = edge(moves, wanted, side * BESIDE * held, wanted + side * 0.5 * held)
-            allowed = WITHIN * held + EXACT * (abs(middle) + held)
+            allowed = WITHIN * held + EXACT * (abs(middle) + held) + _weight_rounding(model)
+            allowed += _spring_rounding(model, twist)
             yield judged("breakaway_torque", "drive", wanted, found, allowed, unit=unit,
                          condition=f"at rest under {load:g} {unit}, {WAYS[side]}")  # fmt: skip
+
+
+def _weight_rounding(model: Design) -> float:
+    """What a unit in the last place of the load's angle makes of its weight, at the motor."""
+    gravity, N = model.load.gravity, model.total_ratio
+    peak = 0.0 if gravity is None else gravity.peak_Nm
+    return ULPS * float(np.spacing(peak)) * (model.friction.load_coefficient + 1.0 / N)
+
+
+def _spring_rounding(model: Design, twist_rad: float) -> float:
+    """What a unit in the last place of the twist makes of friction and reaction at the motor."""
+    if model.coupling is None:
+        return 0.0
+    share = 1.0 / model.ratio_to_coupling + model.friction.load_coefficient * model.ratio_behind_coupling
+    return ULPS * model.coupling.stiffness_Nm_rad * float(np.spacing(abs(twist_rad))) * share
 
 
 WAYS = {1: "forward", -1: "backward"}
