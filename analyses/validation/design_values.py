@@ -1,16 +1,20 @@
 """Every number of a design that no small signal sees, confronted once by an exact question.
 
-Friction and breakaway, play, inertias (`torque_values`), limits, profile, counts, overload and supply
-(`controller_values`): the compiled tick starts in a state in which the number decides what comes out of one
-tick or a few, and the prediction is a formula of the model.  Nothing is waited for.
+Friction, breakaway, play and inertias (`torque_values`), limits (`limit_values`), overload and supply
+(`power_values`), profile and counts (`command_values`): the compiled tick starts in a state in which the
+number decides what comes out of one tick, and the prediction is a formula of the model.  Nothing is waited
+for.  Noise, jitter and their seed are left: they are random.
 """
 
 from __future__ import annotations
 
 from actuator_lti.design.model import Design
-from analyses.validation.controller_values import controller_rows
+from analyses.validation.command_values import command_rows
+from analyses.validation.limit_values import limit_rows
+from analyses.validation.power_values import power_rows
 from analyses.validation.row import Row
 from analyses.validation.torque_values import torque_rows
+from analyses.validation.value_pair import Pair
 
 
 def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
@@ -30,5 +34,6 @@ def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
     >>> {str(row.verdict) for row in rows}
     {'met'}
     """
-    predicted = design if model is None else model
-    return [*torque_rows(design, predicted), *controller_rows(design, predicted)]
+    pair = Pair(design, design if model is None else model)
+    rows = [*torque_rows(pair.design, pair.model), *limit_rows(pair), *power_rows(pair)]
+    return [*rows, *command_rows(pair)]

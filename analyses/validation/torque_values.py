@@ -18,13 +18,14 @@ import numpy as np
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
 from actuator_lti.drive.operating import dry_torque
 from analyses.validation.row import Row, judged
-from nonlinear.operating_motion import OperatingMotion, operating_motion_at
+from analyses.validation.value_pair import WITHIN
+from nonlinear.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
 from nonlinear.rows import Rows
 from nonlinear.stepper import Stepper
 
-WITHIN = 1e-6  # of a torque
 EXACT = 1e-9  # of an inertia; of the largest torque that takes part in a balance
 ULPS = 64.0  # of a speed, a twist: what the transition of a tick rounds to
+SHARE = 0.1  # of the full torque: a load where none is named
 FAST, SLOW = 0.4, 1e-3  # of the largest speed; of that
 BESIDE = 1e-7  # of a threshold: where it is looked for first
 FAR = 4.0  # times a threshold: where it is looked for then
@@ -76,8 +77,12 @@ def torque_unit(design: Design) -> str:
 
 
 def loads_of(design: Design) -> tuple[float, ...]:
-    """No load, and every named one with either sign."""
-    return tuple(sorted({0.0, *design.validation.loads_Nm, *(-x for x in design.validation.loads_Nm)}))
+    """No load, and every named one with either sign; where none is, a share of the full torque."""
+    named = [abs(load) for load in (*design.validation.loads_Nm, design.load.moment_max_Nm) if load]
+    if not named:
+        full = full_torque_Nm(design) * design.total_ratio
+        named = [SHARE * full if isfinite(full) else 1.0]
+    return tuple(sorted({0.0, *named, *(-load for load in named)}))
 
 
 def _inertias(design: Design, model: Design) -> Iterator[Row]:

@@ -1,156 +1,166 @@
-# ruff: noqa: T201 - a script that prints lines for people
-"""The smallest change of a model that a validation sees, for each thing that can be wrong in it.
+# ruff: noqa: T201 - a script that writes a table for people
+"""Which row of a validation sees a change of each key of a design file.
 
-Run as a script it prints a line a change::
+The model is changed by 1 %, the drive that is simulated is not; the first row that is not met is told.  Where
+1 % is below what a row resolves, or a whole number cannot change by so little, a larger change is told.  Run
+as a script it writes docs/validation_keys.md::
 
-    python -m tests.validation.mutation_table              # ilr33-amber
-    python -m tests.validation.mutation_table fin          # another shipped design
-    python -m tests.validation.mutation_table 3037         # a random drive
+    python -m tests.validation.mutation_table
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
-from dataclasses import replace
-from math import isfinite
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.model import Design, Limits
-from analyses.large_signal.border import check_border
-from analyses.validation import validate
-from tests.validation.random_drives import full_drive
-from tests.validation.small_settings import SMALL
+from actuator_lti import load_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.verdict import Verdict
+from analyses.validation.design_values import design_value_rows
+from analyses.validation.places import Bench
+from analyses.validation.row import Row
+from analyses.validation.small_signal import small_signal
 
-SIZES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1e-2)
-LIMIT_SIZES = (1e-3, 3e-3, 0.01, 0.015, 0.02, 0.05)
-Change = Callable[[Design, float], Design]
-
-
-def motor(name: str) -> Change:
-    """One constant of the motor times 1 + x."""
-    return lambda d, x: replace(
-        d, motor=replace(d.motor, **{name: (getattr(d.motor, name) or 0.0) * (1.0 + x) or None})
-    )
-
-
-def friction(name: str) -> Change:
-    """One number of the friction times 1 + x."""
-    return lambda d, x: replace(
-        d, friction=replace(d.friction, **{name: getattr(d.friction, name) * (1.0 + x)})
-    )
-
-
-def loop(stage: str, name: str) -> Change:
-    """One number of a controller times 1 + x."""
-
-    def change(d: Design, x: float) -> Design:
-        one = getattr(d.controller, stage)
-        if one is None or getattr(one, name) is None:
-            return d
-        one = replace(one, **{name: getattr(one, name) * (1.0 + x)})
-        return replace(d, controller=replace(d.controller, **{stage: one}))
-
-    return change
-
-
-def load_inertia(d: Design, x: float) -> Design:
-    """The load's inertia times 1 + x."""
-    return replace(d, load=replace(d.load, inertia_kgm2=d.load.inertia_kgm2 * (1.0 + x)))
-
-
-def delay(d: Design, x: float) -> Design:
-    """x of a tick more of computing delay."""
-    control = d.controller
-    return replace(
-        d, controller=replace(control, computing_delay_s=control.computing_delay_s + x * control.period_s)
-    )
-
-
-def feedforward(d: Design, x: float) -> Design:
-    """Feed-forward of the command's rate by x more."""
-    place = d.controller.position_loop
-    return replace(
-        d, controller=replace(d.controller, position=replace(place, feedforward=place.feedforward + x))
-    )
-
-
-def command_filter(d: Design, x: float) -> Design:
-    """A filter of the command, x of 10 ms, at least the shortest that there is."""
-    return replace(d, command=replace(d.command, filter_time_s=max(1e-2 * x, 0.4 * d.controller.period_s)))
-
-
-def back_emf_sign(d: Design, _: float) -> Design:
-    """The motor drives itself on instead of braking: a sign has no size."""
-    turned = -(d.motor.back_emf_constant_Vs_rad or 0.0)
-    return replace(d, motor=replace(d.motor, back_emf_constant_Vs_rad=turned))
-
-
-def coupling(name: str) -> Change:
-    """One number of the coupling times 1 + x."""
-
-    def change(d: Design, x: float) -> Design:
-        if d.coupling is None:
-            return d
-        return replace(d, coupling=replace(d.coupling, **{name: getattr(d.coupling, name) * (1.0 + x)}))
-
-    return change
-
-
-CHANGES: dict[str, Change] = {
-    "inductance (pole of the current loop)": motor("inductance_H"),
-    "resistance": motor("resistance_ohm"),
-    "torque constant": motor("torque_constant_Nm_A"),
-    "back-EMF constant": motor("back_emf_constant_Vs_rad"),
-    "rotor inertia (mechanical pole)": motor("rotor_inertia_kgm2"),
-    "load inertia": load_inertia,
-    "current gain": loop("current", "gain_V_A"),
-    "current integral time": loop("current", "integral_time_s"),
-    "velocity gain": loop("velocity", "gain"),
-    "velocity integral time": loop("velocity", "integral_time_s"),
-    "position gain": loop("position", "gain"),
-    "computing delay (of a tick)": delay,
-    "sign of the back-EMF": back_emf_sign,
-    "stiffness of the coupling": coupling("stiffness_Nm_rad"),
-    "damping of the coupling": coupling("damping_Nms_rad"),
-    "viscous friction": friction("viscous_Nms_rad"),
-    "dry friction": friction("dry_torque_Nm"),
-    "breakaway ratio": friction("breakaway_ratio"),
-    "feed-forward (absolute)": feedforward,
-    "command filter (of 10 ms)": command_filter,
+DRIVES = ("ilr33-amber", "joint", "ballscrew", "fin")
+PAGE = Path(__file__).parents[2] / "docs" / "validation_keys.md"
+FACTORS = (1.01, 1.1, 2.0, 0.5)
+NO_RUN = {
+    "load.moment_max": "no run reads it: it checks the design and sizes analyses",
+    "validation.full_deflection": "no run reads it: it is an amplitude that analyses are asked for",
+    "validation.loads": "no run reads it: it names the loads that analyses are asked for",
 }
-LIMITS = {"speed_rad_s": 60.0, "peak_current_A": 1.0, "voltage_V": 3.0, "acceleration_rad_s2": 2e3}
+CHOICES: dict[str, tuple[object, ...]] = {
+    "motor.constants": ("dc", "rms-line", "peak-phase"),
+    "load.path": ("self-locking", "back-drivable"),
+    "friction.law": ("coulomb", "tanh"),
+    "encoder.speed": ("ideal", "difference"),
+    "control.position.sensor": ("motor", "output"),
+}
 
 
-def main(which: str = "ilr33-amber") -> None:
-    """Print the table."""
-    design = full_drive(int(which)) if which.isdigit() else load_design(which)
-    for name, change in CHANGES.items():
-        if change(design, 1e-2) == design:
-            print(f"{name} | the drive has none | |", flush=True)
+@dataclass(frozen=True)
+class Seen:
+    """A changed key: by what, and the row that sees it, or why none does."""
+
+    key: str
+    change: str
+    row: Row | None
+    why: str = ""
+
+
+def keys_of(design: Design) -> tuple[str, ...]:
+    """Keys with a number, and those whose choice another of `CHOICES` can take."""
+    there = {"motor.constants": design.motor.constants, "load.path": design.load.path}
+    there |= {"friction.law": design.friction.law, "encoder.speed": design.encoder.speed}
+    if design.controller.position is not None:
+        there["control.position.sensor"] = design.controller.position.sensor
+    return (*design.parameters, *there)
+
+
+def seen(design: Design, key: str) -> Seen:
+    """The smallest change of a key that a row sees."""
+    if key in NO_RUN or why_idle(design, key):
+        return Seen(key, "", None, NO_RUN.get(key) or why_idle(design, key))
+    refused = ""
+    for words, model in changed(design, key):
+        if isinstance(model, str):
+            refused = model
             continue
-        for size in SIZES:
-            found = validate(design, SMALL, model=change(design, size))
-            if found.failed:
-                over = sorted(found.failed, key=lambda row: -abs(row.difference or 0.0) / row.tolerance)
-                first = ", ".join(dict.fromkeys(f"{row.loop} {row.quantity}" for row in over[:3]))
-                print(f"{name} | {size:g} | {len(found.failed)} | {first}", flush=True)
-                break
+        row = first_row(design, model)
+        if row is not None:
+            return Seen(key, words, row)
+    return Seen(key, "", None, f"refused: {refused}" if refused else "")
+
+
+def why_idle(design: Design, key: str) -> str:
+    """Why a key of this drive moves nothing in a run; empty where it does."""
+    velocity, position = design.controller.velocity, design.controller.position
+    if key == "encoder.counts_per_rev" and design.encoder.speed == "ideal":
+        return "idle: the speed is taken as ideal, and the position loop reads no counts of the motor"
+    behind = [loop for loop in (velocity, position) if loop is not None and loop.sensor == "output"]
+    if key == "output_encoder.counts_per_rev" and not behind:
+        return "idle: no loop reads the output's encoder"
+    if key == "control.position.sensor" and design.coupling is None and design.output_quantum_rad is None:
+        return "idle: on a rigid drive without counts both sensors read one angle"
+    if key == "limits.continuous_current" and design.limits.peak_time_s is None:
+        return "idle: without limits.peak_time nothing in the drive acts on it"
+    return ""
+
+
+def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
+    """Models with one key changed by more and more; in place of one that is refused the reason."""
+    if key in CHOICES:
+        own = {
+            "motor.constants": design.motor.constants,
+            "load.path": design.load.path,
+            "friction.law": design.friction.law,
+            "encoder.speed": design.encoder.speed,
+            "control.position.sensor": design.controller.position_loop.sensor,
+        }[key]
+        tried = [(f'"{other}"', other) for other in CHOICES[key] if other != own]
+    else:
+        value = design.parameters[key].value
+        whole = key.endswith(("counts_per_rev", "every"))
+        tried = [(f"x {x:g}", round(value * x) if whole else value * x) for x in FACTORS]
+        tried = [(words, x) for words, x in tried if x not in (value, 0)]
+    for words, other in tried:
+        try:
+            yield words, design.with_values({key: other})
+        except InputError as error:
+            yield words, str(error)
+
+
+def first_row(design: Design, model: Design) -> Row | None:
+    """The first row that is not met, the numbers of the design first; None: the model passes."""
+    try:
+        for row in design_value_rows(design, model):
+            if row.verdict is Verdict.NOT_MET:
+                return row
+        for place in Bench(design, model).places():
+            for row in small_signal(place):
+                if row.verdict is Verdict.NOT_MET:
+                    return row
+    except (InputError, NumericalError) as error:
+        return Row(name="refused", loop="drive", because=str(error), verdict=Verdict.NOT_MET)
+    return None
+
+
+def lines(name: str) -> Iterator[str]:
+    """The table of one drive."""
+    yield f"## {name}"
+    yield ""
+    yield "| key | change | seen by | where |"
+    yield "|---|---|---|---|"
+    design = load_design(name)
+    for key in keys_of(design):
+        found = seen(design, key)
+        if found.row is None:
+            yield f"| `{key}` | | | {found.why or 'NOT SEEN'} |"
         else:
-            print(f"{name} | not seen up to {SIZES[-1]:g} | 0 |", flush=True)
-    wide = Limits(voltage_V=1e3, speed_rad_s=1e5, acceleration_rad_s2=1e9, peak_current_A=1e3)
-    own = {name: getattr(design.limits, name) for name in LIMITS}
-    for limit, value in (LIMITS if which == "ilr33-amber" else own).items():
-        if not isfinite(value):
-            continue
-        alone = replace(design, limits=replace(wide, **{limit: value}))
-        for size in LIMIT_SIZES:
-            wrong = replace(design, limits=replace(wide, **{limit: value * (1.0 + size)}))
-            border = check_border(alone, assemble_loops(wrong), count=6)
-            if border is not None and border.passed is False:
-                print(f"{limit} | {size:g} | 1 | onset of saturation", flush=True)
-                break
+            row = found.row
+            yield f"| `{key}` | {found.change} | {row.loop} {row.name} | {row.condition or row.because} |"
+    yield ""
+
+
+HEAD = """# What a validation sees of each key
+
+For each key of four shipped drives: the model is changed, the drive that is simulated is not, and the first
+row that is not met is told; rows of the design's numbers come before those of small signals. The change is
+1 %; of a whole number, or where a row resolves less, a larger one. A key that no row sees has its reason.
+Made by `python -m tests.validation.mutation_table`; tests/validation/test_design_values.py draws from it.
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    page = [HEAD]
+    for name in DRIVES:
+        page += lines(name)
+        print(name, flush=True)
+    PAGE.write_text("\n".join(page), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    main()
