@@ -27,7 +27,7 @@ DRIVES = ("ilr33-amber", "joint", "ballscrew", "fin")
 PAGE = Path(__file__).parents[2] / "docs" / "validation_keys.md"
 FACTORS = (1.01, 1.1, 2.0, 0.5)
 NO_RUN = {
-    "load.moment_max": "no run reads it: it checks the design and sizes analyses",
+    "load.moment_max": "no run reads it: it checks the design and names a load to look at",
     "validation.full_deflection": "no run reads it: it is an amplitude that analyses are asked for",
     "validation.loads": "no run reads it: it names the loads that analyses are asked for",
 }
