@@ -9,7 +9,7 @@ gravity.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cosh, inf, isfinite
+from math import copysign, cosh, inf, isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -280,22 +280,22 @@ def steady_gain(design: Design, place: FilterPlace) -> float:
 
 
 def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:
-    """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
-    friction, moment = design.friction, load_Nm
+    """The steady state at a motor speed (rad/s, either direction) under a moment at the output."""
+    friction, moment, sense = design.friction, load_Nm, copysign(1.0, speed_rad_s)
     moment -= design.load.moment_damping_Nms_rad * speed_rad_s / design.total_ratio
     passed = 1.0 if design.load.path == "back-drivable" else 0.0
     twist = coupling_Nm = 0.0
     if design.coupling is None:
-        torque = friction.load_coefficient * abs(moment) - passed * moment / design.total_ratio
+        torque = sense * friction.load_coefficient * abs(moment) - passed * moment / design.total_ratio
     else:
         coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
         coupling_Nm -= moment / design.ratio_behind_coupling
         half = 0.5 * design.coupling.play_rad * (1.0 if coupling_Nm > 0.0 else -1.0)
         twist = coupling_Nm / design.coupling.stiffness_Nm_rad + half
         torque = passed * coupling_Nm / design.ratio_to_coupling
-        torque += friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
-    torque += _own(friction, speed_rad_s) + friction.offset_torque_Nm
-    room = _room(friction, speed_rad_s)
+        torque += sense * friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
+    torque += sense * _own(friction, abs(speed_rad_s), int(sense)) + friction.offset_torque_Nm
+    room = _room(friction, abs(speed_rad_s), int(sense))
     current, voltage = _driven(design, torque, speed_rad_s)
     return OperatingMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
 
@@ -316,14 +316,15 @@ def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
     """Friction of the load at its own shaft."""
     if friction is None:
         return 0.0
-    return friction.dry_torque_Nm + friction.viscous_Nms_rad * speed_rad_s + friction.offset_torque_Nm
+    dry = copysign(friction.dry_torque_Nm, speed_rad_s)
+    return dry + friction.viscous_Nms_rad * speed_rad_s + friction.offset_torque_Nm
 
 
-def _own(friction: Friction, speed_rad_s: float) -> float:
-    """Dry and viscous friction of the motor, or its map, forward."""
-    points = friction.map(1)
+def _own(friction: Friction, speed_rad_s: float, sense: int) -> float:
+    """Dry and viscous friction of the motor, or its map, against a motion forward (1) or backward (-1)."""
+    points = friction.map(sense)
     if not points:
-        return friction.dry_Nm(0.0) + friction.viscous() * speed_rad_s
+        return friction.dry_Nm(0.0, sense) + friction.viscous(sense) * speed_rad_s
     torque = points[0].torque_Nm
     pieces = segments(points)
     ends = [start for start, _ in pieces[1:]] + [inf]
@@ -332,12 +333,12 @@ def _own(friction: Friction, speed_rad_s: float) -> float:
     return torque
 
 
-def _room(friction: Friction, speed_rad_s: float) -> float:
+def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
     """How far the speed may move: part of the way to rest, to a bend of the map, to the slope of a tanh."""
-    if friction.law == "tanh" and friction.dry_Nm(0.0) > 0.0:
+    if friction.law == "tanh" and friction.dry_Nm(0.0, sense) > 0.0:
         least = friction.smoothing_speed_rad_s * 14.0  # there the slope of tanh is below FLAT
         return min(ROOM * speed_rad_s, speed_rad_s - least) if _flat(friction, speed_rad_s) else 0.0
-    bends = [0.0, *(start for start, _ in segments(friction.map(1)))] if friction.points else [0.0]
+    bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
     return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
 
 

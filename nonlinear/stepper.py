@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from actuator_lti.errors import InputError
 from nonlinear import native
+from nonlinear._kernels import elastic_layout
 from nonlinear._kernels import layout as at
+from nonlinear.reduced import COLUMNS
 from nonlinear.rows import Rows
 
 Floats = npt.NDArray[np.float64]
@@ -59,8 +61,31 @@ class Stepper:
         self._tick()
 
     def value(self, name: str) -> float:
-        """A number of the state by its name in the layout, without ``S_``."""
-        place = vars(at).get(f"S_{name}")
-        if place is None:
-            raise InputError(f"state {name!r}: not in the layout")
-        return float(self.s[place])
+        """A number of the state by its name in the layout, without ``S_`` or ``ES_``."""
+        return float(self.s[_place(name)])
+
+    def start_value(self, name: str) -> float:
+        """The same of the state that the row begins in."""
+        return float(self.start[_place(name)])
+
+    def begin(self, ticks: int = 1, **state: float) -> None:
+        """Run so many ticks from the start with some numbers of the state replaced, by their names."""
+        self.put(self.start)
+        for name, value in state.items():
+            self.s[_place(name)] = value
+        self.run(ticks)
+
+    def change(self, column: str, value: float) -> None:
+        """Change a parameter that nothing else is derived of, by its column of `Rows`."""
+        self.p[COLUMNS[column]] = value
+
+    def command(self, size: float) -> None:
+        """Hold the command at a value."""
+        self.p[at.COMMAND : at.COMMAND + 3] = at.STEP, size, -1.0
+
+
+def _place(name: str) -> int:
+    place = vars(at).get(f"S_{name}", vars(elastic_layout).get(f"ES_{name}"))
+    if place is None:
+        raise InputError(f"state {name!r}: not in the layout")
+    return int(place)

@@ -1,0 +1,295 @@
+"""Friction, breakaway, play and inertia of a drive's mechanics, each confronted by one tick.
+
+The mechanics stand alone: an ideal source of torque in place of motor and controllers, so that nothing but
+them is read.  A drive that starts in the predicted steady state keeps its speeds over a tick, or shows by
+their change what torque is missing: ``T = T_predicted - J (w_1 - w_0)/Ts``.  Thresholds (breakaway, contact)
+are bisected between two starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import copysign, isfinite, tanh
+
+import numpy as np
+
+from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
+from actuator_lti.drive.operating import dry_torque
+from analyses.validation.row import Row, judged
+from analyses.validation.value_pair import WITHIN
+from nonlinear.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
+from nonlinear.rows import Rows
+from nonlinear.stepper import Stepper
+
+EXACT = 1e-9  # of an inertia; of the largest torque that takes part in a balance
+ULPS = 64.0  # of a speed, a twist: what the transition of a tick rounds to
+SHARE = 0.1  # of the full torque: a load where none is named
+FAST, SLOW = 0.4, 1e-3  # of the largest speed; of that
+BESIDE = 1e-7  # of a threshold: where it is looked for first
+FAR = 4.0  # times a threshold: where it is looked for then
+
+
+def torque_rows(design: Design, model: Design) -> Iterator[Row]:
+    """All rows of the mechanics."""
+    yield from _inertias(design, model)
+    yield from _steady(design, model)
+    if design.friction.law == "coulomb":
+        yield from _breakaways(design, model)
+    if design.coupling is not None and model.coupling is not None:
+        yield from _load_breakaways(design, model)
+        yield from _play(design, model)
+
+
+def mechanics(design: Design) -> Design:
+    """A drive whose command is the torque at the motor shaft."""
+    return replace(
+        design,
+        motor=Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0),
+        controller=Controller(period_s=design.controller.period_s, computing_delay_s=0.0),
+        limits=Limits(voltage_V=float("inf")),
+        command=Command(),
+        supply=None,
+        instruments=Instruments(),
+        encoder=replace(design.encoder, counts_per_rev=None, speed="ideal"),
+    )
+
+
+def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: float) -> float | None:
+    """Where ``passed`` turns true on the way out from ``predicted - beside`` to ``far``; None: nowhere."""
+    near, out = predicted - beside, predicted + beside
+    if passed(near) or not passed(out):
+        near, out = 2.0 * predicted - far, far
+        if passed(near) or not passed(out):
+            return None
+    while abs(out - near) > 1e-12 * max(abs(near), abs(out)):
+        middle = 0.5 * (near + out)
+        if middle in (near, out):
+            break
+        near, out = (near, middle) if passed(middle) else (middle, out)
+    return 0.5 * (near + out)
+
+
+def torque_unit(design: Design) -> str:
+    """Of a torque, or of a force."""
+    return "N" if design.axis == "linear" else "N*m"
+
+
+def loads_of(design: Design) -> tuple[float, ...]:
+    """No load, and every named one with either sign; where none is, a share of the full torque."""
+    named = [abs(load) for load in (*design.validation.loads_Nm, design.load.moment_max_Nm) if load]
+    if not named:
+        full = full_torque_Nm(design) * design.total_ratio
+        named = [SHARE * full if isfinite(full) else 1.0]
+    return tuple(sorted({0.0, *named, *(-load for load in named)}))
+
+
+def _inertias(design: Design, model: Design) -> Iterator[Row]:
+    """What a torque accelerates, without friction and with the coupling in its gap."""
+    free = replace(mechanics(design), load=design.load.bare())
+    rows = Rows.of(free, friction_on=False)
+    rows["viscous"] = rows["viscous_reverse"] = rows["load_viscous"] = 0.0
+    rows["coupling_damping"], rows["half_play"] = 0.0, 1e9
+    torque = design.inertia_kgm2
+    rows["load"] = design.load_side_inertia_kgm2 * design.ratio_behind_coupling if design.coupling else 0.0
+    drive = Stepper(rows)
+    drive.command(torque)
+    drive.begin()
+    Ts = design.controller.period_s
+    unit = "kg" if design.axis == "linear" else "kg*m^2"
+    pairs = [("inertia", model.inertia_kgm2, torque * Ts / drive.value("SPEED"))]
+    if design.coupling is not None:
+        behind = design.load_side_inertia_kgm2 * Ts / drive.value("LOAD_SPEED")
+        pairs = [
+            ("motor_side_inertia", model.motor_side_inertia_kgm2, pairs[0][2]),
+            ("load_side_inertia", model.load_side_inertia_kgm2, behind),
+        ]
+    for name, predicted, found in pairs:
+        yield judged(name, "drive", predicted, found, EXACT * predicted, unit=unit,
+                     condition="a known torque over one tick, without friction")  # fmt: skip
+
+
+def speeds_of(design: Design, direction: int) -> list[float]:
+    """Speeds at which friction is read: fast, slow, one in each piece of a map, where a tanh bends."""
+    back_emf = design.effective_motor.back_emf_constant_Vs_rad
+    top = min(design.limits.speed_rad_s, design.limits.voltage_V / back_emf if back_emf else float("inf"))
+    fast = FAST * top if isfinite(top) else 1.0
+    points = [point.speed_rad_s for point in design.friction.map(direction)]
+    if points:
+        middles = [0.5 * (a + b) for a, b in pairwise(points)]
+        return [*middles, 1.5 * points[-1] or fast]
+    bent = [design.friction.smoothing_speed_rad_s] if design.friction.law == "tanh" else []
+    return [fast, SLOW * fast, *bent]
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """The predicted steady state at a speed under a load: torque at the motor, and what takes part in it."""
+
+    torque_Nm: float
+    motion: OperatingMotion
+    largest_Nm: float
+
+
+def _predicted(model: Design, speed_rad_s: float, load_Nm: float) -> _Balance:
+    """The steady state that ``model`` predicts, output at zero."""
+    moment = load_Nm + float(model.load.moment_Nm(0.0))
+    motion = operating_motion_at(mechanics(model), speed_rad_s, moment)
+    torque, friction = motion.voltage_V, model.friction
+    sense = int(copysign(1.0, speed_rad_s))
+    if friction.law == "tanh":
+        felt = moment - model.load.moment_damping_Nms_rad * speed_rad_s / model.total_ratio
+        smooth = tanh(abs(speed_rad_s) / friction.smoothing_speed_rad_s)
+        torque -= sense * (1.0 - smooth) * float(dry_torque(model, felt, sense))
+    damped = model.load.moment_damping_Nms_rad * speed_rad_s / model.total_ratio
+    parts = (torque, moment / model.total_ratio, damped / model.total_ratio, friction.offset_torque_Nm,
+             motion.coupling_Nm / model.ratio_to_coupling)  # fmt: skip
+    return _Balance(torque, motion, max(map(abs, parts)))
+
+
+def _steady(design: Design, model: Design) -> Iterator[Row]:
+    """Torques that a constant speed takes: at the motor, and behind a coupling what its twist gives."""
+    rows = Rows.of(mechanics(design))
+    for direction in (1, -1):
+        for load in loads_of(design):
+            for speed in speeds_of(design, direction):
+                yield from _at_speed(rows, design, model, direction * speed, load)
+
+
+def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: float) -> Iterator[Row]:
+    """One tick from the predicted steady state."""
+    wanted = _predicted(model, speed, load)
+    motion, Ts, N_c = wanted.motion, design.controller.period_s, design.ratio_to_coupling
+    elastic = design.coupling is not None
+    rows["load"], rows["speed_start"], rows["load_speed_start"] = load, speed, speed / N_c
+    rows["twist_start"], rows["angle_start"] = motion.twist_rad, N_c * motion.twist_rad
+    drive = Stepper(rows)
+    drive.command(wanted.torque_Nm)
+    drive.begin()
+    unit = torque_unit(design)
+    condition = f"at {speed:.4g} {'m/s' if unit == 'N' else 'rad/s'} under {load:g} {unit}"
+    J = design.motor_side_inertia_kgm2 if elastic else design.inertia_kgm2
+    unbalanced = max(1.0, Ts / J)  # the exponential of a tick is scaled by its largest entry
+    floor, behind = ULPS * J * unbalanced * float(np.spacing(abs(speed))) / Ts + _weight_rounding(model), 0.0
+    if design.coupling is not None:
+        W, coupling = abs(speed) / N_c, design.coupling
+        stretch = float(np.spacing(max(abs(motion.twist_rad), Ts * W)))
+        behind = coupling.stiffness_Nm_rad * stretch + coupling.damping_Nms_rad * float(np.spacing(W))
+        behind = ULPS * (behind + design.load_side_inertia_kgm2 * float(np.spacing(W)) / Ts)
+        floor += behind / N_c
+    found = wanted.torque_Nm - J * (drive.value("SPEED") - speed) / Ts
+    allowed = WITHIN * abs(wanted.torque_Nm) + EXACT * wanted.largest_Nm + floor
+    words = f"rounding of the speed is worth {floor:.1e} {unit}"
+    yield judged("steady_torque", "drive", wanted.torque_Nm, found, allowed, unit=unit, because=words,
+                 condition=condition)  # fmt: skip
+    if not elastic:
+        return
+    slowed = design.load_side_inertia_kgm2 * (drive.value("LOAD_SPEED") - speed / N_c) / Ts
+    allowed = WITHIN * abs(motion.coupling_Nm) + EXACT * N_c * wanted.largest_Nm + behind
+    yield judged("coupling_torque", "drive", motion.coupling_Nm, motion.coupling_Nm - slowed, allowed,
+                 unit=unit, because=words, condition=condition)  # fmt: skip
+
+
+def _at_rest(model: Design, load: float) -> tuple[float, float, float, float]:
+    """What a standing drive predicts: twist, torque that balances, motor friction forward and backward."""
+    moment, friction = load + float(model.load.moment_Nm(0.0)), model.friction
+    passed = 1.0 if model.load.path == "back-drivable" else 0.0
+    twist, pushed = 0.0, -passed * moment / model.total_ratio
+    if model.coupling is not None:
+        behind = model.load.friction
+        T_s = -moment / model.ratio_behind_coupling + (behind.offset_torque_Nm if behind else 0.0)
+        twist = T_s / model.coupling.stiffness_Nm_rad
+        twist += copysign(0.5 * model.coupling.play_rad, T_s) if T_s else 0.0
+        pushed, moment = passed * T_s / model.ratio_to_coupling, T_s * model.ratio_behind_coupling
+    held = [float(dry_torque(model, moment, side)) * friction.breakaway_ratio for side in (1, -1)]
+    return twist, pushed + friction.offset_torque_Nm, held[0], held[1]
+
+
+def _breakaways(design: Design, model: Design) -> Iterator[Row]:
+    """Torques at which the standing motor starts, under every load, forward and backward."""
+    rows, unit = Rows.of(mechanics(design)), torque_unit(design)
+    for load in loads_of(design):
+        twist, middle, ahead, back = _at_rest(model, load)
+        if ahead + back <= 2.0 * _weight_rounding(model):
+            continue
+        rows["load"], rows["twist_start"] = load, twist
+        rows["angle_start"], rows["voltage_start"] = design.ratio_to_coupling * twist, middle
+        drive = Stepper(rows)
+        for side, held in ((1, ahead), (-1, back)):
+            wanted = middle + side * held
+
+            def moves(torque: float, drive: Stepper = drive, side: int = side) -> bool:
+                drive.command(torque)
+                drive.begin()
+                turned = drive.value("ANGLE") - drive.start_value("ANGLE")  # it may stand again by now
+                return drive.value("SPEED") * side > 0.0 or turned * side > 0.0
+
+            found = edge(moves, wanted, side * BESIDE * held, wanted + side * 0.5 * held)
+            allowed = WITHIN * held + EXACT * (abs(middle) + held) + _weight_rounding(model)
+            allowed += _spring_rounding(model, twist)
+            yield judged("breakaway_torque", "drive", wanted, found, allowed, unit=unit,
+                         condition=f"at rest under {load:g} {unit}, {WAYS[side]}")  # fmt: skip
+
+
+def _weight_rounding(model: Design) -> float:
+    """What a unit in the last place of the load's angle makes of its weight, at the motor."""
+    gravity, N = model.load.gravity, model.total_ratio
+    peak = 0.0 if gravity is None else gravity.peak_Nm
+    return ULPS * float(np.spacing(peak)) * (model.friction.load_coefficient + 1.0 / N)
+
+
+def _spring_rounding(model: Design, twist_rad: float) -> float:
+    """What a unit in the last place of the twist makes of friction and reaction at the motor."""
+    if model.coupling is None:
+        return 0.0
+    share = 1.0 / model.ratio_to_coupling + model.friction.load_coefficient * model.ratio_behind_coupling
+    return ULPS * model.coupling.stiffness_Nm_rad * float(np.spacing(abs(twist_rad))) * share
+
+
+WAYS = {1: "forward", -1: "backward"}
+
+
+def _load_breakaways(design: Design, model: Design) -> Iterator[Row]:
+    """Moments at which the standing load starts, the coupling without torque."""
+    behind = model.load.friction
+    held = 0.0 if behind is None else behind.dry_torque_Nm * behind.breakaway_ratio
+    if behind is None or held == 0.0:
+        return
+    rows = Rows.of(mechanics(design))
+    rows["voltage_start"] = design.friction.offset_torque_Nm
+    drive = Stepper(rows)
+    drive.command(design.friction.offset_torque_Nm)
+    own, N_r = float(model.load.moment_Nm(0.0)), model.ratio_behind_coupling
+    for side in (1, -1):
+        wanted = N_r * (behind.offset_torque_Nm + side * held) - own
+
+        def moves(moment: float, side: int = side) -> bool:
+            drive.change("load", moment)
+            drive.begin(LOAD=moment)
+            return drive.value("LOAD_SPEED") * side > 0.0 or drive.value("LOAD_ANGLE") * side > 0.0
+
+        found = edge(moves, wanted, side * BESIDE * N_r * held, wanted + side * 0.5 * N_r * held)
+        allowed = N_r * (WITHIN * held + EXACT * abs(behind.offset_torque_Nm)) + EXACT * abs(own)
+        yield judged("load_breakaway_moment", "drive", wanted, found, allowed, unit=torque_unit(design),
+                     condition=f"load at rest, {WAYS[side]}")  # fmt: skip
+
+
+def _play(design: Design, model: Design) -> Iterator[Row]:
+    """The twist at which the coupling is met, on either side."""
+    assert design.coupling is not None
+    assert model.coupling is not None
+    wanted = 0.5 * model.coupling.play_rad
+    if not design.coupling.play_rad and not wanted:
+        return
+    rows = Rows.of(mechanics(design))
+    for side in (1, -1):
+
+        def meets(twist: float, side: int = side) -> bool:
+            rows["twist_start"] = side * twist
+            return Stepper(rows).value("CONTACT") == side
+
+        found = edge(meets, wanted, BESIDE * wanted, FAR * wanted)
+        yield judged("half_play", "drive", wanted, found, WITHIN * wanted,
+                     unit="m" if design.axis == "linear" else "rad",
+                     condition=f"contact on the {WAYS[side]} side")  # fmt: skip

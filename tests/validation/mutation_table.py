@@ -1,0 +1,166 @@
+# ruff: noqa: T201 - a script that writes a table for people
+"""Which row of a validation sees a change of each key of a design file.
+
+The model is changed by 1 %, the drive that is simulated is not; the first row that is not met is told.  Where
+1 % is below what a row resolves, or a whole number cannot change by so little, a larger change is told.  Run
+as a script it writes docs/validation_keys.md::
+
+    python -m tests.validation.mutation_table
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.verdict import Verdict
+from analyses.validation.design_values import design_value_rows
+from analyses.validation.places import Bench
+from analyses.validation.row import Row
+from analyses.validation.small_signal import small_signal
+
+DRIVES = ("ilr33-amber", "joint", "ballscrew", "fin")
+PAGE = Path(__file__).parents[2] / "docs" / "validation_keys.md"
+FACTORS = (1.01, 1.1, 2.0, 0.5)
+NO_RUN = {
+    "load.moment_max": "no run reads it: it checks the design and names a load to look at",
+    "validation.full_deflection": "no run reads it: it is an amplitude that analyses are asked for",
+    "validation.loads": "no run reads it: it names the loads that analyses are asked for",
+}
+CHOICES: dict[str, tuple[object, ...]] = {
+    "motor.constants": ("dc", "rms-line", "peak-phase"),
+    "load.path": ("self-locking", "back-drivable"),
+    "friction.law": ("coulomb", "tanh"),
+    "encoder.speed": ("ideal", "difference"),
+    "control.position.sensor": ("motor", "output"),
+}
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A changed key: by what, and the row that sees it, or why none does."""
+
+    key: str
+    change: str
+    row: Row | None
+    why: str = ""
+
+
+def keys_of(design: Design) -> tuple[str, ...]:
+    """Keys with a number, and those whose choice another of `CHOICES` can take."""
+    there = {"motor.constants": design.motor.constants, "load.path": design.load.path}
+    there |= {"friction.law": design.friction.law, "encoder.speed": design.encoder.speed}
+    if design.controller.position is not None:
+        there["control.position.sensor"] = design.controller.position.sensor
+    return (*design.parameters, *there)
+
+
+def seen(design: Design, key: str) -> Seen:
+    """The smallest change of a key that a row sees."""
+    if key in NO_RUN or why_idle(design, key):
+        return Seen(key, "", None, NO_RUN.get(key) or why_idle(design, key))
+    refused = ""
+    for words, model in changed(design, key):
+        if isinstance(model, str):
+            refused = model
+            continue
+        row = first_row(design, model)
+        if row is not None:
+            return Seen(key, words, row)
+    return Seen(key, "", None, f"refused: {refused}" if refused else "")
+
+
+def why_idle(design: Design, key: str) -> str:
+    """Why a key of this drive moves nothing in a run; empty where it does."""
+    velocity, position = design.controller.velocity, design.controller.position
+    if key == "encoder.counts_per_rev" and design.encoder.speed == "ideal":
+        return "idle: the speed is taken as ideal, and the position loop reads no counts of the motor"
+    behind = [loop for loop in (velocity, position) if loop is not None and loop.sensor == "output"]
+    if key == "output_encoder.counts_per_rev" and not behind:
+        return "idle: no loop reads the output's encoder"
+    if key == "control.position.sensor" and design.coupling is None and design.output_quantum_rad is None:
+        return "idle: on a rigid drive without counts both sensors read one angle"
+    if key == "limits.continuous_current" and design.limits.peak_time_s is None:
+        return "idle: without limits.peak_time nothing in the drive acts on it"
+    return ""
+
+
+def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
+    """Models with one key changed by more and more; in place of one that is refused the reason."""
+    if key in CHOICES:
+        own = {
+            "motor.constants": design.motor.constants,
+            "load.path": design.load.path,
+            "friction.law": design.friction.law,
+            "encoder.speed": design.encoder.speed,
+            "control.position.sensor": design.controller.position_loop.sensor,
+        }[key]
+        tried = [(f'"{other}"', other) for other in CHOICES[key] if other != own]
+    else:
+        value = design.parameters[key].value
+        whole = key.endswith(("counts_per_rev", "every"))
+        tried = [(f"x {x:g}", round(value * x) if whole else value * x) for x in FACTORS]
+        tried = [(words, x) for words, x in tried if x not in (value, 0)]
+    for words, other in tried:
+        try:
+            yield words, design.with_values({key: other})
+        except InputError as error:
+            yield words, str(error)
+
+
+def first_row(design: Design, model: Design) -> Row | None:
+    """The first row that is not met, the numbers of the design first; None: the model passes."""
+    try:
+        for row in design_value_rows(design, model):
+            if row.verdict is Verdict.NOT_MET:
+                return row
+        for place in Bench(design, model).places():
+            for row in small_signal(place):
+                if row.verdict is Verdict.NOT_MET:
+                    return row
+    except (InputError, NumericalError) as error:
+        return Row(name="refused", loop="drive", because=str(error), verdict=Verdict.NOT_MET)
+    return None
+
+
+def lines(name: str) -> Iterator[str]:
+    """The table of one drive."""
+    yield f"## {name}"
+    yield ""
+    yield "| key | change | seen by | where |"
+    yield "|---|---|---|---|"
+    design = load_design(name)
+    for key in keys_of(design):
+        found = seen(design, key)
+        if found.row is None:
+            yield f"| `{key}` | | | {found.why or 'NOT SEEN'} |"
+        else:
+            row = found.row
+            yield f"| `{key}` | {found.change} | {row.loop} {row.name} | {row.condition or row.because} |"
+    yield ""
+
+
+HEAD = """# What a validation sees of each key
+
+For each key of four shipped drives: the model is changed, the drive that is simulated is not, and the first
+row that is not met is told; rows of the design's numbers come before those of small signals. The change is
+1 %; of a whole number, or where a row resolves less, a larger one. A key that no row sees has its reason.
+Made by `python -m tests.validation.mutation_table`; tests/validation/test_design_values.py draws from it.
+"""
+
+
+def main() -> None:
+    """Write the page."""
+    page = [HEAD]
+    for name in DRIVES:
+        page += lines(name)
+        print(name, flush=True)
+    PAGE.write_text("\n".join(page), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
