@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.plain_system import PlainSystem
+from actuator_lti.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN
@@ -205,9 +206,9 @@ def _closed_pole(system: PlainSystem, gain: float, z: complex) -> complex:
 
 def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes, complex]:
     """Left and right eigenvector of the eigenvalue nearest to a pole, their product 1."""
-    from scipy.linalg import eig, matrix_balance
+    from scipy.linalg import eig
 
-    even, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    even, scale = balanced(A)
     values, left, right = eig(even, left=True)
     k = int(np.argmin(np.abs(values - pole)))
     w, v = left[:, k].conj() / scale, right[:, k] * scale

@@ -20,6 +20,7 @@ from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.by_amplitude import margins_by_amplitude
 from analyses.validation.conditional import Conditional, conditional_stability
 from analyses.validation.counts import Counts, counts_of
+from analyses.validation.design_values import design_value_rows
 from analyses.validation.from_rest import RestSteps, steps_from_rest
 from analyses.validation.in_time import margin_shown, step_shown
 from analyses.validation.places import Bench
@@ -104,6 +105,7 @@ class _Work:
         margins = {name: self._shown("runs beside the margin", margin_shown, name) for name in stable}
         rows += [shown.row for shown in steps.values() if shown is not None]
         rows += [row for shown in margins.values() if shown is not None for row in shown.rows]
+        rows += self._part("numbers of the design", self._values, [])
         self._step()
         asked = self.settings
         large = asked.from_rest and whole
@@ -178,6 +180,9 @@ class _Work:
             rows += [_unproven(name, self.notes)] if made is None else made
             self._step()
         return rows, places
+
+    def _values(self) -> list[Row]:
+        return design_value_rows(self.design, self.bench.model)
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
