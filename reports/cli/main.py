@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 
-from reports.certain import same_order
+from reports import arithmetic
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and give the exit status.
 
-    Linear algebra gets one thread and one kernel (`same_order`) unless the environment says otherwise.
+    At the start of a process linear algebra gets one thread and one kernel (`reports.arithmetic`) unless the
+    environment says otherwise.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Without the program's name; those of the process where left out.
     """
-    for name, value in same_order().items():
-        os.environ.setdefault(name, value)
+    arithmetic.settle()
     from reports.cli.app import build
     from reports.cli.errors import run
 
