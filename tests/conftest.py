@@ -1,7 +1,11 @@
-"""The browser of all tests that look at a page."""
+"""The browser of all tests that look at a page; a processor that is not at hand, where one is asked for.
+
+``OTHER_PROCESSOR=SEED``: every result of linear algebra a few ulp beside what it was (`machines.beside`).
+"""
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -10,6 +14,11 @@ import pytest
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+if os.environ.get("OTHER_PROCESSOR"):
+    from tests.machines import beside
+
+    beside.install(int(os.environ["OTHER_PROCESSOR"]))
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
