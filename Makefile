@@ -48,17 +48,21 @@ $(ALL): $(CORE) requirements-all.lock
 	@$(LOCKED) --requirement requirements-all.lock
 	@touch $@
 
-# The tests of margins, loops and many designs again, as on processors with other linear algebra kernels.
+# The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
+# that run here, and ten processors that are not at hand (tests/machines/beside.py).
 MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
   tests/margins/test_margin_reference_loops.py tests/margins/test_unstable_inner_loops.py \
-  tests/margins/test_delay_margins.py tests/margins/test_step_random.py tests/margins/test_bandwidth.py \
-  tests/loops/test_loops_forms.py tests/loops/test_loops_published.py tests/study/test_compiled_figures.py
+  tests/margins/test_delay_margins.py tests/margins/test_certified_delays.py tests/margins/test_step_random.py \
+  tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
+  tests/loops/test_free_rotor.py tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \
+  tests/reports/test_certified_report.py
+AS_MACHINE := $(BIN)/python -m pytest -q -n 2 -m "not slow" $(MACHINE_TESTS)
 
 machines: $(ALL)
-	set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
-	  echo "OPENBLAS_CORETYPE=$$kernel"; \
-	  OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q -n 2 $(MACHINE_TESTS); \
-	done
+	@set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
+	  echo "OPENBLAS_CORETYPE=$$kernel"; OPENBLAS_CORETYPE=$$kernel $(AS_MACHINE); done
+	@set -e; for seed in 1 2 3 4 5 6 7 8 9 10; do \
+	  echo "OTHER_PROCESSOR=$$seed"; OTHER_PROCESSOR=$$seed $(AS_MACHINE); done
 
 check: $(ALL)
 	$(BIN)/ruff check .

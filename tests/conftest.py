@@ -1,4 +1,4 @@
-"""The browser of all tests that look at a page; a processor that is not at hand, where one is asked for.
+"""The browser of all tests that look at a page; which tests are slow; a processor that is not at hand.
 
 ``OTHER_PROCESSOR=SEED``: every result of linear algebra a few ulp beside what it was (`machines.beside`).
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -20,7 +21,17 @@ if os.environ.get("OTHER_PROCESSOR"):
 
     beside.install(int(os.environ["OTHER_PROCESSOR"]))
 
+SLOW = Path(__file__).with_name("slow.txt")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `slow.txt` names, by file or by test."""
+    slow = {line for line in SLOW.read_text(encoding="utf-8").splitlines() if line[:1] not in ("", "#")}
+    for item in items:
+        name = item.nodeid.partition("[")[0]
+        if name in slow or name.partition("::")[0] in slow:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="module")
