@@ -1,4 +1,4 @@
-"""All figures of a document as SVG."""
+"""All figures of a document as SVG; what of a document that somebody gives can be drawn."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from actuator_lti.errors import InputError
 from analyses.isolation import caught, note
 from reports.figures.registry import draw_svg
 
@@ -40,6 +41,21 @@ def draw_all(
         if progress is not None:
             progress(len(drawn), len(blocks))
     return drawn
+
+
+def refuse_undrawable(blocks: Sequence[Mapping[str, Any]], origin: str) -> None:
+    """Refuse a document of somebody in which the data of a figure are not what its module draws.
+
+    Raises
+    ------
+    InputError
+        Naming the figure, and what went wrong.
+    """
+    for k, block in enumerate(blocks):
+        _, missing = caught(block["figure"], partial(_draw, block, "f", False))
+        if missing:
+            why = missing.why.removeprefix("unforeseen ")
+            raise InputError(f"figure {k + 1} ({block['figure']}): its data cannot be drawn ({why})", origin)
 
 
 def _draw(block: Mapping[str, Any], prefix: str, page: bool) -> str:

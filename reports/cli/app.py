@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from reports.cli.numbers import bounded
+
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
@@ -34,6 +36,11 @@ def build() -> typer.Typer:
         for command in commands:
             _register(app, command, panel)
     return app
+
+
+def built() -> Any:
+    """The command with all that are below it."""
+    return bounded(typer.main.get_command(build()))
 
 
 def say_version(wanted: bool) -> None:

@@ -19,8 +19,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Without the program's name; those of the process where left out.
     """
     arithmetic.settle()
-    from reports.cli.app import build
+    from reports.cli.app import built
     from reports.cli.errors import run
 
     given = None if arguments is None else list(arguments)
-    return run(lambda: build()(args=given, prog_name="actuator-lti", standalone_mode=False))
+    return run(lambda: built()(args=given, prog_name="actuator-lti", standalone_mode=False))
