@@ -314,7 +314,7 @@ def _first_rise(frequency_hz: Floats, phases: Floats, duration_s: float) -> floa
 
     count = 8 * int(np.ceil(frequency_hz.max() * duration_s))
     for first in range(0, count, _ROWS):
-        t = np.arange(first, min(first + _ROWS, count) + 1) * (duration_s / count)
+        t = np.arange(first, min(first + _ROWS, count) + 1, dtype=np.float64) * (duration_s / count)
         seen = _summed(frequency_hz, phases, t)
         rises = np.flatnonzero((seen[:-1] < 0.0) & (seen[1:] >= 0.0))
         if rises.size:
