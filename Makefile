@@ -5,44 +5,66 @@ BIN := $(VENV)/bin
 OUT ?= out
 SECONDS ?= 600
 SEED ?= 1
-STAMP := $(VENV)/.installed
+CORE := $(VENV)/.core
+ALL := $(VENV)/.all
 RELEASE := $(VENV)/.release
-PIP := $(BIN)/python -m pip --disable-pip-version-check
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+LOCKED := $(PIP) install --no-compile --require-hashes --requirement requirements.lock
 # Each package is pinned with the hashes of its files; "make lock" writes them anew from constraints.txt.
 EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables)
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
-  --no-emit-options --no-emit-index-url --no-emit-find-links
+  --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: newest installs wasm report test machines check bench clean install browser fuzz lock limits docs release
+.PHONY: newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
-install: $(STAMP)
+# The main job.
+report: $(CORE)
+	@echo "report of ilr33-amber: every prediction is checked by simulation"
+	@$(BIN)/actuator-lti report ilr33-amber --out $(OUT)
+	@echo "done: open $(OUT)/report.html"
 
-$(STAMP): pyproject.toml requirements.lock
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) install --quiet --require-hashes --requirement requirements.lock
-	$(PIP) install --quiet --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m nonlinear.native
-	touch $(STAMP)
+test: $(ALL)
+	@echo "tests, on two cores; make test-all has the slow ones too"
+	@$(BIN)/python -m pytest -q -n 2 -m "not slow"
 
-report: $(STAMP)
-	$(BIN)/actuator-lti report ilr33-amber --out $(OUT)
-
-test: $(STAMP)
+test-all: $(ALL)
 	$(BIN)/python -m pytest -n 2
 
-# The tests of margins, loops and many designs again, as on processors with other linear algebra kernels.
+install: $(ALL)
+
+$(CORE): pyproject.toml requirements.lock
+	@echo "1/4 environment: $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+	@echo "2/4 packages: $$(grep -c == requirements.lock) of requirements.lock, by their hashes (0.5 GB)"
+	@$(LOCKED)
+	@echo "3/4 toolkit: actuator-lti, from here"
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@echo "4/4 simulator: compiled"
+	@$(BIN)/python -m nonlinear.native
+	@touch $@
+
+$(ALL): $(CORE) requirements-all.lock
+	@echo "more packages: $$(grep -c == requirements-all.lock) of requirements-all.lock, for tests, documentation, clusters, PDF, FMUs (2 GB)"
+	@$(LOCKED) --requirement requirements-all.lock
+	@touch $@
+
+# The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
+# that run here, and ten processors that are not at hand (tests/machines/beside.py).
 MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
   tests/margins/test_margin_reference_loops.py tests/margins/test_unstable_inner_loops.py \
-  tests/margins/test_delay_margins.py tests/margins/test_step_random.py tests/margins/test_bandwidth.py \
-  tests/loops/test_loops_forms.py tests/loops/test_loops_published.py tests/study/test_compiled_figures.py
+  tests/margins/test_delay_margins.py tests/margins/test_certified_delays.py tests/margins/test_step_random.py \
+  tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
+  tests/loops/test_free_rotor.py tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \
+  tests/reports/test_certified_report.py
+AS_MACHINE := $(BIN)/python -m pytest -q -n 2 -m "not slow" $(MACHINE_TESTS)
 
-machines: $(STAMP)
-	set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
-	  echo "OPENBLAS_CORETYPE=$$kernel"; \
-	  OPENBLAS_CORETYPE=$$kernel $(BIN)/python -m pytest -q -n 2 $(MACHINE_TESTS); \
-	done
+machines: $(ALL)
+	@set -e; for kernel in $$($(BIN)/python tests/machines/machine_kinds.py); do \
+	  echo "OPENBLAS_CORETYPE=$$kernel"; OPENBLAS_CORETYPE=$$kernel $(AS_MACHINE); done
+	@set -e; for seed in 1 2 3 4 5 6 7 8 9 10; do \
+	  echo "OTHER_PROCESSOR=$$seed"; OTHER_PROCESSOR=$$seed $(AS_MACHINE); done
 
-check: $(STAMP)
+check: $(ALL)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -50,26 +72,28 @@ check: $(STAMP)
 	$(BIN)/python -m pytest -q --doctest-modules actuator_lti nonlinear analyses reports
 
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
-fuzz: $(STAMP)
+fuzz: $(ALL)
 	$(BIN)/python -m tests.hardness.fuzz --seconds $(SECONDS) --seed $(SEED)
 
-bench: $(STAMP)
+bench: $(ALL)
 	$(BIN)/python -m benchmarks.run
 
-limits: $(STAMP)
+limits: $(CORE)
 	$(BIN)/python -m actuator_lti.bounds > docs/limits.md
 
 # The documentation in out/docs: opens from disk, asks no network; its tutorials are run while it is built.
-docs: $(STAMP)
+docs: $(ALL)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs $(OUT)/docs
 
-$(RELEASE): $(STAMP)
-	$(PIP) install --quiet --constraint constraints.txt '.[release]'
+$(RELEASE): $(CORE)
+	$(PIP) install --constraint constraints.txt '.[release]'
 	touch $(RELEASE)
 
-# The wheel in a clean environment with the newest versions of what it needs, and nothing else; skipped offline.
+# The wheel in a clean environment with the newest versions of what it needs, and nothing else; make report in a
+# fresh copy: what it takes has a bound. Skipped offline.
 newest:
 	$(PYTHON) -m tests.install.clean_install
+	$(PYTHON) -m tests.install.clean_install --report
 
 # The same with every Python that is here, and from the sources with the pinned versions.
 installs: newest
@@ -78,19 +102,21 @@ installs: newest
 	  if $$each --version >/dev/null 2>&1; then $(PYTHON) -m tests.install.clean_install --python $$each; \
 	  else echo "$$each: not here"; fi; done
 
+# What the toolkit itself needs, and apart from that what its extras, tests and documentation need besides.
 lock: $(RELEASE)
-	$(COMPILE) $(EXTRAS) --all-build-deps --constraint constraints.txt --output-file requirements.lock pyproject.toml
+	$(COMPILE) --all-build-deps --output-file requirements.lock pyproject.toml
+	$(COMPILE) $(EXTRAS) --all-build-deps --output-file $(VENV)/all.lock pyproject.toml
+	awk '/^[^ ]/ {new = !($$1 in core)} NR == FNR {core[$$1]; next} new' requirements.lock $(VENV)/all.lock > requirements-all.lock
 
 # Wheel, sources and the bill of materials of what they need to run.
 release: $(RELEASE)
 	rm -rf dist && mkdir dist
-	$(COMPILE) --constraint constraints.txt --output-file dist/runtime.lock pyproject.toml
+	$(COMPILE) --output-file dist/runtime.lock pyproject.toml
 	$(BIN)/cyclonedx-py requirements --output-reproducible --pyproject pyproject.toml \
 	  --output-file dist/actuator-lti.cdx.json dist/runtime.lock
 	$(BIN)/python -m build --no-isolation --outdir dist
 
-wasm: $(STAMP)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[export]'
+wasm: $(ALL)
 	$(BIN)/python -m nonlinear.export.wasm_module
 
 clean:

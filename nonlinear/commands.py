@@ -35,6 +35,7 @@ __all__ = [
 
 Floats = npt.NDArray[np.float64]
 LEAST_SPECTRUM = 16  # samples from which on a spectrum is looked at
+_ROWS = 1 << 16  # samples that are summed at a time
 UNEVEN = 1.5  # times the usual interval: a longer one is a hole
 
 
@@ -98,7 +99,7 @@ class Command:
             return 0.0
         times, values = self.samples
         even = np.linspace(times[0], times[-1], times.size)
-        y = np.interp(even, times, values)
+        y = np.interp(even, times, values / (np.abs(values).max() or 1.0))
         y = y - np.linspace(y[0], y[-1], y.size)
         size = float(np.ptp(y))
         if size == 0.0:
@@ -230,7 +231,10 @@ def stepped_sine(
         _positive("stepped_sine", frequencies_hz=frequency)
     if cycles < 1 or settle_cycles < 0 or not len(frequencies_hz):
         raise InputError("command stepped_sine: at least one frequency and one cycle needed")
-    f = np.asarray(frequencies_hz, dtype=float)
+    f = _sampled_at("stepped_sine", frequencies_hz, period_s)
+    SIGNAL_ROWS.check(cycles + settle_cycles)
+    slowest = float(f.min()) * period_s
+    SIGNAL_ROWS.check((cycles + settle_cycles) / slowest if slowest else np.inf)
     ends = np.cumsum((cycles + settle_cycles) / f)
     SIGNAL_ROWS.check(float(ends[-1]) / period_s)
     t = np.arange(int(np.ceil(ends[-1] / period_s)) + 1) * period_s
@@ -270,10 +274,10 @@ def multisine(
         _positive("multisine", frequencies_hz=frequency)
     if not len(frequencies_hz):
         raise InputError("command multisine: at least one frequency needed")
-    periods = np.rint(np.asarray(frequencies_hz, dtype=float) * duration_s)
+    wanted = _sampled_at("multisine", frequencies_hz, period_s)
+    periods = np.rint(wanted * duration_s)
     if periods.min() < 1.0:
-        least = float(np.min(np.asarray(frequencies_hz, dtype=float)))
-        message = f"command multisine: {least:g} Hz: less than one period in {duration_s:g} s"
+        message = f"command multisine: {wanted.min():g} Hz: less than one period in {duration_s:g} s"
         raise InputError(f"{message}; a longer duration or a higher frequency is needed")
     if np.unique(periods).size < periods.size:
         message = f"command multisine: two frequencies of {periods.size} have the same number of periods"
@@ -282,26 +286,44 @@ def multisine(
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * pi, f.size)
     phases += 2.0 * pi * f * _first_rise(f, phases, duration_s)
     t = np.arange(round(duration_s / period_s) + 1) * period_s
-    values = np.zeros(t.size)
-    for frequency, phase in zip(f, phases, strict=True):
-        values += np.sin(2.0 * pi * frequency * t + phase)
+    values = np.concatenate([_summed(f, phases, part) for part in np.array_split(t, t.size // _ROWS + 1)])
     values *= amplitude_rad / np.abs(values).max()
     return Command("multisine", at.TABLE, (), float(f.max()), float(t[-1]), np.vstack([t, values]))
 
 
+def _sampled_at(kind: str, frequencies_hz: Sequence[float], period_s: float) -> Floats:
+    """Frequencies as an array, each refused that samples cannot hold."""
+    f = np.asarray(frequencies_hz, dtype=float)
+    if f.max() * period_s >= 0.5:
+        message = f"command {kind}: {f.max():g} Hz: must be below the Nyquist frequency"
+        raise InputError(f"{message} of its table, {0.5 / period_s:g} Hz")
+    return f
+
+
+def _summed(frequency_hz: Floats, phases: Floats, t: Floats) -> Floats:
+    """Sum of sines at times."""
+    total = np.zeros(t.size)
+    for frequency, phase in zip(frequency_hz, phases, strict=True):
+        total += np.sin(2.0 * pi * frequency * t + phase)
+    return total
+
+
 def _first_rise(frequency_hz: Floats, phases: Floats, duration_s: float) -> float:
-    """A time at which a sum of sines passes zero, rising."""
+    """A time at which a sum of sines passes zero, rising: looked for block by block."""
     from scipy.optimize import brentq
 
-    def value(t: float) -> float:
-        return float(np.sin(2.0 * pi * frequency_hz * t + phases).sum())
-
-    t = np.linspace(0.0, duration_s, 8 * int(np.ceil(frequency_hz.max() * duration_s)) + 1)
-    seen = np.zeros(t.size)
-    for frequency, phase in zip(frequency_hz, phases, strict=True):
-        seen += np.sin(2.0 * pi * frequency * t + phase)
-    k = int(np.flatnonzero((seen[:-1] < 0.0) & (seen[1:] >= 0.0))[0])
-    return float(brentq(value, t[k], t[k + 1], xtol=1e-15 * duration_s))
+    count = 8 * int(np.ceil(frequency_hz.max() * duration_s))
+    for first in range(0, count, _ROWS):
+        t = np.arange(first, min(first + _ROWS, count) + 1, dtype=np.float64) * (duration_s / count)
+        seen = _summed(frequency_hz, phases, t)
+        rises = np.flatnonzero((seen[:-1] < 0.0) & (seen[1:] >= 0.0))
+        if rises.size:
+            at_s = t[rises[0] : rises[0] + 2]
+            return float(
+                brentq(lambda x: float(_summed(frequency_hz, phases, np.array([x]))[0]), *at_s,
+                       xtol=1e-15 * duration_s)
+            )  # fmt: skip
+    raise AssertionError("a sum of sines without a mean rises somewhere in its period")
 
 
 def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event log") -> Command:

@@ -61,17 +61,3 @@ def _number(value: float, name: str) -> float:
         value = round(value, DECIMALS)
     flat = name.endswith(_PLACES) and any(word in name for word in _MAXIMA)
     return 0.0 if abs(value) < ZERO else float(f"{value:.{FLAT_DIGITS if flat else DIGITS}g}")
-
-
-def same_order() -> Mapping[str, str]:
-    """Settings under which linear algebra adds in the same order on every machine of a kind.
-
-    One thread: the matrices are small, and threads that wait for each other cost several times what they
-    save. One kernel for all processors: the fastest differ in the last digit.
-    """
-    import platform
-
-    settings = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "MKL_CBWR": "COMPATIBLE"}
-    if platform.machine().lower() in ("x86_64", "amd64"):
-        settings["OPENBLAS_CORETYPE"] = "Nehalem"
-    return settings

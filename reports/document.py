@@ -351,10 +351,13 @@ def load(path: str | Path) -> Tree:
     Raises
     ------
     InputError
-        Also where its verdict is not that of its sections.
+        Also where its verdict is not that of its sections, or a figure cannot be drawn.
     """
+    from reports.drawing import refuse_undrawable
+
     made = read_json(path)
     check(made, shown_path(path))
+    refuse_undrawable(figures(made), shown_path(path))
     counted = verdict_of(made["sections"], made["kind"])
     if made["verdict"] != counted:
         raise InputError("verdict: does not agree with the verdicts in its sections", where=shown_path(path))

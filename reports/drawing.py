@@ -1,4 +1,4 @@
-"""All figures of a document as SVG."""
+"""All figures of a document as SVG; what of a document that somebody gives can be drawn."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from actuator_lti.errors import InputError
 from analyses.isolation import caught, note
 from reports.charts.data import chart_of
 from reports.charts.svg import page_svg, paper_svg
@@ -50,3 +51,18 @@ def draw_svg(block: Mapping[str, Any], prefix: str = "f", page: bool = True) -> 
     """Draw one figure; its chart passes through JSON, so that a page equals one made of report.json."""
     chart = chart_of(json.loads(json.dumps(block["chart"], allow_nan=False)))
     return page_svg(chart, prefix, block["alt"]) if page else paper_svg(chart, prefix)
+
+
+def refuse_undrawable(blocks: Sequence[Mapping[str, Any]], origin: str) -> None:
+    """Refuse a document of somebody in which a figure's chart cannot be drawn.
+
+    Raises
+    ------
+    InputError
+        Naming the figure, and what went wrong.
+    """
+    for k, block in enumerate(blocks):
+        _, missing = caught(block["figure"], partial(draw_svg, block, "f", False))
+        if missing:
+            why = missing.why.removeprefix("unforeseen ")
+            raise InputError(f"figure {k + 1} ({block['figure']}): its data cannot be drawn ({why})", origin)

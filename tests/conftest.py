@@ -1,9 +1,14 @@
-"""The browser of all tests that look at a page."""
+"""The browser of all tests that look at a page; which tests are slow; a processor that is not at hand.
+
+``OTHER_PROCESSOR=SEED``: every result of linear algebra a few ulp beside what it was (`machines.beside`).
+"""
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -11,7 +16,22 @@ import pytest
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+if os.environ.get("OTHER_PROCESSOR"):
+    from tests.machines import beside
+
+    beside.install(int(os.environ["OTHER_PROCESSOR"]))
+
+SLOW = Path(__file__).with_name("slow.txt")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what `slow.txt` names, by file or by test."""
+    slow = {line for line in SLOW.read_text(encoding="utf-8").splitlines() if line[:1] not in ("", "#")}
+    for item in items:
+        name = item.nodeid.partition("[")[0]
+        if name in slow or name.partition("::")[0] in slow:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="module")

@@ -103,12 +103,19 @@ class Field:
         if self.low == SMALL:
             return f"above 0, {self.low:g} to {self.high:g}{shown}"
         low = "" if self.low == -inf else f"{'above' if self.low_open else 'at least'} {self.low:g}{shown}"
+        low = f"0, or at least {SMALL:g}{shown}" if self._zero_or_more else low
         high = "" if self.high == inf else f"at most {self.high:g}{shown}"
         return " and ".join(part for part in (low, high) if part) or "any finite number"
 
     def accepts(self, value: float) -> bool:
-        """Whether an SI value lies in the allowed range; NaN does not."""
+        """Whether an SI value lies in the allowed range; NaN does not, nor what is next to zero."""
+        if self._zero_or_more and 0.0 < value < SMALL:
+            return False
         return (self.low < value if self.low_open else self.low <= value) and value <= self.high
+
+    @property
+    def _zero_or_more(self) -> bool:
+        return self.kind in ("quantity", "quantities") and self.low == 0.0 and not self.low_open
 
 
 # --- a part of a design declares a key so: ``name: Annotated[type, positive(key, unit, symbol, words)]`` ---

@@ -10,6 +10,7 @@ import typer
 
 from reports.analyses import ANALYSES, BY_NAME
 from reports.cli.analysis import command as declared
+from reports.cli.numbers import bounded
 
 
 def _declared(group: str) -> tuple[str, ...]:
@@ -42,6 +43,11 @@ def build() -> typer.Typer:
         for command in commands:
             _register(app, command, panel)
     return app
+
+
+def built() -> Any:
+    """The command with all that are below it."""
+    return bounded(typer.main.get_command(build()))
 
 
 def say_version(wanted: bool) -> None:

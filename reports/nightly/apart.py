@@ -22,16 +22,13 @@ from typing import Any
 
 from actuator_lti.errors import InputError
 from analyses.engine import Engine
+from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs in parallel
 from reports.nightly import worker
 from reports.nightly.cache import Cache, CorruptEntry
 
 START_LIMIT_S = 180.0
 END_S = 10.0
 _CHILD = "import sys; from reports.nightly.worker import main; main(sys.argv[1], int(sys.argv[2]))"
-# One thread a process: the jobs themselves are what runs in parallel.
-_ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +115,7 @@ class _Child:
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _CHILD, limits.build, str(limits.memory_bytes)],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
-            env={**os.environ, **_ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
 
     def build(self, task: Task) -> tuple[Done, bytes]:

@@ -91,6 +91,8 @@ class Cache:
             Where the file is there but not whole.
         """
         path = self.path(key)
+        if path.is_symlink():
+            raise CorruptEntry("is a symbolic link")
         try:
             if path.stat().st_size > MAX_ENTRY_BYTES:
                 raise CorruptEntry(f"larger than {MAX_ENTRY_BYTES} bytes")

@@ -88,12 +88,21 @@ def state_of(site: Path, settings: Settings) -> Path:
     Raises
     ------
     InputError
-        For a state that is no folder or lies inside the site, or a site that has no folder beside it.
+        For a state that is no folder, leads elsewhere or lies inside the site, or a site that has no folder
+        beside it.
     """
     state = _state_of(site, settings)
-    for folder in (state, state / "cache"):
+    cache = state / "cache"
+    for folder in (state, cache):
         if os.path.lexists(folder) and not folder.is_dir():
             raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
+    inside = [path for folder in (state, cache) if folder.is_dir() for path in folder.iterdir()]
+    for path in (state, *inside):
+        if path.is_symlink():
+            raise InputError(
+                "is a symbolic link: history and cache are kept in the state folder itself",
+                where=shown_path(path),
+            )
     return state
 
 
@@ -154,6 +163,7 @@ def run_night(
     jobs = check_jobs(study.jobs, study.name)
     state = state_of(site, use)
     site_files.check_place(site)
+    _unless_lost(site, state, use)
     version = code or code_version()
     with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
         if history.notice:
@@ -162,12 +172,19 @@ def run_night(
         history.claim(study.name)
         if not use.accept_lost_history:
             memory.check(site, history.memory(), state)
+        site_files.mark(site)
         run = history.start_run(_run_row(version, study, clock()))
         outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
         known = history.known(o.key for o in outcomes)
         history.finish_run(run, clock(), [_new_result(o, o.key in known) for o in outcomes])
         metas = {o.key: o.meta for o in outcomes}
         return publish(study, site, history, Cache(state / "cache"), use, metas)
+
+
+def _unless_lost(site: Path, state: Path, use: Settings) -> None:
+    """Refuse a site whose history is not there, before one is begun."""
+    if not use.accept_lost_history and not (state / "history.sqlite").exists():
+        memory.check(site, memory.Memory("", 0, 0), state)
 
 
 def publish(
@@ -208,6 +225,7 @@ def approve(
     if not by.strip() or not reason.strip():
         raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
     state = state_of(site, use)
+    site_files.check_place(site)
     if not (state / "history.sqlite").exists():
         memory.check(site, memory.Memory("", 0, 0), state)
         raise InputError("no night has been built here yet", where=str(site))

@@ -48,6 +48,21 @@ def check_place(site: Path) -> None:
         raise InputError("is a file: --site takes a folder", where=str(site))
     if site.is_dir() and not (site / MARKER).exists() and any(site.iterdir()):
         raise InputError("is not empty and no site of a nightly: use an empty folder", where=str(site))
+    if (site / MARKER).exists():
+        mark(site)
+    there = next(folder for folder in (site, *site.absolute().parents) if folder.exists())
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError("cannot be written", where=str(there))
+
+
+def mark(site: Path) -> None:
+    """Make a folder a site; one that is a site already stays it.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written.
+    """
     write_text(site / MARKER, "actuator-lti nightly site 1\n")
 
 

@@ -41,7 +41,6 @@ def _same_compiler() -> bool:
         return False
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not _same_compiler(), reason="the ziglang that made the module is not installed")
 def test_building_again_gives_the_same_bytes() -> None:
     assert build_wasm() == kept_wasm()

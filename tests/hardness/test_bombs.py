@@ -17,6 +17,7 @@ from analyses.study import load_study
 from nonlinear import commands, loads, simulate
 from nonlinear.batch import run_rows
 from nonlinear.parameters import design_row
+from reports.cli.main import main
 
 ROOT = Path(__file__).parents[2]
 PERIOD_S = 1e-4
@@ -67,6 +68,41 @@ def test_millions_of_tones() -> None:
     refused(lambda: commands.multisine(0.1, [1.0], 1e9, PERIOD_S), "--duration")
     refused(lambda: commands.multisine(0.1, [1.0] * 5000, 4000.0, PERIOD_S), "lines times ticks")
     refused(lambda: commands.multisine(0.1, [1.0], 1.0, PERIOD_S, seed=-1), "seed = -1")
+    refused(lambda: commands.multisine(0.1, [1.0, 1e7], 1.0, PERIOD_S), "1e+07 Hz", "Nyquist", "5000 Hz")
+    refused(lambda: commands.stepped_sine(0.1, [1.0, 1e308], 5, PERIOD_S), "1e+308 Hz", "5000 Hz")
+    refused(lambda: commands.stepped_sine(0.1, [5e-324], 5, PERIOD_S), "at most 50000000")
+    refused(lambda: commands.stepped_sine(0.1, [1.0], 10**400, PERIOD_S), "--cycles", "at most 50000000")
+
+
+def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
+    """The tones at 100 001 ticks are never held at once; it begins at zero, rising."""
+    made = commands.multisine(0.1, [1.0, 500.0], 10.0, PERIOD_S)
+    assert made.samples is not None
+    times, values = made.samples
+    assert times.size == 100_001
+    assert abs(values[0]) < 1e-9
+    assert values[1] > 0.0
+    assert abs(values).max() == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["--every 9", "--cycles 9", "--count 9", "--seed 9", "--frequency inf", "--to nan", "--amplitude=-inf"],
+)
+def test_a_number_beyond_all_bounds_is_one_line(given: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four hundred digits, or no finite number: whatever the option."""
+    option = given.replace(" 9", " " + "9" * 400)
+    assert main(["simulate", "--command", "stepped-sine", *option.split()]) == 2
+    line = capsys.readouterr().err
+    assert given.split()[0].partition("=")[0] in line
+    assert ("finite" if "9" not in given else "2^63") in line
+    assert line.count("\n") == 1
+
+
+def test_a_command_as_large_as_a_double_has_no_warning() -> None:
+    """Warnings are errors here: its spectrum is of its shape."""
+    largest = commands.multisine(1e308, [1.0, 100.0], 1.0, PERIOD_S)
+    assert largest.highest_content(5000.0) < 1e-3
 
 
 def test_a_batch_that_would_take_days() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import shutil
 import socket
+import sqlite3
 import stat
 import subprocess
 import sys
@@ -17,7 +20,9 @@ from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti import atomic
 from actuator_lti.errors import InputError
-from reports.nightly.night import run_night, state_of
+from reports.nightly.lock import hold
+from reports.nightly.memory import HistoryLost
+from reports.nightly.night import approve, run_night, state_of
 
 SIMULATE = ("simulate", "ilr33-amber", "--duration", "0.01", "--quiet")
 
@@ -258,3 +263,71 @@ def test_a_state_that_is_no_folder_is_named(place, target, tmp_path) -> None:
     path.write_text("mine") if target is None else path.symlink_to(target)
     with pytest.raises(InputError, match="is no folder"):
         run_night(study(job("a")), tmp_path / "site", INLINE, code=CODE)
+
+
+@pytest.mark.parametrize("name", ["", "history.sqlite", "nightly.lock", "cache", "cache/ab"])
+def test_a_state_that_leads_elsewhere_is_refused(name, tmp_path) -> None:
+    site, state, elsewhere = tmp_path / "site", tmp_path / "site.state", tmp_path / "elsewhere"
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (state / "cache" / "ab").mkdir(exist_ok=True)
+    (state / name).rename(elsewhere)
+    (state / name).symlink_to(elsewhere)
+    before = contents(elsewhere)
+    for again in (
+        lambda: run_night(study(job("a", 12.0)), site, INLINE, code=CODE),
+        lambda: approve(study(job("a")), site, by="A", reason="b", settings=INLINE),
+    ):
+        with pytest.raises(InputError, match="is a symbolic link"):
+            again()
+    assert contents(elsewhere) == before
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    """What lies at and below a path."""
+    below = [path, *path.rglob("*")] if path.is_dir() else [path]
+    return {str(one): one.read_bytes() if one.is_file() else b"" for one in below if os.path.lexists(one)}
+
+
+def test_a_cached_result_that_leads_elsewhere_is_built_again(tmp_path) -> None:
+    site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
+    run_night(study(job("a")), site, INLINE, code=CODE)
+    (entry,) = (tmp_path / "site.state" / "cache").glob("*/*.entry")
+    entry.rename(elsewhere)
+    entry.symlink_to(elsewhere)
+    said: list[str] = []
+    run_night(study(job("a")), site, INLINE, code=CODE, say=said.append)
+    assert len(said) == 1
+    assert "symbolic link" in said[0]
+    assert not entry.is_symlink()
+    assert elsewhere.is_file()
+
+
+@pytest.mark.parametrize(
+    "why", ["history lost", "history damaged", "history newer", "locked", "no designs", "foreign"]
+)
+def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
+    site, state = tmp_path / "site", tmp_path / "site.state"
+    jobs = () if why == "no designs" else (job("a"),)
+    held = contextlib.nullcontext()
+    if why == "history lost":
+        run_night(study(job("a")), site, INLINE, code=CODE)
+        shutil.rmtree(state)
+    elif why == "foreign":
+        site.mkdir()
+        (site / "mine").write_text("mine")
+    elif why == "history damaged":
+        state.mkdir()
+        (state / "history.sqlite").write_bytes(b"no history" * 1000)
+    elif why == "history newer":
+        run_night(study(job("a")), site, INLINE, code=CODE)
+        with contextlib.closing(sqlite3.connect(state / "history.sqlite")) as c:
+            c.execute("PRAGMA user_version = 999")
+        shutil.rmtree(site)
+    elif why == "locked":
+        held = hold(state)
+    with held:
+        before = contents(tmp_path)
+        with pytest.raises((InputError, HistoryLost)):
+            run_night(study(*jobs), site, INLINE, code=CODE)
+        after = contents(tmp_path)
+    assert after.keys() - {str(state / "nightly.lock")} == before.keys() - {str(state / "nightly.lock")}

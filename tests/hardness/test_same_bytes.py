@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import platform
 import subprocess
@@ -9,7 +10,8 @@ import sys
 
 import pytest
 
-from reports.certain import certain, same_order
+from reports.arithmetic import same_order
+from reports.certain import certain
 
 DOCUMENT = """
 import sys
@@ -57,11 +59,40 @@ def test_rounding_keeps_what_is_certain_and_nothing_else() -> None:
     assert str(certain([-1e-17])) == "[0.0]"
 
 
-def test_the_command_line_fixes_the_order_unless_told_otherwise(monkeypatch) -> None:
-    from reports.cli.main import main
+ASKED = """
+import os, sys
+from reports.cli.main import main
+{before}
+assert main(["--version"]) == 0
+import numpy
+sys.stdout.write("|" + repr({{name: os.environ.get(name) for name in {names}}}))
+"""
 
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
-    monkeypatch.delenv("MKL_CBWR", raising=False)
-    assert main(["--version"]) == 0
-    assert os.environ["OPENBLAS_NUM_THREADS"] == "2"
-    assert os.environ["MKL_CBWR"] == same_order()["MKL_CBWR"]
+
+def settings_of_a_process(before: str, **environment: str) -> dict[str, str | None]:
+    """What linear algebra was told in a process that runs a command."""
+    names = (*same_order(), "OPENBLAS_CORETYPE")
+    kept = {name: value for name, value in os.environ.items() if name not in names}
+    code = ASKED.format(before=before, names=names)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**kept, **environment}, check=True
+    )
+    return ast.literal_eval(done.stdout.partition("|")[2])
+
+
+def test_the_command_line_fixes_the_order_at_its_start_unless_told_otherwise() -> None:
+    assert settings_of_a_process("") == same_order() | (
+        {} if "OPENBLAS_CORETYPE" in same_order() else {"OPENBLAS_CORETYPE": None}
+    )
+    told = settings_of_a_process("", OPENBLAS_NUM_THREADS="2")
+    assert told["OPENBLAS_NUM_THREADS"] == "2"
+    assert told["MKL_CBWR"] == same_order()["MKL_CBWR"]
+
+
+def test_a_process_that_adds_up_already_changes_nothing_for_those_that_it_starts() -> None:
+    """Their numbers would be others than its own."""
+    assert set(settings_of_a_process("import numpy").values()) == {None}
+
+
+def test_the_tests_add_up_as_the_command_line_does() -> None:
+    assert all(os.environ.get(name) for name in same_order())

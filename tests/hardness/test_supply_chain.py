@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import re
 import tomllib
 from pathlib import Path
@@ -10,9 +11,23 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
-LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
-ENTRIES = [entry for entry in re.split(r"\n(?=\S)", LOCK) if entry.strip() and not entry.startswith("#")]
-LOCKED = dict(re.match(r"([A-Za-z0-9._-]+)==(\S+)", entry).groups() for entry in ENTRIES)
+CORE, REST = (
+    (ROOT / name).read_text(encoding="utf-8") for name in ("requirements.lock", "requirements-all.lock")
+)
+
+
+def entries(lock: str) -> list[str]:
+    """One text a package."""
+    return [entry for entry in re.split(r"\n(?=\S)", lock) if entry.strip() and not entry.startswith("#")]
+
+
+def versions(lock: str) -> dict[str, str]:
+    """By name."""
+    return dict(re.match(r"([A-Za-z0-9._-]+)==(\S+)", entry).groups() for entry in entries(lock))
+
+
+ENTRIES = entries(CORE) + entries(REST)
+LOCKED = versions(CORE) | versions(REST)
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 APART = {"all", "release", "examples"}  # not part of an installation by the lock
@@ -23,8 +38,25 @@ def test_every_package_is_pinned_with_hashes() -> None:
     for entry in ENTRIES:
         assert re.match(r"[A-Za-z0-9._-]+==\S+ ", entry), entry[:60]
         assert len(re.findall(r"--hash=sha256:[0-9a-f]{64}", entry)) >= 1, entry[:60]
-    assert "--index-url" not in LOCK
-    assert "://" not in LOCK
+    assert "--index-url" not in CORE + REST
+    assert "://" not in CORE + REST
+
+
+def test_what_make_report_installs_is_what_the_toolkit_itself_needs_and_no_more() -> None:
+    """And that is locked once: in the one file or in the other."""
+    core = versions(CORE)
+    needed = {canonicalize_name(Requirement(words).name) for words in (*PROJECT["project"]["dependencies"],
+              *PROJECT["build-system"]["requires"])}  # fmt: skip
+    todo = list(needed)
+    while todo:
+        for words in importlib.metadata.requires(todo.pop()) or ():
+            one = Requirement(words)
+            name = canonicalize_name(one.name)
+            if name not in needed and (one.marker is None or one.marker.evaluate({"extra": ""})):
+                needed.add(name)
+                todo.append(name)
+    assert set(core) == needed
+    assert not set(core) & set(versions(REST))
 
 
 def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> None:

@@ -5,12 +5,18 @@
     python -m tests.install.clean_install --pinned            the versions of constraints.txt
 
 What is run there: the margins, a report, a run of the simulator, and a command that lacks its extra.
+
+    python -m tests.install.clean_install --report            `make report` in a fresh copy of the checkout
+
+What that takes of disk and processor time has a bound.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -27,6 +33,7 @@ RUN = (
     "run = simulate('ilr33-amber', commands.step(0.01), 0.1);"
     "assert abs(run.output_angle_rad[-1] - 0.01) < 1e-3, run"
 )
+MOST_BYTES, MOST_S = 1_000_000_000, 60.0  # of make report
 HEAVY = ("dask", "distributed", "pyarrow", "pandas", "typst", "ziglang", "fmpy", "ruptures")
 
 
@@ -61,12 +68,8 @@ def reached(python: Path, folder: Path) -> bool:
     return done.returncode == 0
 
 
-def install(python: str, pinned: bool, sources: bool, folder: Path) -> Path | None:
-    """An environment with the package alone in it, and its folder of programs; None without a registry."""
-    call([python, "-m", "venv", folder / "there"], folder, quiet=True)
-    bin_folder = folder / "there" / "bin"
-    if not reached(bin_folder / "python", folder):
-        return None
+def install(bin_folder: Path, pinned: bool, sources: bool, folder: Path) -> None:
+    """The package alone in an environment."""
     pip = [bin_folder / "python", "-m", "pip", "--disable-pip-version-check", "--quiet"]
     call([*pip, "install", "build"], folder, quiet=True)
     kind = "--sdist" if sources else "--wheel"
@@ -74,7 +77,6 @@ def install(python: str, pinned: bool, sources: bool, folder: Path) -> Path | No
     (built,) = (folder / "dist").iterdir()
     held = ["--constraint", ROOT / "constraints.txt"] if pinned else []
     call([*pip, "install", *held, built], folder, quiet=True)
-    return bin_folder
 
 
 def use(bin_folder: Path, folder: Path) -> None:
@@ -97,19 +99,43 @@ def use(bin_folder: Path, folder: Path) -> None:
     call([program, "pdf", "out/report.json"], folder, 2, 'pip install "actuator-lti[pdf]"')
 
 
+def report(folder: Path) -> None:
+    """The main job as a newcomer does it: what it says, and what it takes."""
+    files = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    for name in files.splitlines():
+        (folder / "copy" / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, folder / "copy" / name)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    said = call(["make", "--directory", folder / "copy", f"PYTHON={sys.executable}", "report"], folder)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    taken = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    size = sum(path.lstat().st_blocks * 512 for path in (folder / "copy/.venv").rglob("*"))
+    sys.stdout.write(f"make report: {size / 1e9:.2f} GB, {taken:.0f} s of processor time\n")
+    lines = [line for line in said.splitlines() if not line.startswith(("make", "WARNING"))]
+    steps = [line[:3] for line in lines[:4]]
+    if size > MOST_BYTES or taken > MOST_S or steps != ["1/4", "2/4", "3/4", "4/4"] or "done: " not in said:
+        raise SystemExit(f"make report: at most {MOST_BYTES} bytes, {MOST_S} s; a line a step\n{said}")
+
+
 def main() -> None:
     """Install and use."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--python", default=sys.executable)
     parser.add_argument("--pinned", action="store_true")
     parser.add_argument("--sources", action="store_true", help="from the sdist")
+    parser.add_argument("--report", action="store_true", help="make report, in a copy of the checkout")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="install-") as name:
-        result = install(given.python, given.pinned, given.sources, Path(name))
-        if result is None:
+        folder = Path(name)
+        bin_folder = folder / "there" / "bin"
+        call([given.python, "-m", "venv", folder / "there"], folder, quiet=True)
+        if not reached(bin_folder / "python", folder):
             sys.stdout.write("clean install: skipped, no package registry is reached\n")
-            return
-        use(result, Path(name))
+        elif given.report:
+            report(folder)
+        else:
+            install(bin_folder, given.pinned, given.sources, folder)
+            use(bin_folder, folder)
 
 
 if __name__ == "__main__":

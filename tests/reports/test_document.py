@@ -144,6 +144,30 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
         doc.load(path)
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [{"edges": []}, {"counts": [1]}, {"counts": [10**400, 1]}, {"edges": ["a", 1, 2]}, {"nominal": {}}],
+)
+def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(damage: dict[str, Any], tmp_path) -> None:
+    marks = {"nominal": 1.0, "worst": 0.5, "minimum": 0.2, "maximum": None}
+    panel = {"label": "g", "unit": "dB", "edges": [0.0, 1.0, 2.0], "counts": [3, 4], **marks}
+    for changed in ({}, damage):
+        drawn = doc.figure("distribution", {"panels": [{**panel, **changed}]}, caption="c", alt="a")
+        made = doc.document(
+            title="t", subtitle="s", design={"name": "d", "revision": "1"},
+            provenance={"time": None, "version": "1"}, sections=[doc.section("one", "One", [drawn])],
+        )  # fmt: skip
+        path = tmp_path / "report.json"
+        path.write_text(json.dumps(made))
+        if not changed:
+            assert doc.load(path)["title"] == "t"
+            continue
+        with pytest.raises(
+            InputError, match=r"report\.json: figure 1 \(distribution\): its data cannot be drawn"
+        ):
+            doc.load(path)
+
+
 @pytest.mark.parametrize("format", ["sig:0", "short:0", "ms:0", "sig", "fix:99", "sig:3x", ""])
 def test_a_column_that_no_number_can_be_written_by_is_refused(format: str) -> None:
     table = doc.table("T", [doc.column("a", "A", format=format)], [{"a": 1.5}])
