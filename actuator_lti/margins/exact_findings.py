@@ -108,7 +108,8 @@ def findings(loop: ExactLoop, merge: bool = False, neighbour: Findings | None = 
         return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
 
     def off_axis(v: arb) -> arb:
-        return v.sqrt() * phase(v) / (N.at(v) * D.at(v)).abs_lower()
+        L = N.at(v) / D.at(v)
+        return L.imag / L.abs_lower()
 
     ends = _touched_ends(loop, gain) if merge else (False, False)
     start = (neighbour.near_gains, neighbour.near_reals) if neighbour else (None, None)
