@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
+from actuator_lti.margins.certified_roots import HalfPlanes
 from actuator_lti.margins.results import (
     Agreement,
     DelayMargin,
@@ -15,6 +17,8 @@ from actuator_lti.margins.results import (
     StabilityMargins,
     Verdict,
 )
+
+FARTHEST = 1e10
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,7 @@ def assembled(
     reason: str,
     delay_s: float = 0.0,
     band_rad_s: tuple[float, float] | None = None,
+    hidden_border: int = 0,
 ) -> StabilityMargins:
     """Put a result together; without figures they are withheld."""
     if band_rad_s is None:
@@ -65,7 +70,41 @@ def assembled(
         notes=notes,
         evidence=evidence,
         evidence_reason=reason,
+        hidden_border_modes=hidden_border,
     )
+
+
+def out_of_sight(L: complex) -> bool:
+    """Whether a crossing of the negative real axis is too far from -1 to be listed: more than 200 dB."""
+    return math.isfinite(abs(L)) and not FARTHEST**-1 <= abs(L) <= FARTHEST
+
+
+def far_note(far: int) -> tuple[str, ...]:
+    """What is said of crossings that are not listed."""
+    if not far:
+        return ()
+    return (f"{far} crossing(s) of the negative real axis more than 200 dB from -1 are not listed",)
+
+
+def hidden_notes(hidden: HalfPlanes) -> tuple[str, ...]:
+    """What is said of modes that the loop neither drives nor sees, by where they lie."""
+    notes = []
+    if hidden.on_border == 1:
+        notes.append(
+            "one mode at zero frequency that the loop neither drives nor sees is left out "
+            "(it is no instability)"
+        )
+    elif hidden.on_border:
+        at = f"{hidden.at_zero} at zero frequency" if hidden.at_zero else ""
+        pairs = ", ".join(f"{times} pair(s) at {float(w.mid()):.6g}" for w, times in hidden.border)
+        notes.append(
+            f"modes on the border of stability that the loop neither drives nor sees are left out "
+            f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
+            "seen; inside, the loop is not asymptotically stable"
+        )
+    if hidden.right:
+        notes.append(f"{hidden.right} unstable mode(s) that the loop neither drives nor sees")
+    return tuple(notes)
 
 
 def verdict_of(agreement: Agreement) -> tuple[bool | None, Verdict]:
@@ -90,3 +129,21 @@ def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None
         samples = None if period_s is None else seconds / period_s
         out.append(DelayMargin(seconds, samples, margin.frequency_rad_s))
     return tuple(out)
+
+
+def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:
+    """The same with only the margins of a band listed."""
+    if band is None:
+        return margins
+    low, high = band
+
+    def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
+
+    return replace(
+        margins,
+        gain_margins=inside(margins.gain_margins),
+        phase_margins=inside(margins.phase_margins),
+        delay_margins=inside(margins.delay_margins),
+        band_rad_s=(low, high),
+    )

@@ -145,6 +145,9 @@ class HalfPlanes:
         return self.at_zero + 2 * sum(times for _, times in self.border)
 
 
+NOTHING_HIDDEN = HalfPlanes(0, 0, ())
+
+
 def places(roots: list[tuple[acb, int]]) -> Near:
     """Where the simple ones of certified roots are, in double precision: a start for those of a neighbour."""
     return tuple(complex(root) for root, times in roots if times == 1)

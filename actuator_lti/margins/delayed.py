@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.assemble import delay_margins, verdict_of
+from actuator_lti.margins.assemble import delay_margins, out_of_sight, verdict_of
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, values
@@ -166,11 +166,12 @@ def _gain_margins(
     form = setting.form
     unit = 1.0 if form.period_s is None else 1.0 / form.period_s
     out = []
-    if setting.order == 0 and dc_value(setting) < 0.0 and band[0] <= 0.0:
-        out.append(GainMargin(-1.0 / dc_value(setting), 0.0))
+    at_rest = 0.0 if setting.order else dc_value(setting)
+    if at_rest < 0.0 and band[0] <= 0.0 and not out_of_sight(at_rest):
+        out.append(GainMargin(-1.0 / at_rest, 0.0))
     x, touch = phases
     for at, L, flat in zip(x, border_values(form, x), touch, strict=True):
-        if band[0] <= at * unit <= band[1] and (listed_all or abs(L) >= FLOOR):
+        if band[0] <= at * unit <= band[1] and (listed_all or abs(L) >= FLOOR) and not out_of_sight(L):
             out.append(GainMargin(float(1.0 / abs(L)), float(at) * unit, bool(flat)))
     return tuple(out)
 
