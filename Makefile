@@ -13,7 +13,7 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links
 
-.PHONY: newest installs wasm report test machines check bench clean install browser fuzz lock limits docs release
+.PHONY: differential newest installs wasm report test machines check bench clean install browser fuzz lock limits docs release
 
 install: $(STAMP)
 
@@ -52,6 +52,10 @@ check: $(STAMP)
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
 fuzz: $(STAMP)
 	$(BIN)/python -m tests.hardness.fuzz --seconds $(SECONDS) --seed $(SEED)
+
+# Harsh loops in all their forms against exact polynomials: make differential SECONDS=120 SEED=$$(date +%j)
+differential: $(STAMP)
+	$(BIN)/python -m tests.margins.differential --seconds $(SECONDS) --seed $(SEED)
 
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.run

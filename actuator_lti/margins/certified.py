@@ -46,7 +46,7 @@ def certified_margins(given: Given) -> StabilityMargins:
 
 def _compared(loop: ExactLoop, others: list[ExactLoop], merge: bool) -> tuple[Findings, Settled]:
     base = findings(loop, merge)
-    return base, settled(base, [findings(other, merge, base) for other in others])
+    return base, settled(base, [findings(other, merge) for other in others])
 
 
 def _refuse_ill_posed(loop: ExactLoop) -> None:

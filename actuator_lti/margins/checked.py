@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
-from actuator_lti.margins.axis_search import FAR_LOG, Found, search
+from actuator_lti.margins.axis_search import FAR_LOG, Found, last_above, search
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_form import in_series
 from actuator_lti.margins.factored import Response, factored
@@ -104,6 +104,21 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     return within(result, band)
 
 
+def gain_crossovers(loop: RationalLoop) -> Real:
+    """Where the gain is one (x of the loop), in order.
+
+    Raises
+    ------
+    Doubtful
+        It could not be checked.
+    """
+    with np.errstate(all="ignore"):
+        response = Response(loop)
+        factors = factored(response, sorted_poles(loop.A, loop.in_z))
+        parts, _ = _parts(factors, None)
+        return response.polished(_merged(parts)[0], gain=True)[0]
+
+
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
     if delay_s:
         if loop.period_s is None and abs(loop.d) >= 1.0:
@@ -186,7 +201,7 @@ def _parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[_P
     least, most = (float(size.min()), float(size.max())) if size.size else (scale, scale)
     low = _start(factors, _LOW * min(least, scale if factors.delay else least))
     if factors.delay:
-        high, listed_to = _turning_stop(factors, most)
+        high, listed_to = _turning_stop(factors, low, most)
         if band is not None:
             listed_to, high = float(band[1]), max(high, 2.0 * float(band[1]))
         if factors.delay * listed_to > 2.0 * math.pi * _MOST_TURNS:
@@ -205,19 +220,15 @@ def _parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[_P
     ], math.inf
 
 
-def _turning_stop(factors: Factored, most: float) -> tuple[float, float]:
+def _turning_stop(factors: Factored, low: float, most: float) -> tuple[float, float]:
     """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed."""
     slope, high = factors.at_infinity, _HIGH * most
     if not slope:
         listed_to = 10.0 * most + 8.0 * math.pi / factors.delay
         return 10.0 * max(high, listed_to), listed_to
     gain = float(factors.log_value(np.array([high]))[0, 0])
-    floor = high * math.exp((math.log(FLOOR) - gain) / slope)
-    if floor < high:  # not yet on the last slope: where it falls below for good
-        w = np.geomspace(high, 1e-3 * most, 400)
-        above = np.flatnonzero(factors.log_value(w)[0] >= math.log(FLOOR))
-        floor = float(w[max(above[0] - 1, 0)]) if above.size else float(w[-1])
-    return max(high, high * math.exp((math.log(_LEAST_GAIN) - gain) / slope)), floor
+    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - gain) / slope))
+    return top, last_above(factors, low, top, math.log(FLOOR))
 
 
 def _stop(factors: Factored, high: float) -> float:

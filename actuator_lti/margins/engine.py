@@ -17,6 +17,7 @@ from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured import measured_margins
 from actuator_lti.margins.results import Agreement, StabilityMargins
+from actuator_lti.margins.series_delay import in_series
 from actuator_lti.margins.trust import Doubtful
 
 if TYPE_CHECKING:
@@ -89,7 +90,13 @@ def stability_margins(
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
-            return _delayed(delay_form(system, delay_s), band_rad_s, certify)
+            form = delay_form(system, delay_s)  # refuses what is no loop
+            plain = in_series(system)
+            if plain is None:
+                return _delayed(form, band_rad_s, certify)
+            given, inside_s = plain
+            late = _behind_delay(given, inside_s + delay_s, band_rad_s, certify)
+            return replace(late, delay_s=delay_s)
         system = system.to_state_space()
     if not (hasattr(system, "num") or hasattr(system, "A")):
         raise InputError(

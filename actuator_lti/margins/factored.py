@@ -15,6 +15,7 @@ from actuator_lti.margins.trust import Doubtful
 
 _LEAST_SLACK = 1e-8
 _SAME = 1e-4  # relative: the loop and the product of its factors
+_NEARLY_REAL = 1e-12
 _SEEN = 1e-10  # of L
 _NEWTON_STEPS = 6
 _NEWTON_STEP = 1e-9
@@ -211,4 +212,11 @@ def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
     system = shifted(loop, shift)
     sigma = eigenvalues(system.W_plus + np.outer(system.b_plus / system.l_plus, system.c_plus))
-    return shift + 1.0 / sigma[sigma != 0.0]
+    zeros = shift + 1.0 / sigma[sigma != 0.0]
+    if loop.in_z or loop.d or zeros.size < loop.order:
+        return zeros
+    farthest = np.abs(
+        zeros
+    ).argmax()  # without feed-through one is at infinity, with its mirror image where two
+    real = abs(zeros[farthest].imag) <= _NEARLY_REAL * abs(zeros[farthest])
+    return np.delete(zeros, np.abs(zeros).argsort()[-1 if real else -2 :])
