@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from actuator_lti.margins.certified_roots import HalfPlanes
 from actuator_lti.margins.results import (
     Agreement,
     DelayMargin,
@@ -86,24 +85,32 @@ def far_note(far: int) -> tuple[str, ...]:
     return (f"{far} crossing(s) of the negative real axis more than 200 dB from -1 are not listed",)
 
 
-def hidden_notes(hidden: HalfPlanes) -> tuple[str, ...]:
-    """What is said of modes that the loop neither drives nor sees, by where they lie."""
+def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:
+    """What is said of modes that the loop neither drives nor sees.
+
+    Parameters
+    ----------
+    at_zero, right : int
+        How many there are at zero frequency, and unstable ones.
+    border : tuple
+        w of the s-plane of each undamped pair, and how often it occurs.
+    """
     notes = []
-    if hidden.on_border == 1:
+    if at_zero == 1 and not border:
         notes.append(
             "one mode at zero frequency that the loop neither drives nor sees is left out "
             "(it is no instability)"
         )
-    elif hidden.on_border:
-        at = f"{hidden.at_zero} at zero frequency" if hidden.at_zero else ""
-        pairs = ", ".join(f"{times} pair(s) at {float(w.mid()):.6g}" for w, times in hidden.border)
+    elif at_zero or border:
+        at = f"{at_zero} at zero frequency" if at_zero else ""
+        pairs = ", ".join(f"{times} pair(s) at {w:.6g}" for w, times in border)
         notes.append(
             f"modes on the border of stability that the loop neither drives nor sees are left out "
             f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
             "seen; inside, the loop is not asymptotically stable"
         )
-    if hidden.right:
-        notes.append(f"{hidden.right} unstable mode(s) that the loop neither drives nor sees")
+    if right:
+        notes.append(f"{right} unstable mode(s) that the loop neither drives nor sees")
     return tuple(notes)
 
 

@@ -100,7 +100,10 @@ def _notes(base: Findings, result: Settled) -> tuple[str, ...]:
     hidden = base.hidden
     if result.hidden_at_dc > hidden.at_zero:  # one that the data do not tell from a mode at zero
         hidden = replace(hidden, at_zero=result.hidden_at_dc)
-    notes = [*hidden_notes(hidden), *far_note(sum(out_of_sight(c.L) for c in result.reals))]
+    notes = [
+        *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
+        *far_note(sum(out_of_sight(c.L) for c in result.reals)),
+    ]
     if result.dropped:
         notes.append(
             f"{result.dropped} crossing(s) of the real axis more than {FAR_DB:g} dB from -1 are left out: "

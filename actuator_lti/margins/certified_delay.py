@@ -79,7 +79,10 @@ def certified_delayed_margins(
         near[1],
     )
     hidden = loops[0].hidden
-    notes = (*hidden_notes(hidden), *far_note(sum(out_of_sight(c.L) for c in reals)))
+    notes = (
+        *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
+        *far_note(sum(out_of_sight(c.L) for c in reals)),
+    )
     if band is None:
         notes = (*notes, f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed")
     return assembled(
