@@ -74,15 +74,15 @@ def assembled(
 
 
 def out_of_sight(L: complex) -> bool:
-    """Whether a crossing of the negative real axis is too far from -1 to be listed: more than 200 dB."""
-    return math.isfinite(abs(L)) and not FARTHEST**-1 <= abs(L) <= FARTHEST
+    """Whether a crossing of the negative real axis is too small to be listed: a margin above 200 dB."""
+    return abs(L) < 1.0 / FARTHEST
 
 
 def far_note(far: int) -> tuple[str, ...]:
     """What is said of crossings that are not listed."""
     if not far:
         return ()
-    return (f"{far} crossing(s) of the negative real axis more than 200 dB from -1 are not listed",)
+    return (f"{far} crossing(s) of the negative real axis whose margin is above 200 dB are not listed",)
 
 
 def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:

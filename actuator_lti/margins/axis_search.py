@@ -33,9 +33,9 @@ class Found:
     rising : array of bool
         Whether the phase rises at each of ``real_w``.
     far : int
-        Crossings of the negative real axis more than 200 dB from -1, which are not listed.
+        Crossings of the negative real axis with a gain below -200 dB, which are not listed.
     turns : int
-        Rising less falling ones among those whose gain is above that.
+        Rising less falling ones among those not listed where the gain is above one.
     known : Intervals
         They cover all that was searched, in order.
     """
@@ -87,7 +87,7 @@ def _clear(here: Intervals, listed_to: float, slack: float) -> Mask:
     least, most = here.bounds()
     off_circle = (least[0] > slack) | (most[0] < -slack)
     off_axis = _half_turns(least[1] - slack) == _half_turns(most[1] + slack)
-    out_of_sight = (most[0] < -FAR_LOG) | (least[0] > FAR_LOG) | (here.low >= listed_to)
+    out_of_sight = (most[0] < -FAR_LOG) | (here.low >= listed_to)
     clear: Mask = (one_way[0] | off_circle) & (one_way[1] | off_axis | out_of_sight)
     return clear
 
@@ -104,7 +104,7 @@ def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -
         first[0] = _half_turns(known.first[1, 0] + math.copysign(2.0 * _REAL, known.first[3, 0]))
     least, most = known.bounds()
     listed = known.low < listed_to
-    seen = (most[0] >= -FAR_LOG) & (least[0] <= FAR_LOG) & listed
+    seen = (most[0] >= -FAR_LOG) & listed
     step = (last - first).astype(int)
     count = np.where(seen, np.abs(step), 0)
     which = np.repeat(np.arange(count.size), count)
@@ -120,7 +120,7 @@ def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -
         w[hit.size :][order],
         rising[order],
         int(np.abs(step[~seen & listed]).sum()),
-        int(step[~seen & (least[0] > FAR_LOG)].sum()),
+        int(step[~seen & (least[0] > 0.0)].sum()),
         known,
     )
 

@@ -77,7 +77,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     second = _poles_behind_delay(loop, delay_s, gain_x) if closed is None else closed.unstable
     if second is not None and count != second:
         raise Doubtful("poles and Nyquist count disagree")
-    listed = np.abs(np.log(np.abs(real_L))) <= FAR_LOG
+    listed = np.log(np.abs(real_L)) >= -FAR_LOG
     far += int(np.count_nonzero(~listed)) + sum(value.real < 0.0 and out_of_sight(value) for value in ends)
     if math.isfinite(listed_to) and band is None and factors.at_infinity:
         listed &= np.abs(real_L) >= FLOOR
@@ -326,7 +326,7 @@ def _to_end(response: Response, part: _Part, end: complex) -> tuple[float, float
 
 def _trust_crossings(loop: RationalLoop, gain_x: Real, real_x: Real, ends: tuple[complex, complex]) -> None:
     """The error bound of every crossing, and of the gain at both ends."""
-    at_ends = [x for x, L in zip((0.0, loop.end), ends, strict=True) if _LEAST <= abs(L) <= 1.0 / _LEAST]
+    at_ends = [x for x, L in zip((0.0, loop.end), ends, strict=True) if _LEAST <= abs(L) < math.inf]
     if loop.numerator is None and not loop.in_z:
         at_ends = [x for x in at_ends if x < math.inf]  # the direct feed-through is an entry: exact
     if not (error_bound(loop, np.concatenate((gain_x, real_x, at_ends))) <= MOST_ERROR).all():

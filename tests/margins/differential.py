@@ -126,7 +126,7 @@ def truth(loop: control.TransferFunction, part: Fraction = Fraction(0)) -> Facts
             last = math.pi / float(loop.dt) if loop.dt else math.inf
             both = ((0.0, num[0], den[0]), (last, num[n], den[n]))
             gains += [(w, -float(arb(d) / arb(c))) for w, c, d in both if c * d < 0 and n]
-    return Facts(unstable, sorted(g for g in gains if 1.0 / FARTHEST <= g[1] <= FARTHEST), phases)
+    return Facts(unstable, sorted(g for g in gains if g[1] <= FARTHEST), phases)
 
 
 def integers(loop: control.TransferFunction) -> tuple[fmpz_poly, fmpz_poly]:

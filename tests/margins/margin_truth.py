@@ -266,11 +266,11 @@ def difference(m: StabilityMargins, expected: Truth, period: float, rel: float) 
 
 
 def within_sight(a: Truth) -> Truth:
-    """Without the crossings of the real axis more than 200 dB from -1, which are not listed."""
-    real = [(x, k) for x, k in zip(a.phase_crossovers, a.gain_margins, strict=True) if 1e-10 <= k <= 1e10]
+    """Without the crossings of the real axis with a margin above 200 dB, which are not listed."""
+    real = [(x, k) for x, k in zip(a.phase_crossovers, a.gain_margins, strict=True) if k <= 1e10]
     return replace(
         a, phase_crossovers=[x for x, _ in real], gain_margins=[k for _, k in real],
-        end_margins=[k for k in a.end_margins if 1e-10 <= k <= 1e10],
+        end_margins=[k for k in a.end_margins if k <= 1e10],
     )  # fmt: skip
 
 
