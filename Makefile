@@ -15,7 +15,7 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+.PHONY: differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -74,6 +74,10 @@ check: $(ALL)
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
 fuzz: $(ALL)
 	$(BIN)/python -m tests.hardness.fuzz --seconds $(SECONDS) --seed $(SEED)
+
+# Harsh loops in all their forms against exact polynomials: make differential SECONDS=120 SEED=$$(date +%j)
+differential: $(ALL)
+	$(BIN)/python -m tests.margins.differential --seconds $(SECONDS) --seed $(SEED)
 
 bench: $(ALL)
 	$(BIN)/python -m benchmarks.run

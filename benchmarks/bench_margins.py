@@ -14,28 +14,22 @@ import numpy as np
 from actuator_lti.margins import stability_margins
 from benchmarks.row import Row
 
-ORDER = 10
+ORDER = 10  # of the certified ones
+ORDERS = (2, 5, 10, 25)
 PERIOD_S = 1e-3
 LARGER = ((25, 0.030), (50, 0.100), (100, 0.400))  # order, seconds allowed
 CERTIFIED_S = 0.050
 
 
 def rows(quick: bool = False) -> Iterable[Row]:
-    """Median of the loops: ratio of the times at order 10, then the time of larger and certified ones."""
+    """Medians: ratio of the times over order and form, then the time of larger and certified loops."""
     seeds = range(3 if quick else 8)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for kind, target in (("continuous", 1.3), ("sampled", 1.0)):
-            pairs = [_times(_loop(seed, ORDER, kind == "sampled"), 20 if quick else 60) for seed in seeds]
-            ours, theirs = (statistics.median(pair[k] for pair in pairs) for k in (0, 1))
-            yield Row(
-                group="margins",
-                name=f"order {ORDER}, state space, {kind}: time over control.stability_margins",
-                measured=statistics.median(a / b for a, b in pairs),
-                unit="",
-                target=target,
-                note=f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms",
-            )
+        for order in (2,) if quick else ORDERS:
+            for form in ("state space", "transfer function"):
+                for kind in ("continuous", "sampled"):
+                    yield _beside(order, form, kind, seeds, 5 if order > ORDER else 20)
         for order, allowed_s in LARGER:
             loops = [_loop(seed, order, False) for seed in seeds]
             yield _row(f"order {order}, state space, continuous", loops, stability_margins, allowed_s)
@@ -43,6 +37,23 @@ def rows(quick: bool = False) -> Iterable[Row]:
             loops = [_loop(seed, ORDER, kind == "sampled") for seed in seeds]
             certified = partial(stability_margins, certify=True)
             yield _row(f"order {ORDER}, state space, {kind}, certified", loops, certified, CERTIFIED_S)
+
+
+def _beside(order: int, form: str, kind: str, seeds: range, repeats: int) -> Row:
+    """Median over loops of the ratio of both times."""
+    loops = [_loop(seed, order, kind == "sampled") for seed in seeds]
+    if form == "transfer function":
+        loops = [control.tf(loop) for loop in loops]
+    pairs = [_times(loop, repeats) for loop in loops]
+    ours, theirs = (statistics.median(pair[k] for pair in pairs) for k in (0, 1))
+    return Row(
+        group="margins",
+        name=f"order {order}, {form}, {kind}: time over control.stability_margins",
+        measured=statistics.median(a / b for a, b in pairs),
+        unit="",
+        target=1.3,
+        note=f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms",
+    )
 
 
 def _row(name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float) -> Row:
@@ -82,7 +93,7 @@ def _best(call: Callable[[], object], repeats: int) -> float:
     return best
 
 
-def _times(loop: control.StateSpace, repeats: int) -> tuple[float, float]:
+def _times(loop: control.LTI, repeats: int) -> tuple[float, float]:
     """Best time of each, taken in turns."""
     best = [float("inf"), float("inf")]
     for _ in range(repeats):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from actuator_lti.margins.results import (
     Agreement,
@@ -15,6 +16,8 @@ from actuator_lti.margins.results import (
     StabilityMargins,
     Verdict,
 )
+
+FARTHEST = 1e10
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ def assembled(
     reason: str,
     delay_s: float = 0.0,
     band_rad_s: tuple[float, float] | None = None,
+    hidden_border: int = 0,
 ) -> StabilityMargins:
     """Put a result together; without figures they are withheld."""
     if band_rad_s is None:
@@ -65,7 +69,49 @@ def assembled(
         notes=notes,
         evidence=evidence,
         evidence_reason=reason,
+        hidden_border_modes=hidden_border,
     )
+
+
+def out_of_sight(L: complex) -> bool:
+    """Whether a crossing of the negative real axis is too small to be listed: a margin above 200 dB."""
+    return abs(L) < 1.0 / FARTHEST
+
+
+def far_note(far: int) -> tuple[str, ...]:
+    """What is said of crossings that are not listed."""
+    if not far:
+        return ()
+    return (f"{far} crossing(s) of the negative real axis whose margin is above 200 dB are not listed",)
+
+
+def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:
+    """What is said of modes that the loop neither drives nor sees.
+
+    Parameters
+    ----------
+    at_zero, right : int
+        How many there are at zero frequency, and unstable ones.
+    border : tuple
+        w of the s-plane of each undamped pair, and how often it occurs.
+    """
+    notes = []
+    if at_zero == 1 and not border:
+        notes.append(
+            "one mode at zero frequency that the loop neither drives nor sees is left out "
+            "(it is no instability)"
+        )
+    elif at_zero or border:
+        at = f"{at_zero} at zero frequency" if at_zero else ""
+        pairs = ", ".join(f"{times} pair(s) at {w:.6g}" for w, times in border)
+        notes.append(
+            f"modes on the border of stability that the loop neither drives nor sees are left out "
+            f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
+            "seen; inside, the loop is not asymptotically stable"
+        )
+    if right:
+        notes.append(f"{right} unstable mode(s) that the loop neither drives nor sees")
+    return tuple(notes)
 
 
 def verdict_of(agreement: Agreement) -> tuple[bool | None, Verdict]:
@@ -90,3 +136,21 @@ def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None
         samples = None if period_s is None else seconds / period_s
         out.append(DelayMargin(seconds, samples, margin.frequency_rad_s))
     return tuple(out)
+
+
+def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:
+    """The same with only the margins of a band listed."""
+    if band is None:
+        return margins
+    low, high = band
+
+    def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
+
+    return replace(
+        margins,
+        gain_margins=inside(margins.gain_margins),
+        phase_margins=inside(margins.phase_margins),
+        delay_margins=inside(margins.delay_margins),
+        band_rad_s=(low, high),
+    )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.assemble import Figures, assembled
+from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.determined import FAR_DB, Settled, settled
 from actuator_lti.margins.exact_extremes import disk_alpha, modulus_margin
 from actuator_lti.margins.exact_findings import Crossing, Findings, findings
-from actuator_lti.margins.exact_loop import ExactLoop, exact_loop
+from actuator_lti.margins.exact_loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
 from actuator_lti.margins.results import (
     Agreement,
@@ -36,7 +37,7 @@ def certified_margins(given: Given) -> StabilityMargins:
     """
     loop = exact_loop(given)
     _refuse_ill_posed(loop)
-    others = [exact_loop(neighbour) for neighbour in given.neighbours()]
+    others = neighbours(given, loop)
     base, result = _compared(loop, others, merge=False)
     if result.problem is not None:
         base, result = _compared(loop, others, merge=True)
@@ -45,7 +46,7 @@ def certified_margins(given: Given) -> StabilityMargins:
 
 def _compared(loop: ExactLoop, others: list[ExactLoop], merge: bool) -> tuple[Findings, Settled]:
     base = findings(loop, merge)
-    return base, settled(base, [findings(other, merge, base) for other in others])
+    return base, settled(base, [findings(other, merge) for other in others])
 
 
 def _refuse_ill_posed(loop: ExactLoop) -> None:
@@ -71,7 +72,7 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
     if result.problem is None:
         modulus, disk = modulus_margin(base.loop), disk_alpha(base.loop)
         figures = Figures(
-            tuple(map(gain_margin, result.reals)),
+            tuple(gain_margin(c) for c in result.reals if not out_of_sight(c.L)),
             tuple(map(phase_margin, result.gains)),
             (modulus[0], frequency(modulus[1])),
             (disk[0], frequency(disk[1])),
@@ -84,6 +85,7 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
         notes=_notes(base, result),
         evidence="certified" if result.problem is None else "withheld",
         reason=result.problem or _reason(result),
+        hidden_border=max(base.hidden.on_border, result.hidden_at_dc) + base.loop.hidden_at_end,
     )
 
 
@@ -95,14 +97,13 @@ def _reason(result: Settled) -> str:
 
 
 def _notes(base: Findings, result: Settled) -> tuple[str, ...]:
-    notes = []
-    if result.hidden_at_dc:
-        notes.append(
-            "one mode at zero frequency that the loop neither drives nor sees is left out "
-            "(it is no instability)"
-        )
-    if base.hidden.right:
-        notes.append(f"{base.hidden.right} unstable mode(s) that the loop neither drives nor sees")
+    hidden = base.hidden
+    if result.hidden_at_dc > hidden.at_zero:  # one that the data do not tell from a mode at zero
+        hidden = replace(hidden, at_zero=result.hidden_at_dc)
+    notes = [
+        *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
+        *far_note(sum(out_of_sight(c.L) for c in result.reals)),
+    ]
     if result.dropped:
         notes.append(
             f"{result.dropped} crossing(s) of the real axis more than {FAR_DB:g} dB from -1 are left out: "

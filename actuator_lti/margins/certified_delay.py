@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 from flint import acb, arb, ctx, fmpq_poly
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.assemble import delay_margins, verdict_of
-from actuator_lti.margins.delay_form import DelayForm
+from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.delay_setting import FLOOR
 from actuator_lti.margins.determined import difference
-from actuator_lti.margins.exact_axis import Axis, Form, order_of, turn, zeros
-from actuator_lti.margins.exact_delay import ExactDelayLoop, exact_delay_loop, neighbour
+from actuator_lti.margins.exact_axis import Axis, Form, gain_order, phase_order, turn, zeros
+from actuator_lti.margins.exact_delay import ExactDelayLoop
 from actuator_lti.margins.exact_findings import Crossing
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
+from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import TOUCH
 
 _BITS = 128
@@ -29,13 +27,26 @@ _SLACK = 1e-8  # relative: how much lower a smallest distance may be without bei
 _AT_END = (0.9, 0.99, 0.999, 0.9999)  # parts of the distance at infinity at which a smaller one is looked for
 _ROUNDS = 8
 _AT_REST = 1e-3  # how far L has moved from its value at rest where a crossover is one of its own
+_METHOD = "zeros of real functions of the axis, parted by intervals in certified arithmetic"
 _REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries change nothing"
 
 
 def certified_delayed_margins(
-    form: DelayForm, margins: StabilityMargins, band: tuple[float, float] | None
+    loops: tuple[ExactDelayLoop, ...],
+    delay_s: float,
+    band: tuple[float, float] | None,
+    start: StabilityMargins | None = None,
 ) -> StabilityMargins:
-    """Certify a result of `delayed_margins`: crossings, verdict and bounds of both distances anew.
+    """All margins of a loop with exact delays, by certified intervals.
+
+    Parameters
+    ----------
+    loops : tuple of ExactDelayLoop
+        The loop, and its neighbours 8 ulp away.
+    delay_s : float
+        The delay in series, for the result.
+    start : StabilityMargins, optional
+        The answer in double precision: its distances are where the search for smaller ones begins.
 
     Raises
     ------
@@ -43,92 +54,97 @@ def certified_delayed_margins(
         Something could not be told.
     """
     with ctx.workprec(_BITS):
-        gains, reals, unstable, problem = _compared(form, band, merge=False)
+        answer, problem = _compared(loops, band, merge=False)
         if problem is not None:
-            gains, reals, unstable, problem = _compared(form, band, merge=True)
+            answer, problem = _compared(loops, band, merge=True)
+        near = _at_rest_or_infinity(loops[0])
+        if start is not None and start.modulus_margin is not None:
+            assert start.modulus_frequency_rad_s is not None
+            assert start.disk_margin is not None
+            near[0] = (start.modulus_margin, start.modulus_frequency_rad_s)
+            near[1] = (start.disk_margin.alpha, start.disk_margin.frequency_rad_s)
         if problem is None:
-            margins = _with_distances(Axis(exact_delay_loop(form)), margins)
-    second = margins.agreement.unstable_nyquist
-    notes = margins.notes
-    if second is not None and second != unstable:
-        # the turn of N + D is proven; the other count rests on open-loop poles that collocation found
-        notes = (*notes, f"the Nyquist count in double precision was {second} instead of {unstable}")
-        second = None
-    agreement = Agreement(unstable, second)
-    if problem is not None:
-        return withheld(replace(margins, agreement=agreement), problem)
-    low, high = margins.band_rad_s
-    phase_margins = tuple(
-        PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w) for c in gains if low <= c.w <= high
+            axis = Axis(loops[0])
+            near = [_distance(axis, near[0], 1.0), _distance(axis, near[1], 2.0)]
+    gains, reals, unstable, listed_to = answer
+    low, high = (0.0, listed_to) if band is None else band
+    figures = Figures(
+        tuple(GainMargin(1.0 / abs(c.L), c.w) for c in reals if low <= c.w <= high and not out_of_sight(c.L)),
+        tuple(
+            PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w)
+            for c in gains
+            if low <= c.w <= high
+        ),
+        near[0],
+        near[1],
     )
-    stable, verdict = verdict_of(agreement)
-    return replace(
-        margins,
-        stable=stable,
-        verdict=verdict,
-        gain_margins=tuple(GainMargin(1.0 / abs(c.L), c.w) for c in reals if low <= c.w <= high),
-        phase_margins=phase_margins,
-        delay_margins=delay_margins(phase_margins, None),
-        agreement=agreement,
+    hidden = loops[0].hidden
+    notes = (
+        *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
+        *far_note(sum(out_of_sight(c.L) for c in reals)),
+    )
+    if band is None:
+        notes = (*notes, f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed")
+    return assembled(
+        None,
+        Agreement(None, None) if problem else _agreement(unstable + hidden.right, start),
+        figures if problem is None else None,
+        method=_METHOD,
         notes=notes,
-        evidence="certified",
-        evidence_reason=_REASON,
+        evidence="certified" if problem is None else "withheld",
+        reason=problem or _REASON,
+        delay_s=delay_s,
+        band_rad_s=(low, high),
+        hidden_border=hidden.on_border,
     )
+
+
+def _at_rest_or_infinity(loop: ExactDelayLoop) -> list[tuple[float, float]]:
+    """Both distances at the nearer end of the axis, each with its frequency."""
+    ends = [(1.0, math.inf), (2.0, math.inf)]
+    N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
+    if D0 == 0:
+        return ends
+    at_rest = float((N0 / D0).p) / float((N0 / D0).q)
+    alpha = math.inf if at_rest == 1.0 else abs(2.0 * (1.0 + at_rest) / (1.0 - at_rest))
+    return [min(ends[0], (abs(1.0 + at_rest), 0.0)), min(ends[1], (alpha, 0.0))]
+
+
+def _agreement(unstable: int, start: StabilityMargins | None) -> Agreement:
+    """The turn of N + D is proven; the count in double precision stands beside it where it is the same."""
+    second = None if start is None else start.agreement.unstable_nyquist
+    return Agreement(unstable, second if second == unstable else None)
+
+
+_Answer = tuple[tuple[Crossing, ...], tuple[Crossing, ...], int, float]
 
 
 def _compared(
-    form: DelayForm, band: tuple[float, float] | None, merge: bool
-) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...], int, str | None]:
+    loops: tuple[ExactDelayLoop, ...], band: tuple[float, float] | None, merge: bool
+) -> tuple[_Answer, str | None]:
     """The answer, and what neighbours 8 ulp away say against it.
 
     With ``merge`` a gain of one at zero frequency, within `TOUCH`, is no crossover; that of the given doubles
     may lie at any frequency below the loop's own.
     """
-    gains, reals, unstable = _answer(form, band, merge)
+    answer, *others = (_answer(loop, band, merge) for loop in loops)
     problem = None
-    for way in (1.0, -1.0):
-        near_gains, near_reals, near_unstable = _answer(neighbour(form, way), band, merge)
-        if near_unstable != unstable:
+    for gains, reals, unstable, _ in others:
+        if unstable != answer[2]:
             problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
-        problem = problem or difference(gains, near_gains, "|L| = 1")
-        problem = problem or difference(reals, near_reals, "the real axis")
-    return gains, reals, unstable, problem
+        problem = problem or difference(answer[0], gains, "|L| = 1")
+        problem = problem or difference(answer[1], reals, "the real axis")
+    return answer, problem
 
 
-def _with_distances(axis: Axis, margins: StabilityMargins) -> StabilityMargins:
-    """Both smallest distances, confirmed or corrected."""
-    assert margins.modulus_margin is not None
-    assert margins.modulus_frequency_rad_s is not None
-    assert margins.disk_margin is not None
-    modulus = _distance(axis, (margins.modulus_margin, margins.modulus_frequency_rad_s), 1.0)
-    disk = _distance(axis, (margins.disk_margin.alpha, margins.disk_margin.frequency_rad_s), 2.0)
-    return replace(
-        margins, modulus_margin=modulus[0], modulus_frequency_rad_s=modulus[1], disk_margin=DiskMargin(*disk)
-    )
-
-
-def withheld(margins: StabilityMargins, reason: str) -> StabilityMargins:
-    """The same without any figure."""
-    return replace(
-        margins, stable=None, verdict="undecided", gain_margins=(), phase_margins=(), delay_margins=(),
-        modulus_margin=None, modulus_frequency_rad_s=None, disk_margin=None,
-        evidence="withheld", evidence_reason=reason,
-    )  # fmt: skip
-
-
-def _answer(
-    form: DelayForm, band: tuple[float, float] | None, merge: bool
-) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...], int]:
-    """Gain crossovers, crossings of the negative real axis, unstable closed-loop poles."""
-    loop = exact_delay_loop(form)
+def _answer(loop: ExactDelayLoop, band: tuple[float, float] | None, merge: bool) -> _Answer:
+    """Gain crossovers, crossings of the negative real axis, unstable closed-loop poles; how far they go."""
     axis = Axis(loop)
     start = _lowest(loop)
     top = _beyond(loop, _UNDER_ONE, start)
     far = _beyond(loop, FLOOR, start) if band is None else max(band[1], top)
-    gains = [_crossing(axis, x) for x in zeros(axis, _GAIN, axis.edges(start, top))]
-    both = loop.N.series(20) * loop.D.series(20)(fmpq_poly([0, -1]))
-    order = order_of(list(both.coeffs()[:20]))
-    reals = [_crossing(axis, x) for x in zeros(axis, _PHASE, axis.edges(start, far), order)]
+    gains = [_crossing(axis, x) for x in zeros(axis, _GAIN, axis.edges(start, top), gain_order(loop))]
+    reals = [_crossing(axis, x) for x in zeros(axis, _PHASE, axis.edges(start, far), phase_order(loop))]
     reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= FLOOR)]
     N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
     at_rest = None if D0 == 0 else float((N0 / D0).p) / float((N0 / D0).q)
@@ -136,7 +152,7 @@ def _answer(
         reals = [Crossing(0.0, complex(at_rest)), *reals]
     if merge and at_rest is not None and abs(at_rest - 1.0) <= TOUCH:
         gains = [c for c in gains if abs(c.L - at_rest) > _AT_REST]
-    return tuple(gains), tuple(reals), _unstable(axis, axis.edges(start, top))
+    return tuple(gains), tuple(reals), _unstable(axis, axis.edges(start, top)), far
 
 
 def _crossing(axis: Axis, x: arb) -> Crossing:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -10,11 +10,8 @@ from typing import Any, TypeVar
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.positive_axis import positive_axis_roots
-from actuator_lti.margins.root_isolation import Near, NotIsolated, isolated_roots, square_free
 
 _MOST_BITS = 1 << 15
-_HIGH = 40  # degree above which simultaneous iteration takes less time than the library
 _SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
 V = fmpz_poly([0, 1])
 Polynomial = TypeVar("Polynomial", fmpz_poly, fmpq_poly)
@@ -59,30 +56,14 @@ def free_of(p: fmpz_poly, q: fmpz_poly) -> fmpz_poly:
     return p
 
 
-def all_roots(p: fmpz_poly, near: Near = None) -> list[tuple[acb, int]]:
-    """Every root but zero, isolated, with its multiplicity; the real ones have no imaginary part at all.
-
-    ``near`` may say about where the simple ones are, see `isolated_roots`.
-    """
+def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
+    """Every root but zero, isolated, with its multiplicity; the real ones have no imaginary part at all."""
     while p.degree() > 0 and p[0] == 0:
         p = p.right_shift(1)
     if p.degree() < 1:
         return []
-    p = p // p.content()
-    if p.degree() > _HIGH:
-        try:
-            return [(root, n) for factor, n in square_free(p) for root in _roots_of_factor(factor, near)]
-        except NotIsolated:
-            pass  # the library parts any roots, in its time
-    result: Any = p.complex_roots()
+    result: Any = (p // p.content()).complex_roots()
     return [(acb(root), times) for root, times in result]
-
-
-def _roots_of_factor(p: fmpz_poly, near: Near) -> list[acb]:
-    if p.degree() > _HIGH:
-        return isolated_roots(p, near)
-    result: Any = p.complex_roots()
-    return [acb(root) for root, _ in result]
 
 
 def sign_changes(p: fmpz_poly) -> int:
@@ -97,27 +78,6 @@ def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:
     return sorted(real, key=lambda pair: float(pair[0].mid()))
 
 
-def roots_on_axis(p: fmpz_poly) -> list[tuple[arb, int]]:
-    """The positive roots of a polynomial in order, isolated, with their multiplicities."""
-    while p.degree() > 0 and p[0] == 0:
-        p = p.right_shift(1)
-    if p.degree() > _HIGH:
-        try:
-            found = [
-                (v, n) for factor, n in square_free(p // p.content()) for v in _positive_of_factor(factor)
-            ]
-            return sorted(found, key=lambda pair: float(pair[0].mid()))
-        except NotIsolated:
-            pass
-    return positive_roots(all_roots(p))
-
-
-def _positive_of_factor(p: fmpz_poly) -> list[arb]:
-    if p.degree() > _HIGH:
-        return positive_axis_roots(p)
-    return [v for v, _ in positive_roots([(root, 1) for root in _roots_of_factor(p, None)])]
-
-
 @dataclass(frozen=True)
 class HalfPlanes:
     """Where the roots of a polynomial lie.
@@ -130,14 +90,16 @@ class HalfPlanes:
         Multiplicity of the root zero.
     border : tuple of (arb, int)
         w > 0 of the roots +-j w, with their multiplicity.
-    near : tuple of complex or None
-        About where the simple roots off the axis are.
     """
 
     right: int
     at_zero: int
     border: tuple[tuple[arb, int], ...]
-    near: Near = field(default=None, compare=False, repr=False)
+
+    @property
+    def pairs(self) -> tuple[tuple[float, int], ...]:
+        """The same in double precision."""
+        return tuple((float(w.mid()), times) for w, times in self.border)
 
     @property
     def on_border(self) -> int:
@@ -145,12 +107,10 @@ class HalfPlanes:
         return self.at_zero + 2 * sum(times for _, times in self.border)
 
 
-def places(roots: list[tuple[acb, int]]) -> Near:
-    """Where the simple ones of certified roots are, in double precision: a start for those of a neighbour."""
-    return tuple(complex(root) for root, times in roots if times == 1)
+NOTHING_HIDDEN = HalfPlanes(0, 0, ())
 
 
-def half_planes(p: fmpz_poly, near: Near = None) -> HalfPlanes:
+def half_planes(p: fmpz_poly) -> HalfPlanes:
     """Sort the roots by the imaginary axis, exactly.
 
     Roots that lie symmetrically to the origin, all those on the axis among them, are the common factor of
@@ -167,23 +127,22 @@ def half_planes(p: fmpz_poly, near: Near = None) -> HalfPlanes:
         border = [(v.sqrt(), times) for v, times in positive_roots(all_roots(symmetric))]
         right = symmetric.degree() - sum(times for _, times in border)
         p = p // _exact(symmetric(_SQUARE))
-    told, simple = _right(p, near)
-    return HalfPlanes(right + told, at_zero, tuple(border), simple)
+    return HalfPlanes(right + _right(p), at_zero, tuple(border))
 
 
 def _exact(p: fmpz_poly) -> fmpz_poly:
     return p // p.content()
 
 
-def _right(p: fmpz_poly, near: Near) -> tuple[int, Near]:
-    """How many roots are right of the axis, and where the simple ones are."""
+def _right(p: fmpz_poly) -> int:
+    """How many roots are right of the axis."""
     if sign_changes(p) == 0 and p.degree() < 3:
-        return 0, None
+        return 0
     bits = ctx.prec
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
-            roots = all_roots(p, near)
+            roots = all_roots(p)
             if all(root.real > 0 or root.real < 0 for root, _ in roots):
-                return sum(times for root, times in roots if root.real > 0), places(roots)
+                return sum(times for root, times in roots if root.real > 0)
         bits *= 2
     raise NumericalError("a closed-loop pole could not be told from the border of stability")

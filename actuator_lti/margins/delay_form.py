@@ -94,12 +94,16 @@ def delay_form(system: Any, series_s: float = 0.0) -> DelayForm:
 
 
 def from_rational(loop: RationalLoop, series_s: float) -> DelayForm:
+    """A rational loop behind a delay, with its zeros and poles."""
+    return replace(in_series(loop, series_s), zeros=zeros(loop), poles=poles(loop))
+
+
+def in_series(loop: RationalLoop, series_s: float) -> DelayForm:
     """A rational loop behind a delay."""
     n = loop.order
     whole = np.empty((n + 1, n + 1))
     whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = loop.A, loop.b, loop.c, loop.d
-    form = _form(whole, n, np.empty(0), series_s, loop.period_s)
-    return replace(form, zeros=zeros(loop), poles=poles(loop))
+    return _form(whole, n, np.empty(0), series_s, loop.period_s)
 
 
 def _form(whole: Real, n: int, delays: Real, series_s: float, period_s: float | None) -> DelayForm:

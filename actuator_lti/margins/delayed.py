@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.assemble import delay_margins, verdict_of
+from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight, within
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, values
@@ -17,20 +16,14 @@ from actuator_lti.margins.extremes import DISK, MODULUS
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
-from actuator_lti.margins.results import (
-    Agreement,
-    DiskMargin,
-    GainMargin,
-    PhaseMargin,
-    StabilityMargins,
-)
+from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.sweep import GAIN, PHASE, crossings, variation
 
 _BESIDE = 1e-3  # of the next pole: this near to zero lies the hidden one, collocated
 
 
 def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
-    """All margins of a loop with delays, see `stability_margins`."""
+    """All margins of a continuous loop with delays inside, see `stability_margins`."""
     if form.series_s == 0.0 and abs(1.0 + form.D11) <= 1e-12:
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     setting = setting_of(form, band_rad_s)
@@ -41,17 +34,24 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     phase_x, phase_touch = crossings(form, intervals, PHASE, no_phase)
     count = _nyquist(setting, intervals)
     agreement = _agreement(setting, count, float(gain_x.max()) if gain_x.size else 0.0)
-    distances = [smallest_distance(setting, intervals, criterion) for criterion in (MODULUS, DISK)]
-    return _assembled(setting, band_rad_s, agreement, (gain_x, gain_touch), (phase_x, phase_touch), distances)
-
-
-def without_intervals(form: DelayForm, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
-    """What exact arithmetic starts from where the intervals in double precision do not settle."""
-    none = np.empty(0), np.empty(0, dtype=bool)
-    at_infinity = [(1.0, math.inf), (2.0, math.inf)]
-    return _assembled(
-        setting_of(form, band_rad_s), band_rad_s, Agreement(None, None), none, none, at_infinity
+    modulus, disk = (smallest_distance(setting, intervals, criterion) for criterion in (MODULUS, DISK))
+    gain_margins, far = _gain_margins(setting, phase_x, phase_touch, listed_all=band_rad_s is not None)
+    notes = [*hidden_notes(setting.hidden), *far_note(far)]
+    if band_rad_s is None:
+        notes.append(f"gain margins above 40 dB beyond {setting.high:.4g} rad/s are not listed")
+    result = assembled(
+        None,
+        agreement,
+        Figures(gain_margins, _phase_margins(form, gain_x, gain_touch), modulus, disk),
+        method="intervals split until a bound on the change of L shows that nothing hides between two points",
+        notes=tuple(notes),
+        evidence="checked",
+        reason=_reason(agreement),
+        delay_s=form.series_s,
+        band_rad_s=(0.0, setting.high),
+        hidden_border=setting.hidden,
     )
+    return within(result, band_rad_s)
 
 
 def delayed_gain_crossings(form: DelayForm, level: float) -> list[float]:
@@ -73,21 +73,18 @@ def _nyquist(setting: Setting, intervals: Intervals) -> int | None:
     angle = float(np.angle(F[1:] * F[:-1].conj()).sum())
     if setting.order:
         r = setting.low
-        on_real = values(form, np.array([np.exp(r) if form.sampled else r], dtype=complex))[0]
+        on_real = values(form, np.array([r], dtype=complex))[0]
         on_axis = border_values(form, np.array([r]))[0]
         angle += angle_about(1.0 + on_real.real, 1.0 + on_axis, -0.5 * np.pi * setting.order)
         angle += angle_between(complex(1.0 + on_axis), complex(F[0]))
     else:
         angle += angle_between(1.0 + complex(dc_value(setting)), complex(F[0]))
-    end = 1.0 if not form.sampled else 1.0 + float(border_values(form, np.array([math.pi]))[0].real)
-    angle += angle_between(complex(F[-1]), complex(end))
+    angle += angle_between(complex(F[-1]), 1.0 + 0j)
     return setting.open_poles.unstable - round(angle / np.pi)
 
 
 def _agreement(setting: Setting, count: int | None, crossover: float) -> Agreement:
     form = setting.form
-    if form.sampled:
-        return Agreement(None, count)
     points = points_for(form, 2.0 * crossover)
     if points is None:  # the gain is above one for many turns of the delay: more poles than can be collocated
         return Agreement(None, count)
@@ -107,53 +104,6 @@ def _without_hidden(closed: SortedPoles, hidden: int) -> tuple[int, int]:
     return closed.unstable - int(closed.values[k].real > 0.0), closed.border_count
 
 
-def _assembled(
-    setting: Setting,
-    band: tuple[float, float] | None,
-    agreement: Agreement,
-    gains: tuple[Real, Mask],
-    phases: tuple[Real, Mask],
-    distances: list[tuple[float, float]],
-) -> StabilityMargins:
-    form = setting.form
-    unit = 1.0 if form.period_s is None else 1.0 / form.period_s
-    low, high = band if band is not None else (0.0, setting.high * unit)
-    stable, verdict = verdict_of(agreement)
-    method = "intervals split until a bound on the change of L shows that nothing hides between two points"
-    notes = []
-    if setting.hidden:
-        notes.append("one mode at zero frequency that the loop neither drives nor sees is left out")
-    if band is None and not form.sampled:
-        notes.append(f"gain margins above 40 dB beyond {setting.high * unit:.4g} rad/s are not listed")
-    result = StabilityMargins(
-        stable=stable,
-        verdict=verdict,
-        gain_margins=(),
-        phase_margins=(),
-        delay_margins=(),
-        modulus_margin=None,
-        modulus_frequency_rad_s=None,
-        disk_margin=None,
-        period_s=form.period_s,
-        delay_s=form.series_s,
-        band_rad_s=(low, high),
-        method=method,
-        agreement=agreement,
-        notes=tuple(notes),
-        evidence_reason=_reason(agreement),
-    )
-    phase_margins = _phase_margins(form, gains, (low, high))
-    return replace(
-        result,
-        gain_margins=_gain_margins(setting, phases, (low, high), band is not None or form.sampled),
-        phase_margins=phase_margins,
-        delay_margins=delay_margins(phase_margins, form.period_s),
-        modulus_margin=distances[0][0],
-        modulus_frequency_rad_s=distances[0][1] * unit,
-        disk_margin=DiskMargin(distances[1][0], distances[1][1] * unit),
-    )
-
-
 def _reason(agreement: Agreement) -> str:
     if agreement.unstable_poles is None:
         return "intervals with a bound that leaves nothing between them; stability by the Nyquist count alone"
@@ -161,28 +111,21 @@ def _reason(agreement: Agreement) -> str:
 
 
 def _gain_margins(
-    setting: Setting, phases: tuple[Real, Mask], band: tuple[float, float], listed_all: bool
-) -> tuple[GainMargin, ...]:
-    form = setting.form
-    unit = 1.0 if form.period_s is None else 1.0 / form.period_s
-    out = []
-    if setting.order == 0 and dc_value(setting) < 0.0 and band[0] <= 0.0:
-        out.append(GainMargin(-1.0 / dc_value(setting), 0.0))
-    x, touch = phases
-    for at, L, flat in zip(x, border_values(form, x), touch, strict=True):
-        if band[0] <= at * unit <= band[1] and (listed_all or abs(L) >= FLOOR):
-            out.append(GainMargin(float(1.0 / abs(L)), float(at) * unit, bool(flat)))
-    return tuple(out)
+    setting: Setting, x: Real, touch: Mask, listed_all: bool
+) -> tuple[tuple[GainMargin, ...], int]:
+    """Those within sight, and how many are not."""
+    at_rest = 0.0 if setting.order else dc_value(setting)
+    places = [(0.0, complex(at_rest), False)] if at_rest < 0.0 else []
+    places += zip(x.tolist(), border_values(setting.form, x).tolist(), touch.tolist(), strict=True)
+    seen = [place for place in places if not out_of_sight(place[1])]
+    listed = [place for place in seen if listed_all or not place[0] or abs(place[1]) >= FLOOR]
+    margins = tuple(GainMargin(1.0 / abs(L), at, flat) for at, L, flat in listed)
+    return margins, len(places) - len(seen)
 
 
-def _phase_margins(
-    form: DelayForm, gains: tuple[Real, Mask], band: tuple[float, float]
-) -> tuple[PhaseMargin, ...]:
-    unit = 1.0 if form.period_s is None else 1.0 / form.period_s
-    x, touch = gains
+def _phase_margins(form: DelayForm, x: Real, touch: Mask) -> tuple[PhaseMargin, ...]:
     deg = np.degrees(np.angle(-border_values(form, x))) if x.size else x
     return tuple(
-        PhaseMargin(float(d) if d > -180.0 else 180.0, float(at) * unit, bool(flat))
+        PhaseMargin(float(d) if d > -180.0 else 180.0, float(at), bool(flat))
         for at, d, flat in zip(x, deg, touch, strict=True)
-        if band[0] <= at * unit <= band[1]
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.errors import InputError
 from actuator_lti.margins.certified_roots import all_roots
 from actuator_lti.margins.exact_findings import Crossing, Findings
 from actuator_lti.margins.given import ULP
@@ -54,13 +53,7 @@ class Settled:
 
 
 def settled(base: Findings, others: list[Findings]) -> Settled:
-    """Compare the findings of the given doubles with those of their neighbours.
-
-    Raises
-    ------
-    InputError
-        A pole on the border of stability is cancelled by a zero.
-    """
+    """Compare the findings of the given doubles with those of their neighbours."""
     unstable, border, hidden, problem = _poles(base, others)
     reals, dropped = base.reals, 0
     for other in others:
@@ -115,12 +108,10 @@ def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
 
 def _poles(base: Findings, others: list[Findings]) -> tuple[int | None, int, int, str | None]:
     hidden = base.hidden.at_zero
-    if hidden > 1 or base.hidden.border or base.loop.hidden_degree > base.loop.hidden.degree():
-        where = "at zero frequency are" if hidden > 1 else "on the border of stability are"
-        raise InputError(f"poles {where} cancelled by zeros: cancel them in the loop first")
     counts = {(f.unstable, f.on_border, f.hidden.at_zero) for f in (base, *others)}
     closed = _values(base, closed=True)
-    if len(counts) == 1 and not _some_near_zero(np.abs(closed)):
+    size = np.abs(closed)
+    if len(counts) == 1 and not _some_near_zero(size[size > 0.0]):
         return base.unstable, base.on_border, hidden, None
     return _by_movement(base, others, closed)
 

@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.margins.delay_form import DelayForm, delay_form, from_rational
-from actuator_lti.margins.delayed import delayed_margins, without_intervals
+from actuator_lti.margins.assemble import assembled, within
+from actuator_lti.margins.checked import checked_margins
+from actuator_lti.margins.delay_form import DelayForm, delay_form
+from actuator_lti.margins.delayed import delayed_margins
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured import measured_margins
-from actuator_lti.margins.rational import checked_margins
-from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.results import Agreement, StabilityMargins
+from actuator_lti.margins.series_delay import in_series
 from actuator_lti.margins.trust import Doubtful
+
+if TYPE_CHECKING:
+    from actuator_lti.margins.exact_delay import ExactDelayLoop
 
 _MOST_SAMPLES = 100
 
@@ -28,11 +35,12 @@ def stability_margins(
 ) -> StabilityMargins:
     """Find all margins of a loop L closed by negative unit feedback.
 
-    Rational loops need no grid: crossovers are eigenvalues (Boyd, Balakrishnan, Kabamba 1989), each held by a
-    change of sign and polished by Newton. With delays, inside or in series, intervals are split until a bound
-    on the change of L shows that nothing hides between two points. Stability is found twice: from closed-loop
-    poles (with delays, by collocation) and from the Nyquist curve alone. What double precision cannot check
-    in this way is worked out in exact arithmetic; ``.evidence`` says how the answer is known. Quoted are, see
+    A rational loop, alone or behind a delay, is taken as its factors: the change of each over an interval of
+    frequency is known, and intervals are split until the loop stays off the unit circle and the negative real
+    axis in each, or moves over them one way; no crossing is left out. Stability is found twice where it can
+    be, from closed-loop poles (with delays, by collocation) and from the Nyquist curve. With delays inside, a
+    bound on the change of L takes the place of the factors. What double precision cannot check in this way is
+    worked out in exact arithmetic; ``.evidence`` says how the answer is known. Quoted are, see
     `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
     smallest delay margin (0 for an unstable loop), the smallest distance to -1.
 
@@ -42,13 +50,14 @@ def stability_margins(
         The open loop L, one input and one output, continuous or sampled. With ``dt=True`` the period counts
         as 1 s. Measured data give bounds between neighbouring points and no verdict.
     delay_s : float, optional
-        Exact extra delay in series, s. In a sampled loop whole samples become states; a fraction of a sample
-        is the factor exp(-j w delay) up to the Nyquist frequency; the verdict is then that of
-        the Nyquist curve alone.
+        Exact extra delay in series, s. In a sampled loop whole samples become states; part of a sample is the
+        factor exp(-j w delay) up to the Nyquist frequency, where L jumps to its conjugate by way of the mean
+        of both, which may lie on the negative real axis and be a gain margin. The verdict is then that of the
+        Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
     band_rad_s : tuple of float, optional
-        Where margins are listed. Default: everywhere; under a delay, whose phase crossovers never end, up to
-        where the gain stays below -40 dB (``.band_rad_s`` of the result). The verdict, the modulus and the
-        disk margin are those of the whole axis in any case.
+        Where margins are listed. Default: everywhere, gain margins up to 200 dB; under a delay, whose phase
+        crossovers never end, up to where the gain stays below -40 dB (``.band_rad_s`` of the result). The
+        verdict, the modulus and the disk margin are those of the whole axis in any case.
     certify : bool, optional
         Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
         ones with exact delays. A fraction of a sample and measured data stay as they are.
@@ -61,8 +70,8 @@ def stability_margins(
     Raises
     ------
     InputError
-        Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a pole on the border of stability
-        cancelled by a zero, a direct feed-through behind a delay (neutral type), data too coarse.
+        Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a direct feed-through of one or
+        more behind a delay (neutral type), data too coarse.
     NumericalError
         ``|L|`` is one at every frequency, or a search was not settled to its accuracy.
 
@@ -81,7 +90,13 @@ def stability_margins(
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
-            return _delayed(delay_form(system, delay_s), band_rad_s, certify)
+            form = delay_form(system, delay_s)  # refuses what is no loop
+            plain = in_series(system)
+            if plain is None:
+                return _delayed(form, band_rad_s, certify)
+            given, inside_s = plain
+            late = _behind_delay(given, inside_s + delay_s, band_rad_s, certify)
+            return replace(late, delay_s=delay_s)
         system = system.to_state_space()
     if not (hasattr(system, "num") or hasattr(system, "A")):
         raise InputError(
@@ -92,7 +107,7 @@ def stability_margins(
         return within(_rational(given, certify), band_rad_s)
     samples = None if given.period_s is None else whole_samples(delay_s / given.period_s)
     if samples is None:
-        return _delayed(from_rational(loop_of(given), delay_s), band_rad_s, certify)
+        return _behind_delay(given, delay_s, band_rad_s, certify)
     late = _rational(replace(given, samples=samples), certify)
     return replace(within(late, band_rad_s), delay_s=delay_s)
 
@@ -109,56 +124,64 @@ def _rational(given: Given, certify: bool) -> StabilityMargins:
         return certified_margins(given)
 
 
+def _behind_delay(
+    given: Given, delay_s: float, band: tuple[float, float] | None, certify: bool
+) -> StabilityMargins:
+    """A rational loop behind a delay, which may be part of a sample."""
+    margins, doubt = None, ""
+    try:
+        margins = checked_margins(loop_of(given, warp=True), delay_s, band)
+    except Doubtful as error:
+        doubt = str(error)
+    if margins is not None and (given.period_s is not None or not certify):
+        return margins
+    if given.period_s is not None:
+        return assembled(
+            given.period_s, Agreement(None, None), None, method="factors of the loop", notes=(),
+            evidence="withheld", reason=doubt, delay_s=delay_s,
+        )  # fmt: skip
+    from actuator_lti.margins.exact_delay import exact_behind_delay  # python-flint only where it is needed
+
+    return _certified_delayed(partial(exact_behind_delay, given, delay_s), delay_s, margins, band, doubt)
+
+
 def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
     """In double precision, and by certified intervals where the two ways to stability do not both tell."""
-    from actuator_lti.margins.certified_delay import certified_delayed_margins, withheld
-    from actuator_lti.margins.exact_axis import Undetermined
+    from actuator_lti.margins.exact_delay import exact_inside_delays  # python-flint only where it is needed
 
+    margins, doubt = None, ""
     try:
         margins = delayed_margins(form, band)
     except NumericalError as error:
-        if form.sampled:
-            raise
-        unknown = without_intervals(form, band)
-        try:
-            return certified_delayed_margins(form, unknown, band)
-        except Undetermined as exact:
-            return withheld(unknown, str(exact))
-        except (NumericalError, InputError):
-            raise error from None
-    told_twice = margins.agreement.agree and None not in (
-        margins.agreement.unstable_poles,
-        margins.agreement.unstable_nyquist,
-    )
-    if form.sampled or (told_twice and not certify):
+        doubt = str(error)
+    if margins is not None and not certify and margins.agreement.told_twice:
         return margins
+    return _certified_delayed(partial(exact_inside_delays, form), form.series_s, margins, band, doubt)
+
+
+def _certified_delayed(
+    loops: Callable[[], tuple[ExactDelayLoop, ...]],
+    delay_s: float,
+    margins: StabilityMargins | None,
+    band: tuple[float, float] | None,
+    doubt: str,
+) -> StabilityMargins:
+    """By certified intervals; what they do not tell is withheld, or stays as it is."""
+    from actuator_lti.margins.certified_delay import certified_delayed_margins
+
     try:
-        return certified_delayed_margins(form, margins, band)
+        return certified_delayed_margins(loops(), delay_s, band, margins)
     except (NumericalError, InputError) as error:
-        if not margins.agreement.agree:
-            return withheld(margins, f"poles and Nyquist count disagree; {error}")
-        return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
+        if margins is not None and margins.agreement.agree:
+            return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
+        doubt = doubt or "poles and Nyquist count disagree"
+        return assembled(
+            None, Agreement(None, None), None, method="certified intervals", notes=(), evidence="withheld",
+            reason=f"{doubt}; {error}", delay_s=delay_s,
+        )  # fmt: skip
 
 
 def whole_samples(samples: float) -> int | None:
     """The number of samples, where it is a whole one and becomes states."""
     whole = round(samples)
     return whole if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES else None
-
-
-def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:
-    """The same with only the margins of a band listed."""
-    if band is None:
-        return margins
-    low, high = band
-
-    def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
-        return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
-
-    return replace(
-        margins,
-        gain_margins=inside(margins.gain_margins),
-        phase_margins=inside(margins.phase_margins),
-        delay_margins=inside(margins.delay_margins),
-        band_rad_s=(low, high),
-    )

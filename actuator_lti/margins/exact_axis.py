@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from itertools import pairwise
 
-from flint import acb, arb
+from flint import acb, arb, fmpq_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.exact_delay import ExactDelayLoop, Quasi, at
@@ -18,6 +18,7 @@ _PER_DECADE = 5
 _HIGHEST_ORDER = 16
 _ODD = 0.9137236158
 J = acb(0, 1)
+_MIRROR = fmpq_poly([0, -1])
 
 Taylor = tuple[acb, acb, acb]  # value and slope in the middle, second derivative over the interval, by x
 
@@ -150,7 +151,11 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
         if slope > 0 or slope < 0:
             result += _root(axis, q, low, high)
             continue
-        if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
+        if count > _MOST_INTERVALS:
+            raise Undetermined(
+                f"{count} certified intervals reach no farther than {low:.6g} rad/s of {edges[-1]:.6g}"
+            )
+        if high - low < _NARROWEST * high:
             raise Undetermined(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]
@@ -192,12 +197,23 @@ def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
     raise NumericalError(f"a crossing near {x:.10g} rad/s did not settle")
 
 
-def order_of(series: list) -> int:
-    """Multiplicity of the zero of Im(N conj D) at x = 0, from the exact series of N(s) D(-s)."""
-    for k in range(1, _HIGHEST_ORDER, 2):
-        if k < len(series) and series[k] != 0:
+def gain_order(loop: ExactDelayLoop) -> int:
+    """Multiplicity of the zero of |N|^2 - |D|^2 at x = 0; 0: the gain is not one there."""
+    N, D = loop.N.series(_HIGHEST_ORDER), loop.D.series(_HIGHEST_ORDER)
+    return _order(N * N(_MIRROR) - D * D(_MIRROR), 0)
+
+
+def phase_order(loop: ExactDelayLoop) -> int:
+    """Multiplicity of the zero of Im(N conj D) at x = 0."""
+    return _order(loop.N.series(_HIGHEST_ORDER) * loop.D.series(_HIGHEST_ORDER)(_MIRROR), 1)
+
+
+def _order(series: fmpq_poly, first: int) -> int:
+    """The first power, counted in twos, whose coefficient is not zero."""
+    for k in range(first, _HIGHEST_ORDER, 2):
+        if series[k] != 0:
             return k
-    raise NumericalError("the phase of the loop does not leave the real axis at zero frequency")
+    raise NumericalError("the loop does not leave the line at zero frequency")
 
 
 def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
@@ -213,7 +229,8 @@ def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
     N, D = derivatives
     total = arb(0)
     for k in range(order + 1):
-        total += math.comb(order, k) * (q.v * N[k] * D[order - k].conjugate()).real
+        both = (q.u * N[k] * N[order - k].conjugate()).real + (q.v * N[k] * D[order - k].conjugate()).real
+        total += math.comb(order, k) * (both + (q.w * D[k] * D[order - k].conjugate()).real)
     return bool(total > 0 or total < 0)
 
 
@@ -248,7 +265,11 @@ def turn(axis: Axis, edges: list[float]) -> arb:
             )
             last = here
             continue
-        if count > _MOST_INTERVALS or high - low < _NARROWEST * high:
+        if count > _MOST_INTERVALS:
+            raise Undetermined(
+                f"{count} certified intervals reach no farther than {low:.6g} rad/s of {edges[-1]:.6g}"
+            )
+        if high - low < _NARROWEST * high:
             raise Undetermined(f"1 + L could not be told from zero near {low:.10g} rad/s")
         middle = 0.5 * (low + high)
         stack += [(middle, high), (low, middle)]

@@ -10,8 +10,10 @@ import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.certified_roots import NOTHING_HIDDEN, HalfPlanes, half_planes
 from actuator_lti.margins.delay_form import DelayForm
-from actuator_lti.margins.given import ULP
+from actuator_lti.margins.exact_loop import exact_loop, neighbours
+from actuator_lti.margins.given import ULP, Given
 
 _MOST_DELAYS = 5
 _MOST_AT_REST = 6
@@ -61,11 +63,12 @@ def at(balls: list[tuple[acb_poly, arb]], s: acb) -> acb:
 
 @dataclass(frozen=True)
 class ExactDelayLoop:
-    """L = N/D; retarded: the term of D without delay has the highest power alone."""
+    """L = N/D, hidden modes cancelled; retarded: the term of D without delay has the highest power alone."""
 
     N: Quasi
     D: Quasi
     degree: int
+    hidden: HalfPlanes = NOTHING_HIDDEN
 
 
 def neighbour(form: DelayForm, way: float) -> DelayForm:
@@ -80,6 +83,27 @@ def neighbour(form: DelayForm, way: float) -> DelayForm:
     names = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays", "series_s")
     values = {name: getattr(form, name) for name in DelayForm.__dataclass_fields__}
     return DelayForm(**{**values, **{name: moved(values[name]) for name in names}})
+
+
+def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ...]:
+    """A continuous rational loop behind a delay, common factors cancelled, and its neighbours 8 ulp away."""
+    loop = exact_loop(given)
+    if loop.N.degree() >= loop.D.degree():
+        raise InputError(
+            "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
+        )
+    hidden = half_planes(loop.hidden)
+    out = []
+    for near, way in zip((loop, *neighbours(given, loop)), (0.0, 1.0, -1.0), strict=True):
+        delay = _exact(delay_s + way * ULP * float(np.spacing(delay_s)))
+        N, D = (((fmpq_poly(p), tau),) for p, tau in ((near.N, delay), (near.D, fmpq(0))))
+        out.append(ExactDelayLoop(Quasi(N), Quasi(D), near.degree, hidden))
+    return tuple(out)
+
+
+def exact_inside_delays(form: DelayForm) -> tuple[ExactDelayLoop, ...]:
+    """A loop with delays inside, and its neighbours."""
+    return tuple(exact_delay_loop(f) for f in (form, neighbour(form, 1.0), neighbour(form, -1.0)))
 
 
 def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:

@@ -7,7 +7,7 @@ import math
 from flint import arb, ctx, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.certified_roots import roots_on_axis, split
+from actuator_lti.margins.certified_roots import all_roots, positive_roots, split
 from actuator_lti.margins.exact_loop import ExactLoop
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
@@ -33,7 +33,7 @@ def _smallest(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
-            places = [v for v, _ in roots_on_axis(slope)]
+            places = [v for v, _ in positive_roots(all_roots(slope))]
             values = [above(v) / below(v) for v in places]
             if all(_settled(value) for value in values):
                 stationary = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from flint import acb, arb, ctx, fmpz, fmpz_poly
@@ -16,12 +16,10 @@ from actuator_lti.margins.certified_roots import (
     all_roots,
     free_of,
     half_planes,
-    places,
     positive_roots,
     split,
 )
 from actuator_lti.margins.exact_loop import ExactLoop
-from actuator_lti.margins.root_isolation import Near
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
@@ -40,23 +38,16 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Findings:
-    """All crossings of an exact loop, ends included, and where its closed-loop poles lie.
-
-    ``neighbour`` are the findings of one next to it, whose roots (`near_gains`, `near_reals`: those of the
-    crossings) are where the search for these begins.
-    """
+    """All crossings of an exact loop, ends included, and where its closed-loop poles lie."""
 
     loop: ExactLoop
     gains: tuple[Crossing, ...]
     reals: tuple[Crossing, ...]
-    neighbour: Findings | None = field(default=None, repr=False)
-    near_gains: Near = field(default=None, repr=False)
-    near_reals: Near = field(default=None, repr=False)
 
     @cached_property
     def closed(self) -> HalfPlanes:
         """Closed-loop poles, hidden modes and those at infinity (z = -1) left out."""
-        return half_planes(self.loop.closed, self.neighbour.closed.near if self.neighbour else None)
+        return half_planes(self.loop.closed)
 
     @cached_property
     def hidden(self) -> HalfPlanes:
@@ -79,7 +70,7 @@ class Findings:
         return self.closed.on_border + self.closed_at_end
 
 
-def findings(loop: ExactLoop, merge: bool = False, neighbour: Findings | None = None) -> Findings:
+def findings(loop: ExactLoop, merge: bool = False) -> Findings:
     """Find every crossing.
 
     Parameters
@@ -87,9 +78,6 @@ def findings(loop: ExactLoop, merge: bool = False, neighbour: Findings | None = 
     merge : bool
         Take a gain within `TOUCH` of one at an end of the axis for one, which is no crossing; between two
         crossings L that stays so close to the line only touches it in any case.
-
-    neighbour : Findings, optional
-        Of a loop next to it: saves time.
 
     Raises
     ------
@@ -108,16 +96,15 @@ def findings(loop: ExactLoop, merge: bool = False, neighbour: Findings | None = 
         return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
 
     def off_axis(v: arb) -> arb:
-        return v.sqrt() * phase(v) / (N.at(v) * D.at(v)).abs_lower()
+        L = N.at(v) / D.at(v)
+        return L.imag / L.abs_lower()
 
     ends = _touched_ends(loop, gain) if merge else (False, False)
-    start = (neighbour.near_gains, neighbour.near_reals) if neighbour else (None, None)
-    gains, near_gains = _crossings(N, D, gain, off_circle, start[0], ends)
-    every, near_reals = _crossings(N, D, phase, off_axis, start[1])
-    reals = [c for c in every if c.L.real < 0.0]
+    gains = _crossings(N, D, gain, off_circle, ends)
+    reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
     first, last = _end(0.0, loop.N[0], loop.D[0]), _end(math.inf, *loop.at_end)
     reals = [*([first] if first else []), *reals, *([last] if last and loop.degree else [])]
-    return Findings(loop, tuple(gains), tuple(reals), neighbour, near_gains, near_reals)
+    return Findings(loop, tuple(gains), tuple(reals))
 
 
 def _end(w: float, N: fmpz, D: fmpz) -> Crossing | None:
@@ -141,14 +128,13 @@ def _crossings(
     D: Split,
     p: fmpz_poly,
     off: Callable[[arb], arb],
-    near: Near,
     touched_ends: tuple[bool, bool] = (False, False),
-) -> tuple[list[Crossing], Near]:
-    """The positive roots of p, touches merged, and where all are; ``off`` is the distance to the line."""
+) -> list[Crossing]:
+    """The positive roots of p, touches merged; ``off`` is the distance to the line."""
     bits = _FIRST_BITS
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
-            roots = all_roots(p, near)
+            roots = all_roots(p)
             met = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
             met = _merged(met, roots, off, touched_ends)
             values = [N.at(v) / D.at(v) for v, _ in met]
@@ -156,7 +142,7 @@ def _crossings(
                 return [
                     Crossing(float(v.sqrt().mid()), complex(L), touch)
                     for (v, touch), L in zip(met, values, strict=True)
-                ], places(roots)
+                ]
         bits *= 2
     raise NumericalError("a crossing of the loop could not be told from a zero or a pole beside it")
 

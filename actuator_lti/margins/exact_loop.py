@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from flint import fmpz, fmpz_poly
 
-from actuator_lti.margins.certified_roots import Polynomial
+from actuator_lti.margins.certified_roots import Polynomial, half_planes
 from actuator_lti.margins.exact_charpoly import characteristic, numerator
-from actuator_lti.margins.given import Given
+from actuator_lti.margins.given import ULP, Given
 
 _S = fmpz_poly([0, 1])
 
@@ -49,9 +49,31 @@ class ExactLoop:
         return self.N + self.D
 
     @property
+    def hidden_at_end(self) -> int:
+        """Hidden modes at z = -1."""
+        return self.hidden_degree - self.hidden.degree()
+
+    @property
     def at_end(self) -> tuple[fmpz, fmpz]:
         """Numerator and denominator of L at infinity (z = -1)."""
         return self.N[self.degree], self.D[self.degree]
+
+
+def neighbours(given: Given, loop: ExactLoop) -> list[ExactLoop]:
+    """The same from data 8 ulp away.
+
+    Where modes on the border cancel exactly, what is seen is moved and they stay: data next to these would
+    have a pole beside a zero there, and nothing in common with the loop.
+    """
+    hidden = half_planes(loop.hidden)
+    if hidden.on_border < 2 and not loop.hidden_at_end:
+        return [exact_loop(near) for near in given.neighbours()]
+    return [replace(loop, N=_moved(loop.N, way), D=_moved(loop.D, way)) for way in (1, -1)]
+
+
+def _moved(p: fmpz_poly, way: int) -> fmpz_poly:
+    signs = np.random.default_rng(0).choice([-1, 1], p.degree() + 1)
+    return fmpz_poly([c * ((1 << 53) + way * ULP * int(k)) for c, k in zip(p.coeffs(), signs, strict=True)])
 
 
 def exact_loop(given: Given) -> ExactLoop:

@@ -34,6 +34,11 @@ class Given:
     d: float = 0.0
     samples: int = 0
 
+    def behind_samples(self) -> Given:
+        """Coefficients over z^samples: the whole samples as poles at z = 0."""
+        late = np.concatenate((self.denominator, np.zeros(self.samples)))
+        return replace(self, denominator=late, samples=0)
+
     def neighbours(self) -> tuple[Given, Given]:
         """The same with every entry moved by 8 ulp, up or down at random, and the other way; zeros stay.
 

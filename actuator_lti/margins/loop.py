@@ -198,9 +198,9 @@ def loop_of(given: Given, warp: bool = False) -> RationalLoop:
     ``warp`` holds a sampled transfer function in the plane of (z - 1)/(z + 1), unless it has a pole at -1.
     """
     if given.A is None:
-        loop = from_coefficients(given.numerator, given.denominator, given.period_s, warp)
-    else:
-        loop = from_matrices(given.A, given.b, given.c, given.d, given.period_s)
+        late = given.behind_samples()
+        return from_coefficients(late.numerator, late.denominator, given.period_s, warp)
+    loop = from_matrices(given.A, given.b, given.c, given.d, given.period_s)
     return loop.delayed(given.samples) if given.samples else loop
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.extremes import DISK
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
 from actuator_lti.margins.measured_data import MeasuredResponse, measured_response
 from actuator_lti.margins.measured_distance import distance_ranges
-from actuator_lti.margins.rational import delay_margins
 from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
 
 _MOST_UNRESOLVED = 0.5

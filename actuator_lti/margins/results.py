@@ -86,6 +86,9 @@ class StabilityMargins:
         Why it is that: one line.
     modulus_range : tuple of float or None
         Measured data: where the modulus margin lies between the points and within the noise.
+    hidden_border_modes : int
+        Integrators and undamped modes that the loop neither drives nor sees: ``stable`` and the margins are
+        those of what is seen, `internally_stable` counts them.
     """
 
     stable: bool | None
@@ -105,6 +108,12 @@ class StabilityMargins:
     evidence: Evidence = "checked"
     evidence_reason: str = ""
     modulus_range: tuple[float, float] | None = None
+    hidden_border_modes: int = 0
+
+    @property
+    def internally_stable(self) -> bool | None:
+        """Whether every mode decays, those too that the loop neither drives nor sees."""
+        return self.stable and not self.hidden_border_modes
 
     @property
     def withheld(self) -> bool:

@@ -11,6 +11,9 @@ def frequency_text(omega_rad_s: float) -> str:
     return f"{omega_rad_s:.6g} rad/s ({omega_rad_s / (2.0 * math.pi):.6g} Hz)"
 
 
+_TOUCH = ", a touch within 1e-9: the line is not crossed"
+
+
 def _known(values: tuple[float, float] | None, bracket: tuple[float, float] | None, unit: str) -> str:
     """Where a measured figure and its frequency lie."""
     if values is None or bracket is None:
@@ -57,9 +60,8 @@ class GainMargin:
     def __str__(self) -> str:
         limit = "upper" if self.ratio >= 1.0 else "lower"
         known = _known(self.ratio_range, self.bracket_rad_s, "")
-        return (
-            f"{self.ratio:.6g} ({self.db:+.4f} dB, {limit}) at {frequency_text(self.frequency_rad_s)}{known}"
-        )
+        where = f"{frequency_text(self.frequency_rad_s)}{known}{_TOUCH if self.tangent else ''}"
+        return f"{self.ratio:.6g} ({self.db:+.4f} dB, {limit}) at {where}"
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,8 @@ class PhaseMargin:
 
     def __str__(self) -> str:
         known = _known(self.deg_range, self.bracket_rad_s, " deg")
-        return f"{self.deg:+.4f} deg at {frequency_text(self.frequency_rad_s)}{known}"
+        touch = _TOUCH if self.tangent else ""
+        return f"{self.deg:+.4f} deg at {frequency_text(self.frequency_rad_s)}{known}{touch}"
 
 
 @dataclass(frozen=True)
@@ -179,6 +182,11 @@ class Agreement:
         if self.unstable_poles is None or self.unstable_nyquist is None or self.border_poles:
             return True
         return self.unstable_poles == self.unstable_nyquist
+
+    @property
+    def told_twice(self) -> bool:
+        """Whether both ways apply, and agree."""
+        return self.agree and None not in (self.unstable_poles, self.unstable_nyquist)
 
     def __str__(self) -> str:
         if self.border_poles:

@@ -89,12 +89,14 @@ def nearest_on_a_grid(loop: control.TransferFunction, delay_s: float) -> float:
     return float(np.abs(1 + grid(loop, delay_s, 1e3)[1]).min())
 
 
-def test_many_turns_of_the_delay_that_collocation_cannot_follow_are_certified() -> None:
+def test_many_turns_of_the_delay_that_collocation_cannot_follow_are_certified_on_request() -> None:
     loop, delay_s = control.tf([30, 30], [1, 0.2, 0]), 1.1
     m = stability_margins(loop, delay_s=delay_s, band_rad_s=(0.0, 60.0))
-    assert m.agreement.unstable_poles == unstable_with_delay(truth_of(loop), delay_s)
-    assert m.agreement.unstable_poles == m.agreement.unstable_nyquist
-    assert (m.evidence, m.stable) == ("certified", False)
+    exact = stability_margins(loop, delay_s=delay_s, band_rad_s=(0.0, 60.0), certify=True)
+    assert m.agreement.unstable_nyquist == unstable_with_delay(truth_of(loop), delay_s)
+    assert exact.agreement.unstable_poles == exact.agreement.unstable_nyquist == m.agreement.unstable_nyquist
+    assert (m.evidence, exact.evidence, m.stable) == ("checked", "certified", False)
+    assert [g.ratio for g in m.gain_margins] == pytest.approx([g.ratio for g in exact.gain_margins], rel=1e-9)
 
 
 def test_delays_inside_and_in_series_are_certified_alike() -> None:

@@ -1,0 +1,147 @@
+"""Every crossing of a factored loop between two frequencies: nothing left out.
+
+Intervals are split until in each of them the bounds of `factors_on_axis` say that the loop stays off the
+line, or moves over it one way.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_lti.margins.assemble import FARTHEST
+from actuator_lti.margins.factors_on_axis import Factored, Intervals, halves
+from actuator_lti.margins.loop import Mask, Real
+
+FAR_LOG = math.log(FARTHEST)
+_TURN = 2.0 * math.pi
+_REAL = 1e-9  # rad
+_STEPS = 60
+_STEP = 1e-5  # relative: near enough for the loop itself to go on
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a factored loop meets the unit circle and the negative real axis.
+
+    Attributes
+    ----------
+    gain_w, real_w : arrays
+        In order.
+    rising : array of bool
+        Whether the phase rises at each of ``real_w``.
+    far : int
+        Crossings of the negative real axis with a gain below -200 dB, which are not listed.
+    turns : int
+        Rising less falling ones among those not listed where the gain is above one.
+    known : Intervals
+        They cover all that was searched, in order.
+    """
+
+    gain_w: Real
+    real_w: Real
+    rising: Mask
+    far: int
+    turns: int
+    known: Intervals
+
+
+def search(loop: Factored, low: float, high: float, listed_to: float = math.inf) -> Found:
+    """Find all crossings with low < w < high; of the real axis only those up to ``listed_to``.
+
+    A crossing at w = 0 itself, where low is 0, is not listed.
+
+    Raises
+    ------
+    Doubtful
+        The loop comes so near to a line that its side could not be told.
+    """
+    ends = [low, *([listed_to] if low < listed_to < high else []), high]
+    known = loop.covered(ends, lambda here: _clear(here, listed_to, loop.slack))
+    return _read(loop, known, low == 0.0, listed_to)
+
+
+def last_above(loop: Factored, low: float, high: float, level: float) -> float:
+    """The last w up to ``high`` at which the log gain is above a level; ``low`` where it never is."""
+
+    def clear(here: Intervals) -> Mask:
+        one_way = (here.least[2] > 0.0) | (here.most[2] < 0.0)
+        least, most = here.bounds()
+        return np.asarray(one_way | (least[0] > level) | (most[0] < level))
+
+    known = loop.covered([low, high], clear)
+    above = np.flatnonzero((known.first[0] >= level) | (known.last[0] >= level))
+    if not above.size:
+        return low
+    at = above[-1:]
+    if known.last[0, at] >= level:
+        return float(known.high[at[0]])
+    kind = np.zeros(1, dtype=int)
+    return float(_roots(loop, kind, known.low[at], known.high[at], np.full(1, level))[0])
+
+
+def _clear(here: Intervals, listed_to: float, slack: float) -> Mask:
+    one_way = (here.least[2:] > 0.0) | (here.most[2:] < 0.0)
+    least, most = here.bounds()
+    off_circle = (least[0] > slack) | (most[0] < -slack)
+    off_axis = _half_turns(least[1] - slack) == _half_turns(most[1] + slack)
+    out_of_sight = (most[0] < -FAR_LOG) | (here.low >= listed_to)
+    clear: Mask = (one_way[0] | off_circle) & (one_way[1] | off_axis | out_of_sight)
+    return clear
+
+
+def _half_turns(phase: Real) -> Real:
+    """How many odd multiples of pi lie below."""
+    return np.floor((phase + math.pi) / _TURN)
+
+
+def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -> Found:
+    hit = np.flatnonzero((known.first[0] > 0.0) != (known.last[0] > 0.0))
+    first, last = _half_turns(known.first[1]), _half_turns(known.last[1])
+    if from_zero and abs(math.sin(known.first[1, 0])) < _REAL:  # it leaves the real axis there, one way
+        first[0] = _half_turns(known.first[1, 0] + math.copysign(2.0 * _REAL, known.first[3, 0]))
+    least, most = known.bounds()
+    listed = known.low < listed_to
+    seen = (most[0] >= -FAR_LOG) & listed
+    step = (last - first).astype(int)
+    count = np.where(seen, np.abs(step), 0)
+    which = np.repeat(np.arange(count.size), count)
+    number = np.arange(which.size) - np.repeat(np.cumsum(count) - count, count)
+    rising = step[which] > 0
+    level = np.where(rising, first[which] + 1 + number, first[which] - number) * _TURN - math.pi
+    kind = np.repeat((0, 1), (hit.size, which.size))
+    both = np.concatenate((hit, which))
+    w = _roots(loop, kind, known.low[both], known.high[both], np.concatenate((np.zeros(hit.size), level)))
+    order = w[hit.size :].argsort()
+    return Found(
+        np.sort(w[: hit.size]),
+        w[hit.size :][order],
+        rising[order],
+        int(np.abs(step[~seen & listed]).sum()),
+        int(step[~seen & (least[0] > 0.0)].sum()),
+        known,
+    )
+
+
+def _roots(loop: Factored, kind: Real, low: Real, high: Real, level: Real) -> Real:
+    """Where gain (0) or phase (1), monotone in each bracket, takes a level: Newton held by bisection."""
+    if not low.size:
+        return low
+    each = np.arange(low.size)
+    above = loop.log_value(low)[kind, each] > level
+    at = halves(low, high)
+    for _ in range(_STEPS):
+        total = loop.log_value(at)
+        here = total[kind, each] - level
+        before = (here > 0.0) == above
+        low, high = np.where(before, at, low), np.where(before, high, at)
+        with np.errstate(all="ignore"):
+            ahead = at - here / total[kind + 2, each]
+        ahead = np.where((ahead >= low) & (ahead <= high), ahead, halves(low, high))
+        small = np.abs(ahead - at) <= _STEP * at
+        at = ahead
+        if small.all():
+            break
+    return at

@@ -1,0 +1,222 @@
+"""A rational loop as its factors, and the polish of what they tell by the loop itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuator_lti.margins.factors_on_axis import Factored
+from actuator_lti.margins.level_crossings import shifted, unwarped
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.poles import SortedPoles, eigenvalues
+from actuator_lti.margins.trust import Doubtful
+
+_LEAST_SLACK = 1e-8
+_SAME = 1e-4  # relative: the loop and the product of its factors
+_NEARLY_REAL = 1e-12
+_SEEN = 1e-10  # of L
+_NEWTON_STEPS = 6
+_NEWTON_STEP = 1e-9
+_ROUNDED = 1e-13  # of gain and phase: no step says more
+_FAR_OFF = 1e-4  # relative: a crossing of the factors and one of the loop
+
+
+@dataclass(frozen=True)
+class Response:
+    """A rational loop behind a delay, on w of the s-plane.
+
+    Attributes
+    ----------
+    loop : RationalLoop
+        Without the delay.
+    delay : float
+        s, or samples.
+    """
+
+    loop: RationalLoop
+    delay: float = 0.0
+
+    def x(self, w: Real) -> Real:
+        """The argument of the loop."""
+        return unwarped(w, self.loop.in_z)
+
+    def frequency(self, w: float) -> float:
+        """Angular frequency in rad/s."""
+        period = self.loop.period_s
+        return float(w) if period is None else 2.0 * math.atan(w) / period
+
+    def at(self, w: Real) -> Complex:
+        """L at w."""
+        x = self.x(w)
+        return self._late(x, self.loop.response(x))
+
+    def _late(self, x: Real, L: Complex) -> Complex:
+        return L * np.exp(-1j * self.delay * self._angle(x)) if self.delay else L
+
+    def _angle(self, x: Real) -> Real:
+        return x if self.loop.period_s is None or self.loop.in_z else 2.0 * np.arctan(x)
+
+    def real_point(self, w: float) -> float:
+        """L at a real s next to zero."""
+        point = np.array([math.exp(2.0 * math.atan(w)) if self.loop.in_z else w], dtype=complex)
+        return float(self.loop.at(point)[0].real)
+
+    def at_rest(self) -> complex:
+        """L at zero frequency."""
+        return complex(self.loop.response(np.zeros(1))[0].real)
+
+    def at_end(self) -> complex:
+        """L at the end of the axis: at infinity, or at Nyquist with the whole delay."""
+        loop = self.loop
+        if loop.period_s is None:
+            return complex(loop.d)
+        end = complex(loop.response(np.array([math.pi]))[0].real) if loop.in_z else complex(loop.d)
+        return end * complex(np.exp(-1j * math.pi * self.delay)) if self.delay else end
+
+    def onto_axis(self, end: complex) -> complex:
+        """Where L lies on the real axis at the Nyquist frequency; 0 where it does not come to it there.
+
+        Behind part of a sample L jumps there to its conjugate, over the real axis at the mean of both. Where
+        L moves away from the axis before that, the crossing that goes with it lies below and is listed.
+        """
+        if not self.delay:
+            return end
+        rate = self.rate_at_end()
+        return complex(end.real) if end.imag * (end * rate).imag < 0.0 else 0j
+
+    def rate_at_end(self) -> complex:
+        """d log L/d angle at the Nyquist frequency."""
+        loop = self.loop
+        if loop.in_z:
+            L, slope = loop.response_and_slope(np.array([math.pi]))
+            return complex(slope[0] / L[0]) - 1j * self.delay
+        assert loop.numerator is not None
+        assert loop.denominator is not None
+        above, below = loop.numerator, loop.denominator  # in u = 1/w: x = pi - 2 u, s = j/u
+        rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
+        return -0.5 * complex(rate) - 1j * self.delay
+
+    def distance(self, w: float, disk: bool) -> float:
+        """Distance to -1."""
+        L = complex(self.at(np.array([w]))[0])
+        return abs(2.0 * (1.0 + L) / (1.0 - L)) if disk else abs(1.0 + L)
+
+    def polished(self, w: Real, gain: bool) -> tuple[Real, Complex]:
+        """Newton from crossings of the factors to those of the loop; their x, and L there.
+
+        Raises
+        ------
+        Doubtful
+            The loop has none there.
+        """
+        if not w.size:
+            return w, np.empty(0, dtype=complex)
+        loop, start = self.loop, self.x(w)
+        x = start
+        for _ in range(_NEWTON_STEPS):
+            L, slope = loop.response_and_slope(x)
+            rate = self._rate(x, slope / L)
+            L = self._late(x, L)
+            step = _newton_step(L, rate, gain)
+            x = x - step
+            if (np.abs(step) <= _NEWTON_STEP * x).all() or (np.abs(step * rate) <= _ROUNDED).all():
+                break
+        else:
+            raise Doubtful("a crossing did not settle")
+        L = L * (1.0 - rate * step)
+        if loop.in_z:  # near z = 1 the last digits of z are all there is: one more step with them
+            L = self._late(x, loop.sharp_response(x))
+            step = _newton_step(L, rate, gain)
+            x, L = x - step, L * (1.0 - rate * step)
+        if not (np.abs(x - start) <= _FAR_OFF * start).all():
+            raise Doubtful("a crossing of the factors is none of the loop")
+        return x, L
+
+    def _rate(self, x: Real, rate: Complex) -> Complex:
+        if not self.delay:
+            return rate
+        turning = 1.0 if self.loop.period_s is None or self.loop.in_z else 2.0 / (1.0 + x * x)
+        return rate - 1j * self.delay * turning
+
+
+def _newton_step(L: Complex, rate: Complex, gain: bool) -> Real:
+    if gain:
+        return np.asarray(np.log(np.abs(L)) / rate.real)
+    return np.asarray(np.angle(-L) / rate.imag)
+
+
+def factored(response: Response, poles: SortedPoles) -> Factored:
+    """The factors of a loop in the s-plane, checked against it next to every one of its poles.
+
+    Raises
+    ------
+    Doubtful
+        They do not make up the loop.
+    """
+    loop = response.loop
+    below = _in_s(loop, _exact_zero(poles, loop.in_z))
+    above = _zeros(loop, below)
+    if (above == 0.0).any() and (below == 0.0).any():
+        raise Doubtful("poles and zeros at zero frequency")
+    roots = np.concatenate((above, below))
+    weights = np.concatenate((np.ones(above.size), -np.ones(below.size)))
+    delay = response.delay
+    if delay and loop.period_s is not None:
+        roots, weights, delay = np.append(roots, (1.0, -1.0)), np.append(weights, (delay, -delay)), 0.0
+    return _fitted(Factored(roots, weights, delay), response, below)
+
+
+def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
+    size = np.abs(poles[poles.imag >= 0.0])
+    size = size[size > 0.0]
+    w = (
+        np.concatenate((size * 1.01, [size.min() * 0.3, size.max() * 3.0]))
+        if size.size
+        else np.array([0.5, 2.0])
+    )
+    L = response.at(w)
+    gain, phase, *_ = factors.log_value(w)
+    off = np.log(np.abs(L)) - gain
+    turned = np.angle(L * np.exp(-1j * phase))
+    seen = (np.abs(L) > _SEEN) & (np.abs(L) < 1.0 / _SEEN)
+    k = int(np.argmin(np.where(seen, np.abs(np.log(np.abs(L))), np.inf)))
+    apart = np.hypot(off - off[k], np.angle(np.exp(1j * (turned - turned[k]))))
+    if not (apart[seen] <= _SAME).all() or not np.isfinite(off[k]):
+        raise Doubtful("the factors do not make up the loop")
+    slack = max(_LEAST_SLACK, 10.0 * float(apart[seen].max()))
+    return replace(factors, log_gain=float(off[k]), phase=float(turned[k]), slack=slack)
+
+
+def _exact_zero(poles: SortedPoles, in_z: bool) -> Complex:
+    """The poles with those at zero frequency put there."""
+    values = poles.values.copy()
+    centre = 1.0 if in_z else 0.0
+    values[np.abs(values - centre).argsort()[: poles.at_dc]] = centre
+    return values
+
+
+def _in_s(loop: RationalLoop, points: Complex) -> Complex:
+    if not loop.in_z:
+        return points
+    points = points[points != -1.0]
+    return (points - 1.0) / (points + 1.0)
+
+
+def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
+    """Zeros in the s-plane; those of a state space that lie at infinity come out far away."""
+    if loop.numerator is not None:
+        return _in_s(loop, np.roots(np.trim_zeros(loop.numerator, "f")).astype(complex))
+    size = np.abs(poles[poles != 0.0])
+    shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
+    system = shifted(loop, shift)
+    sigma = eigenvalues(system.W_plus + np.outer(system.b_plus / system.l_plus, system.c_plus))
+    zeros = shift + 1.0 / sigma[sigma != 0.0]
+    if loop.in_z or loop.d or zeros.size < loop.order:
+        return zeros
+    farthest = np.abs(
+        zeros
+    ).argmax()  # without feed-through one is at infinity, with its mirror image where two
+    real = abs(zeros[farthest].imag) <= _NEARLY_REAL * abs(zeros[farthest])
+    return np.delete(zeros, np.abs(zeros).argsort()[-1 if real else -2 :])

@@ -1,0 +1,206 @@
+"""A loop by its factors on the border of stability, with the range of gain and phase over whole intervals.
+
+On s = j w every factor (s - r) moves steadily between few places: its gain falls to w = Im r and rises from
+there, its phase turns one way, and both rates have one peak. Between these places the sum of what the factors
+change by bounds what L does: gain, phase and their rates are known over whole intervals, but for rounding.
+A sampled loop is held in s = (z - 1)/(z + 1), w = tan(angle/2); there a delay of q samples, e^(-j q angle),
+is the factor ((1 - s)/(1 + s))^q.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.margins.trust import Doubtful
+
+_NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
+_ROUNDS = 60
+_MOST = 100_000
+_NARROWEST = 1e-14
+_SHARES = np.arange(7) / 6.0  # of an interval that is split
+
+
+@dataclass(frozen=True)
+class Factored:
+    """log L = constant + sum of weights log(s - roots) - delay s.
+
+    Attributes
+    ----------
+    roots, weights : arrays (m,)
+        Zeros count positive, poles negative; conjugates are both there.
+    delay : float
+        In the unit 1/w (continuous loops only).
+    log_gain, phase : float
+        The constant, so that gain and phase are those of L; the phase modulo a full turn.
+    slack : float
+        How far the factors may be from the loop: log gain, and phase in rad.
+    """
+
+    roots: Complex
+    weights: Real
+    delay: float
+    log_gain: float = 0.0
+    phase: float = 0.0
+    slack: float = 0.0
+
+    @cached_property
+    def at_zero(self) -> float:
+        """Weight of the roots at zero frequency: negative for integrators."""
+        return float(self.weights[self.roots == 0.0].sum())
+
+    @cached_property
+    def at_infinity(self) -> float:
+        """Slope of the gain at infinity in powers of w."""
+        return float(self.weights.sum())
+
+    def reciprocal(self) -> Factored:
+        """L(1/s), which on j/w is the conjugate of L on j w: infinity lies at zero. No delay."""
+        away = self.roots != 0.0
+        roots, weights = 1.0 / self.roots[away], self.weights[away]
+        constant = float(-(weights * np.log(np.abs(roots))).sum())
+        if self.at_infinity:
+            roots, weights = np.append(roots, 0.0), np.append(weights, -self.at_infinity)
+        other = replace(self, roots=roots, weights=weights, log_gain=self.log_gain + constant, phase=0.0)
+        one = np.ones(1)
+        return replace(other, phase=-float(self.log_value(one)[1][0] + other.log_value(one)[1][0]))
+
+    @cached_property
+    def _off_axis(self) -> Real:
+        off: Real = np.maximum(np.abs(self.roots.real), _NEXT_TO_AXIS * np.abs(self.roots.imag))
+        return off
+
+    @cached_property
+    def _turning(self) -> Real:
+        """Weights of gain, phase, and their rates, shape (4, m, 1)."""
+        turning = np.where(self.roots.real > 0.0, -self.weights, self.weights)
+        return np.array((self.weights, turning, self.weights, turning))[..., None]
+
+    @cached_property
+    def places(self) -> Real:
+        """Frequencies w > 0 between which every factor is monotone."""
+        im = self.roots.imag
+        w = np.concatenate((im - self._off_axis, im, im + self._off_axis))
+        return np.unique(w[w > 0.0])
+
+    def _rows(self, w: Real) -> tuple[Real, Real]:
+        """Gain, turn and their rates of every factor (4, points, m), and those of L (4, points)."""
+        y, a = w[:, None] - self.roots.imag, self._off_axis
+        size = y * y + a * a
+        parts = np.empty((4, *size.shape))
+        with np.errstate(divide="ignore"):
+            parts[0], parts[1], parts[2], parts[3] = 0.5 * np.log(size), np.arctan2(y, a), y / size, a / size
+        total = (parts @ self._turning)[..., 0]
+        total[0] += self.log_gain
+        if self.delay:
+            total[1] -= self.delay * w
+            total[3] -= self.delay
+        total[1] += self.phase
+        return parts, total
+
+    def log_value(self, w: Real) -> Real:
+        """Log gain, phase (continuous, less whole turns), and their rates; shape (4, points)."""
+        return self._rows(w)[1]
+
+    def log_slopes(self, w: float) -> tuple[complex, complex]:
+        """First and second derivative of log L by w."""
+        over = 1.0 / (1j * w - self.roots)
+        return 1j * complex(over @ self.weights) - 1j * self.delay, complex((over * over) @ self.weights)
+
+    def between_neighbours(self, w: Real) -> Intervals:
+        """Bounds over the intervals between neighbours in each row of points, shape (k, n)."""
+        k, n = w.shape
+        parts, total = self._rows(w.ravel())
+        parts, total = parts.reshape(4, k, n, -1), total.reshape(4, k, n)
+        spread = (np.abs(parts[:, :, 1:] - parts[:, :, :-1]) @ np.abs(self._turning[:, None]))[..., 0]
+        low, high = w[:, :-1].ravel(), w[:, 1:].ravel()
+        spread = spread.reshape(4, -1)
+        spread[1] += self.delay * (high - low)
+        first, last = total[:, :, :-1].reshape(4, -1), total[:, :, 1:].reshape(4, -1)
+        return Intervals(low, high, first, last, 0.5 * spread)
+
+    def covered(self, ends: list[float], clear: Callable[[Intervals], Mask]) -> Intervals:
+        """Intervals from the first to the last of the ends, in order, split until ``clear`` holds in each.
+
+        Raises
+        ------
+        Doubtful
+            It does not, however small they are.
+        """
+        places = self.places
+        edges = np.concatenate((ends, places[(places > ends[0]) & (places < ends[-1])]))
+        edges.sort()
+        here = self.between_neighbours(edges[None])
+        done: list[Intervals] = []
+        for _ in range(_ROUNDS):
+            good = clear(here)
+            done.append(here.taken(good))
+            if good.all():
+                return _joined(done)
+            low, high = here.low[~good], here.high[~good]
+            if low.size > _MOST or (high - low <= _NARROWEST * high).any():
+                break
+            here = self.between_neighbours(parted(low, high))
+        raise Doubtful(f"the loop comes too near to a line at {float(low[0]):.6g} to tell its side")
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Intervals [low, high] of w: log gain, phase and their rates at both ends, shape (4, k).
+
+    Inside, each lies within ``spread`` of the mean of its ends.
+    """
+
+    low: Real
+    high: Real
+    first: Real
+    last: Real
+    spread: Real
+
+    @cached_property
+    def least(self) -> Real:
+        """Smallest value of each."""
+        return np.asarray(0.5 * (self.first + self.last) - self.spread)
+
+    @cached_property
+    def most(self) -> Real:
+        """Largest value of each."""
+        return np.asarray(0.5 * (self.first + self.last) + self.spread)
+
+    def bounds(self) -> tuple[Real, Real]:
+        """Least and most of log gain and phase (2, k): by the factors, and by the rate of their sum."""
+        width = self.high - self.low
+        up, down = np.maximum(self.most[2:], 0.0) * width, np.maximum(-self.least[2:], 0.0) * width
+        least = np.maximum(self.least[:2], np.maximum(self.first[:2] - down, self.last[:2] - up))
+        return least, np.minimum(self.most[:2], np.minimum(self.first[:2] + up, self.last[:2] + down))
+
+    def taken(self, which: Mask) -> Intervals:
+        """Some of them."""
+        return Intervals(*(getattr(self, name)[..., which] for name in _NAMES))
+
+
+_NAMES = tuple(Intervals.__dataclass_fields__)
+
+
+def _joined(parts: list[Intervals]) -> Intervals:
+    order = np.concatenate([part.low for part in parts]).argsort()
+    return Intervals(*(np.concatenate([getattr(p, n) for p in parts], axis=-1)[..., order] for n in _NAMES))
+
+
+def parted(low: Real, high: Real) -> Real:
+    """The ends of the parts into which intervals are split, shape (k, parts + 1)."""
+    wide = ((high > 4.0 * low) & (low > 0.0))[:, None]
+    ratio = np.where(wide, high[:, None] / np.where(low > 0.0, low, 1.0)[:, None], 1.0)
+    w = np.where(wide, low[:, None] * ratio**_SHARES, low[:, None] + (high - low)[:, None] * _SHARES)
+    w[:, -1] = high
+    return w
+
+
+def halves(low: Real, high: Real) -> Real:
+    """Where to halve intervals."""
+    middle: Real = np.where((high > 4.0 * low) & (low > 0.0), np.sqrt(low * high), 0.5 * (low + high))
+    return middle

@@ -1,0 +1,180 @@
+"""A loop has one answer, however it is given: reference loops with truth from exact rationals, and all forms.
+
+The table's figures were computed apart from this package: closed-loop poles in 40 digits and exact rationals,
+or the closed forms beside them.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import control
+import numpy as np
+import pytest
+
+from actuator_lti.margins import StabilityMargins, stability_margins
+
+Z = control.tf([1, 0], [1], 1.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Ratios of the gain margins and degrees of the phase margins with |.| below 60 dB, as a whole list."""
+
+    name: str
+    given: Callable[[], control.LTI]
+    stable: bool
+    ratios: tuple[float, ...]
+    deg: tuple[float, ...] | None = None
+    delay_s: float = 0.0
+    rel: float = 1e-5
+    notes: tuple[str, ...] = field(default=())
+
+
+def modes(zeta: float) -> control.StateSpace:
+    w1, w2 = 100.3, 200.0
+    A = [[0, w1, 0, 0], [-w1, 0, 0, 0], [0, 0, 0, w2], [0, 0, -w2, -2 * zeta * w2]]
+    return control.ss(A, [[0], [1], [0], [1]], [[0, 10, 0, -1.8 * zeta * w2]], 0)
+
+
+def modes_margin(zeta: float) -> tuple[float, ...]:
+    """-1/L where the two modes of `modes` have opposite imaginary parts, by bisection on closed forms."""
+    w1, w2, K = 100.3, 200.0, 10.0
+
+    def L(w: float) -> complex:
+        s = 1j * w
+        return K * s / (s * s + w1 * w1) - 1.8 * zeta * w2 * s / (s * s + 2 * zeta * w2 * s + w2 * w2)
+
+    out = []
+    w = w2 * (1.0 + zeta * np.linspace(-40.0, 40.0, 40_001))
+    values = np.array([L(float(x)) for x in w])
+    for k in np.flatnonzero(np.diff(np.sign(values.imag)) != 0):
+        low, high = float(w[k]), float(w[k + 1])
+        for _ in range(80):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if L(middle).imag * L(low).imag > 0.0 else (low, middle)
+        out.append(float(-1.0 / L(low).real))
+    return tuple(out)
+
+
+def pi_on_zero() -> control.LTI:
+    return control.tf([2, 1], [1, 0]) * control.tf([1, 0], [1, 3, 3, 1])
+
+
+CASES = [
+    Case("L1", lambda: control.tf([1.2], [1, -1], 1.0), False, (1 / 1.2,), delay_s=1.0),
+    Case("L2", lambda: control.tf([0.1], [1, -1], 1.0), True, (10.0,), (81.4020,), delay_s=1.0),
+    Case("L3", lambda: control.tf([0.4], [1, 0.5], 1.0), True, (2.5,), (), delay_s=1.0),
+    Case(
+        "L4",
+        lambda: control.tf([5999.46, 1803600, 5400001080000, 1.62e15], [1, 0.6000000000000001, 9e8, 0, 0]),
+        True, (1.1694, 20.46),
+        rel=1e-3,
+    ),
+    Case("L5", lambda: modes(2e-5), True, modes_margin(2e-5)),
+    Case("L5, tenfold damping", lambda: modes(2e-4), True, modes_margin(2e-4)),
+    *(
+        Case(f"L6, {q:g} of a sample", lambda: control.tf([0.4], [1, 0.5], 1.0), True, (1.25,), (), q, 1e-3)
+        for q in (1e-8, 1e-6, 1e-4, 0.005, 0.0087, 0.02)
+    ),
+    Case(
+        "L7",
+        lambda: control.tf(
+            [998.8603087726207, 1.460980729685113e-4, 44096.46617201614],
+            [1, 1.1427147625307916e-6, 58.16523611839528, 1.75254191206914e-5, 140.91956726676923],
+        ),
+        True, (0.0226928, 0.204161),
+    ),
+    Case("L12", lambda: control.tf([0.5], [1]), True, (2.0,) * 6, (), delay_s=1.0),
+    Case("L11, one", pi_on_zero, True, (), (141.2739,)),
+    Case("L11, two", lambda: pi_on_zero() * control.tf([2, 1], [1, 0]) * control.tf([1, 0], [1, 1]), True, (),
+         (102.1151,)),
+    Case("L11, a pair", lambda: control.tf([1, 0, 4], np.polymul([1, 2, 1, 0], [1, 0, 4])), True, (2.0,),
+         (21.38639,)),
+]  # fmt: skip
+
+
+def near(m: StabilityMargins) -> list[float]:
+    return [g.ratio for g in m.gain_margins if 1e-3 < g.ratio < 1e3]
+
+
+@pytest.mark.parametrize("certify", [False, True], ids=["", "certified"])
+@pytest.mark.parametrize("form", ["tf", "ss"])
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_reference_loop(case: Case, form: str, certify: bool) -> None:
+    loop = case.given()
+    if form == "ss" and isinstance(loop, control.TransferFunction):
+        if case.name == "L12":
+            pytest.skip("a static gain has no states")
+        loop = control.ss(loop)
+    if form == "tf" and isinstance(loop, control.StateSpace):
+        pytest.skip("given as a state space: its transfer function is another loop by rounding")
+    m = stability_margins(loop, delay_s=case.delay_s, certify=certify)
+    assert m.stable is case.stable
+    assert near(m) == pytest.approx(list(case.ratios), rel=case.rel)
+    if case.deg is not None:
+        assert [p.deg for p in m.phase_margins] == pytest.approx(list(case.deg), abs=1e-3)
+
+
+def test_hidden_modes_are_stated_apart() -> None:
+    for name, hidden in (("L11, one", 1), ("L11, two", 2), ("L11, a pair", 2)):
+        m = stability_margins(next(case for case in CASES if case.name == name).given())
+        assert m.stable is True
+        assert m.internally_stable is False
+        assert m.hidden_border_modes == hidden
+        assert any("neither drives nor sees" in note for note in m.notes)
+    assert stability_margins(control.tf([1], [1, 1])).internally_stable is True
+
+
+@pytest.mark.parametrize("below", [1e-10, 5e-10])
+def test_a_gain_that_all_but_reaches_one_is_a_touch_in_those_words(below: float) -> None:
+    m = stability_margins(control.tf([0.2 * (1.0 - below), 0], [1, 0.2, 1]))
+    assert m.stable
+    assert not m.phase_margins or ("touch within 1e-9" in str(m) and m.phase_margins[0].tangent)
+
+
+def test_an_integrator_behind_a_long_delay() -> None:
+    loop = control.tf([1], [1, 0])
+    stability_margins(loop, delay_s=1.0)
+    start = time.process_time()
+    m = stability_margins(loop, delay_s=500.0)
+    assert time.process_time() - start < 0.2
+    w = math.pi / 1000.0 * np.arange(1, 4 * 80, 4)  # -pi/2 - 500 w = -pi - 2 pi k
+    found = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins][: w.size]
+    assert found == [(pytest.approx(x, rel=1e-9), pytest.approx(x, rel=1e-9)) for x in w]  # |L| = 1/w
+    # zeros of s + exp(-500 s) right of the axis: two for each lower margin
+    assert m.agreement.unstable_nyquist == 2 * int(
+        np.count_nonzero(np.array([g.ratio for g in m.gain_margins]) < 1)
+    )
+
+
+def test_no_gain_margin_at_rest_where_the_loop_is_zero_there() -> None:
+    """s/(s + 1)^2 seen in states that a rotation mixes: c A^-1 b is rounding, of either sign."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        loop = control.ss(control.tf([-1.0, 0.0], [1.0, 2.5, 1.0]) * control.tf([1.0], [0.1, 1.0]))
+        T = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        mixed = control.StateSpace(T @ loop.A @ T.T, T @ loop.B, loop.C @ T.T, loop.D)
+        for delay_s in (0.0, 0.1):
+            m = stability_margins(mixed, delay_s=delay_s)
+            assert all(g.frequency_rad_s > 1e-3 for g in m.gain_margins)
+
+
+@pytest.mark.parametrize("gain", [-0.4, 0.3, 0.9])
+@pytest.mark.parametrize("den", [[1, 0.5], [1, -0.3, 0.1], [1, -0.9]])
+def test_a_fraction_of_a_sample_goes_to_whole_samples(gain: float, den: list[float]) -> None:
+    loop = control.tf([gain], den, 1.0)
+    for whole in (0, 1):
+        limit = stability_margins(loop, delay_s=float(whole)) if whole else stability_margins(loop)
+        for q in [2e-8, 1e-6] if not whole else [1.0 - 2e-8, 1.0 + 2e-8, 1.0 - 1e-6]:
+            m = stability_margins(loop, delay_s=q)
+            assert m.stable is limit.stable
+            assert [g.ratio for g in m.gain_margins] == pytest.approx(
+                [g.ratio for g in limit.gain_margins], rel=1e-4
+            )
+            assert [p.deg for p in m.phase_margins] == pytest.approx(
+                [p.deg for p in limit.phase_margins], abs=1e-3
+            )
