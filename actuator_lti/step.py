@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from actuator_lti.margins.loop import Real, rational_loop
+from actuator_lti.margins.measured_data import refuse_measured
 from actuator_lti.step_delayed import delayed_response
 from actuator_lti.step_exact import exact_response
 from actuator_lti.step_response import Response, Samples
@@ -75,7 +76,7 @@ def step_figures(system: Any) -> StepFigures:
     Raises
     ------
     InputError
-        The system is not stable, or its final value is zero.
+        The system is not stable, its final value is zero, or it is measured data.
     NumericalError
         The final value is lost in the rounding of the entries, or when it settles cannot be told.
 
@@ -85,6 +86,7 @@ def step_figures(system: Any) -> StepFigures:
     >>> print(step_figures(control.tf([1], [1, 1])))
     rise 10-90 % 2.19722 s, overshoot 0.0000 %, settling 2 % 3.91202 s, final value 1
     """
+    refuse_measured(system)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
             return _figures(*delayed_response(system), None)
