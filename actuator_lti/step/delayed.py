@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,9 +32,6 @@ _NEWTON = 8
 _BITS = 256
 
 
-Between = Callable[[int, float], float]
-
-
 def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     """Unit step response of a system with inner delays over its final value, and that value.
 
@@ -58,12 +54,12 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     while True:
         h = _grid_step(form.delays, head)
         values = _stepped(form, h, int(np.ceil(head / h))) / final - 1.0
-        time, e = h / _PARTS * np.arange(_PARTS * values.shape[0]), values[:, :_PARTS].ravel()
         exact, weights = _modes(form, poles.values, head)
-        late = time > 0.75 * head
-        if np.abs((np.exp(np.outer(time[late], exact)) @ weights).real / final - e[late]).max() <= _MEET:
-            later = _motion(exact, weights * np.exp(exact * time[-1]) / final, float(time[-1]))
-            return Stepped(time, e, quartics(h, values)), later, final
+        late = np.arange(len(values) * 3 // 4, len(values))
+        modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
+        if np.abs(modes - values[late, 0]).max() <= _MEET:
+            early = Stepped.through(values, h)
+            return early, _motion(exact, weights * np.exp(exact * early.end) / final, early.end), final
         head *= 2.0
 
 
@@ -127,16 +123,6 @@ def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
         if motion is not None:
             return motion
         bits *= 2
-
-
-def quartics(h: float, values: Real) -> Between:
-    """The response within its steps, through its five points in each; four grid intervals make a step."""
-    coefficients = values @ np.linalg.inv(np.vander(np.linspace(0.0, 1.0, _PARTS + 1))).T
-
-    def between(k: int, t: float) -> float:
-        return float(np.polyval(coefficients[k // _PARTS], t / h - k // _PARTS))
-
-    return between
 
 
 def _grid_step(delays: Real, horizon: float) -> float:

@@ -155,7 +155,8 @@ def _curve(early: Stepped | None, later: Motion, ninety: float, settled: float) 
     if later.start < (rising := min(5.0 * ninety, end)):
         spans.append(later.curve(rising, _SHOWN // 2))
     if early is not None:
-        spans.append((early.time[:-1], early.y[:-1]))
+        stepped = np.linspace(0.0, early.end, _SHOWN)
+        spans.append((stepped, early.e(stepped)))
     time, deviation = (np.concatenate(part) for part in zip(*spans, strict=True))
     once, first = np.unique(time, return_index=True)
     return once, deviation[first]
