@@ -85,7 +85,7 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
 
 
 def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
-    """Whether a mode that is seen at zero frequency alone takes the gain away there: a spring, however weak."""
+    """Whether a mode seen at zero frequency alone takes the gain away there: a spring, however weak."""
     below = fraction.den(at)
     return bool(below != 0 and abs(fraction.num(at) / below) < _TAKEN * abs(dc))
 
