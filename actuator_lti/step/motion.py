@@ -23,9 +23,13 @@ from actuator_lti.margins.loop import Complex, Mask, Real
 BAND = 0.02
 OVER = 1e-9  # an excess below this part of the final value is no overshoot
 _FLAT = 1e-12
+_TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 _FINE = 512.0  # parts of the shortest time constant: a span that its power series covers
 _TERMS = 8
 _LEVELS = 60
+_ROUNDED = 12  # levels that double precision does for: 4096 roundings
+_BITS = 160  # of the transitions beyond
+_VANISHED = 1e-100  # what is smaller would only slow the processor down
 _MOST = 200_000  # spans of one length
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
 
@@ -51,33 +55,45 @@ class Motion:
         self._x = np.array([complex(each) for each in state], dtype=complex)
         exact, output = _cascade(poles, sampled)
         self._A, self._c = _doubles(exact), np.array([complex(each) for each in output], dtype=complex)
-        p = np.diagonal(self._A)
-        self._decay = 1.0 - np.abs(p) if sampled else -p.real
-        size = float(np.linalg.norm(self._A, 2)) if p.size else 0.0
-        self.shortest = 1.0 if sampled or not size else 2.0 ** -np.ceil(np.log2(_FINE * size))
-        turned = self._A - np.eye(p.size) if sampled else self._A
+        rates = [1 - abs(each) if sampled else -each.real for each in poles]
+        self._decay = np.array([float(rate.mid()) for rate in rates], dtype=float)
+        self._tie = _TIE if sampled else 0.0
+        size = float(np.linalg.norm(self._A, 2)) if poles and not sampled else 0.0
+        self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
+        turned = self._A - np.eye(len(poles)) if sampled else self._A
         self._second = np.abs(self._c @ turned @ turned)
         self._moves = self._levels(exact)
 
     def _levels(self, exact: flint.acb_mat) -> list[Complex]:
-        """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts."""
-        move = exact if self.sampled or not self._x.size else (exact * flint.arb(self.shortest)).exp()
-        moves = [_doubles(move)]
-        everlasting = np.abs(self._c) @ self._largest(np.inf)
-        while everlasting @ np.abs(moves[-1] @ self._x) > OVER:
-            if len(moves) == _LEVELS:
-                raise NumericalError(_LONG)
-            move = move * move
-            moves.append(_doubles(move))
+        """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts.
+
+        A rounding of the first is doubled each time: double precision does for short motions.
+        """
+        with flint.ctx.workprec(_BITS):
+            move = exact if self.sampled or not self._x.size else (exact * flint.arb(self.shortest)).exp()
+            moves = [_doubles(move)]
+            everlasting = np.abs(self._c) @ self._largest(np.inf)
+            while everlasting @ np.abs(moves[-1] @ self._x) > OVER:
+                if len(moves) == _LEVELS:
+                    raise NumericalError(_LONG)
+                if len(moves) == _ROUNDED:
+                    for level in range(1, _ROUNDED):
+                        move = move * move
+                        moves[level] = _doubles(move)
+                if len(moves) < _ROUNDED:
+                    moves.append(_flushed(moves[-1] @ moves[-1]))
+                else:
+                    move = move * move
+                    moves.append(_doubles(move))
         return moves
 
     def _largest(self, span: float) -> Real:
         """M with |x(t)| <= M |x(0)| over a span, row by row: what flows into a state is integrated."""
         n = self._x.size
         inflow = np.abs(np.triu(self._A, 1))
-        with np.errstate(under="ignore"):
-            left = (1.0 - self._decay) ** span if self.sampled else np.exp(-self._decay * span)
-        within = np.diag((1.0 - left) / self._decay)  # integral of a decay over the span
+        with np.errstate(divide="ignore"):  # a pole at z = 0
+            rate = -np.log1p(-self._decay) if self.sampled else self._decay
+        within = np.diag(-np.expm1(-rate * span) / self._decay)  # integral of a decay over the span
         return np.asarray(np.eye(n) + inflow @ np.linalg.solve(np.eye(n) - within @ inflow, within))
 
     @cached_property
@@ -96,7 +112,7 @@ class Motion:
 
     def first_at_least(self, level: float) -> float:
         """First time at which 1 + e reaches a level below 1."""
-        target, best = level - 1.0, np.inf
+        target, best = level - 1.0 - self._tie, np.inf
 
         def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
             nonlocal best
@@ -110,12 +126,12 @@ class Motion:
 
     def last_outside(self) -> float | None:
         """Last time at which |e| is more than 2 %; ``None``: never from the start on."""
-        best = -np.inf
+        band, best = BAND + self._tie, -np.inf
 
         def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
             nonlocal best
-            best = max(best, a[left > BAND].max(initial=-np.inf), b[right > BAND].max(initial=-np.inf))
-            return (b > best) & (most > BAND)
+            best = max(best, a[left > band].max(initial=-np.inf), b[right > band].max(initial=-np.inf))
+            return (b > best) & (most > band)
 
         for a, series in sorted(self._spans(undecided, np.abs), key=lambda span: -span[0]):
             if roots := [*_within(series - BAND * _ONE), *_within(series + BAND * _ONE)]:
@@ -169,7 +185,7 @@ class Motion:
         step, move, x = self.shortest * 2.0**level, self._moves[level], self._x[None]
         points = int(np.ceil(spans / 2.0**level)) + 1
         while len(x) < points:
-            x, move = np.concatenate((x, x @ move.T)), move @ move
+            x, move = np.concatenate((x, x @ move.T)), _flushed(move @ move)
         return self.start + step * np.arange(points), (x[:points] @ self._c).real
 
     def _spans(
@@ -249,4 +265,8 @@ def _doubles(exact: flint.acb_mat) -> Complex:
     for i in range(n):
         for j in range(i, n):
             out[i, j] = complex(exact[i, j])
-    return out
+    return _flushed(out)
+
+
+def _flushed(move: Complex) -> Complex:
+    return np.where(np.abs(move) < _VANISHED, 0.0, move)
