@@ -9,7 +9,7 @@ from ._compiled import kernel
 from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
 
 LONGEST = 4_000_000  # ticks
-INSIDE = 10.0  # time constants of the slowest pole within the band: what is left is 5e-5 of it
+INSIDE = 9.0  # time constants of the slowest pole within the band: what is left is 1e-4 of it
 FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no digit (1e-11)
 
 
@@ -19,7 +19,7 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
 
     Where lead is NaN, of a, b, c as they are.
 
-    All are times of samples; the response is followed until it has stayed within the band for ten time
+    All are times of samples; the response is followed until it has stayed within the band for nine time
     constants of the slowest pole, however far above it a resonance was. Where that pole is real and far
     slower than the rest, its tail is known in closed form.
     """
