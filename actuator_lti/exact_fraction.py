@@ -14,6 +14,10 @@ from actuator_lti.margins.given import ULP, given_of
 from actuator_lti.margins.loop import RationalLoop
 
 _EPS = float(np.finfo(float).eps)
+_NEAR_DC = 1e-7  # a pole this near to zero frequency may be one that the response does not show
+_CLOSE = 1e-3  # a computed eigenvalue this near may be such a pole
+_UNSEEN = 1e-9  # what it may move, of the final value, before the rest has settled
+_BITS = 256
 _LOST = 1e3 * _EPS  # cancellation in c A^-1 b of a state space that leaves no figure
 
 
@@ -42,6 +46,76 @@ def roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
     """Every root, isolated, with its multiplicity; real ones have no imaginary part at all."""
     zeros = next((k for k, c in enumerate(p.coeffs()) if c != 0), 0)
     return [(flint.acb(0), zeros)] * bool(zeros) + all_roots(p.numer())
+
+
+def product(poles: list[flint.acb]) -> flint.acb_poly:
+    """The polynomial with these roots."""
+    total = flint.acb_poly([1])
+    for p in poles:
+        total *= flint.acb_poly([-p, 1])
+    return total
+
+
+def divided(p: flint.acb_poly, at: flint.acb) -> flint.acb_poly:
+    """p over x - at, the remainder left out."""
+    quotient, carried = [], flint.acb(0)
+    for value in reversed(p.coeffs()):
+        carried = value + at * carried
+        quotient.append(carried)
+    return flint.acb_poly(quotient[-2::-1])
+
+
+def balls(p: flint.fmpq_poly) -> flint.acb_poly:
+    """The same in balls of the working precision."""
+    return flint.acb_poly(flint.arb_poly(p))
+
+
+def shown(f: Fraction, loop: RationalLoop) -> Fraction:
+    """Without poles of a state space at zero frequency but for rounding that the response does not show.
+
+    In exact numbers such a mode is rarely cancelled: its residue is a rounding error. It is left out where it
+    would move the response by less than 1e-9 of its value before the slowest of the others has settled.
+    """
+    if loop.numerator is not None or loop.order < 2 or _nearest_dc(np.linalg.eigvals(loop.A), loop) > _CLOSE:
+        return f
+    with flint.ctx.workprec(_BITS):
+        every = roots(f.den)
+        near = [p for p, times in every if times == 1 and _nearest_dc(complex(p), loop) < _NEAR_DC]
+        others = [p for p, times in every if not any(p is each for each in near) for _ in range(times)]
+        if not near or not others:
+            return f
+        rates = [-np.log(max(abs(complex(p)), 1e-9)) if loop.in_z else -complex(p).real for p in others]
+        slowest = min((rate for rate in rates if rate > 0.0), default=np.inf)
+        above, residues = balls(f.num / f.den[f.den.degree()]), []
+        for k, p in enumerate(near):
+            beside = product([*others, *near[k + 1 :]])
+            residues.append(above(p) / beside(p))
+            above = divided(above - residues[-1] * beside, p)
+        below, dc = product(others), flint.acb(1 if loop.in_z else 0)
+        size = abs(complex(above(dc) / below(dc)))
+        if any(abs(complex(r)) > _UNSEEN * slowest * size for r in residues):
+            return f
+        return Fraction(_middle(above), _middle(below), f.whole_den)
+
+
+def _nearest_dc(p: Any, loop: RationalLoop) -> float:
+    """Smallest distance to zero frequency, in a sampling period or over the entries of A."""
+    if loop.in_z:
+        return float(np.abs(p - 1.0).min())
+    return float(np.abs(p).min()) / max(float(np.abs(loop.A).max()), 1e-300)
+
+
+def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
+    def exact(value: flint.arb) -> flint.fmpq:
+        mantissa, exponent = value.mid().man_exp()
+        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
+
+    return flint.fmpq_poly([exact(value.real) for value in p.coeffs()])
+
+
+def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
+    """Whether a hidden pole of a state space counts as one at zero frequency."""
+    return loop.numerator is None and _nearest_dc(complex(p), loop) <= _NEAR_DC
 
 
 def rational(value: Any) -> flint.fmpq:

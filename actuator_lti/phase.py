@@ -13,6 +13,9 @@ from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
 from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.factors import factor_phase, poles, zeros
 from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
+from actuator_lti.margins.measured import measured_points
+from actuator_lti.margins.measured_bounds import bounds
+from actuator_lti.margins.measured_data import is_measured, measured_response
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.sweep import subdivided, variation
 
@@ -27,10 +30,12 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
 
     Parameters
     ----------
-    system : StateSpace, TransferFunction or DelaySystem
-        One input, one output, continuous or sampled.
+    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
+        One input, one output, continuous or sampled. Measured data have no factors: their phase is followed
+        from point to point, from between -180 and 180 deg at the first, straight over log frequency.
     omega_rad_s : array_like
-        Angular frequencies > 0 (for a sampled system up to the Nyquist frequency), any order, any shape.
+        Angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured data within
+        their band), any order, any shape.
     delay_s : float, optional
         Exact delay in series, s.
 
@@ -42,7 +47,8 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     Raises
     ------
     InputError
-        A frequency that is not positive and finite, or beyond Nyquist; measured data, which have no factors.
+        A frequency that is not positive and finite, or beyond Nyquist; measured data: outside of their band,
+        or behind an interval in which the phase turns as no smooth curve does, or is lost in noise.
 
     Examples
     --------
@@ -54,9 +60,9 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     omega = np.asarray(omega_rad_s, dtype=float)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):
         raise InputError("omega_rad_s: every frequency must be positive and finite")
-    if not hasattr(system, "delays_s") and hasattr(system, "frdata"):
-        raise InputError("measured data have no factors: their phase cannot be unwrapped with certainty")
     flat = np.atleast_1d(omega).ravel()
+    if is_measured(system):
+        return np.degrees(_measured_phase(system, flat, delay_s)).reshape(omega.shape)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
             phase = _followed(delay_form(system), flat)
@@ -69,6 +75,22 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
             f"omega_rad_s: up to the Nyquist frequency {math.pi / (loop.period_s or 1.0):.6g} rad/s"
         )
     return np.degrees(rational_phase(loop, x) - flat * delay_s).reshape(omega.shape)
+
+
+def _measured_phase(data: Any, omega: Real, delay_s: float) -> Real:
+    """Phase of measured data in rad, between their points."""
+    at, L, radius = measured_points(measured_response(data), None)
+    result = bounds(at, L, radius, delay_s)
+    low, high = at[0] * (1.0 - 1e-12), at[-1] * (1.0 + 1e-12)
+    known, what = high, "outside of the measured band"
+    if (open_from := np.flatnonzero(result.unresolved | result.lost[1:])).size:
+        known = at[open_from[0]] * (1.0 + 1e-12)
+        what = f"the points do not tell how the phase turns beyond {known:.6g} rad/s"
+    if (omega < low).any() or (omega > known).any():
+        asked = omega[(omega < low) | (omega > known)][0]
+        what = what if low <= asked <= high else "outside of the measured band"
+        raise InputError(f"omega_rad_s: {asked:.6g} rad/s: {what}; allowed: {low:.6g} to {known:.6g} rad/s")
+    return np.interp(np.log(omega), np.log(at), result.phase.middle)
 
 
 def rational_phase(loop: RationalLoop, x: Real) -> Real:

@@ -102,6 +102,30 @@ def response(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
     return np.asarray(system(np.exp(s * system.dt) if system.isdtime(strict=True) else s)).ravel()
 
 
+def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies that show a system and its response there; of measured data their own points."""
+    from actuator_lti.margins.measured import measured_points
+    from actuator_lti.margins.measured_data import is_measured, measured_response
+
+    if is_measured(system):
+        omega, L, _ = measured_points(measured_response(system), None)
+        return omega, L
+    omega = frequencies(system, margins)
+    return omega, response(system, omega)
+
+
+def _phase_deg(system: Any, omega_rad_s: np.ndarray, L: np.ndarray) -> np.ndarray:
+    """Unwrapped; of measured data along the shorter turn from point to point."""
+    from actuator_lti.margins.measured_data import is_measured
+    from actuator_lti.phase import unwrapped_phase_deg
+
+    return (
+        np.degrees(np.unwrap(np.angle(L)))
+        if is_measured(system)
+        else unwrapped_phase_deg(system, omega_rad_s)
+    )
+
+
 def plot_bode(
     system: Any, *, label: str = "", margins: StabilityMargins | None = None, axes: Any = None
 ) -> list[Axes]:
@@ -109,7 +133,7 @@ def plot_bode(
 
     Parameters
     ----------
-    system : python-control system or DelaySystem
+    system : python-control system, DelaySystem or measured data
         SISO.
     label : str
         For the legend.
@@ -128,12 +152,9 @@ def plot_bode(
     >>> both[1].get_xlabel()
     'frequency, Hz'
     """
-    from actuator_lti.phase import unwrapped_phase_deg
-
     magnitude, phase = _panels(axes, 2)
-    omega = frequencies(system, margins)
-    hertz, L = omega / (2.0 * np.pi), response(system, omega)
-    turned = unwrapped_phase_deg(system, omega)
+    omega, L = _curve(system, margins)
+    hertz, turned = omega / (2.0 * np.pi), _phase_deg(system, omega, L)
     with np.errstate(divide="ignore"):
         magnitude.semilogx(hertz, 20.0 * np.log10(np.abs(L)), label=label or None)
     phase.semilogx(hertz, turned)
@@ -173,7 +194,7 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     'real part'
     """
     (panel,) = _panels(axes, 1, figsize=(4.8, 4.8))
-    L = response(system, frequencies(system))
+    _, L = _curve(system)
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     panel.plot(turn.real, turn.imag, color=MUTED, linewidth=0.8, linestyle="--")
     panel.plot(L.real, L.imag, label=label or None)
@@ -197,7 +218,9 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     import control
 
     from actuator_lti.bandwidth import closed_loop_bandwidth
+    from actuator_lti.margins.measured_data import refuse_measured
 
+    refuse_measured(system)
     if duration_s is None:
         result = closed_loop_bandwidth(system).minus3db_rad_s
         duration_s = 8.0 / result if result and np.isfinite(result) else 1.0

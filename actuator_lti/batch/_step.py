@@ -9,7 +9,7 @@ from ._compiled import kernel
 from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
 
 LONGEST = 4_000_000  # ticks
-FOLLOWED = 14.0  # time constants of the slowest pole
+INSIDE = 9.0  # time constants of the slowest pole within the band: what is left is 1e-4 of it
 FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no digit (1e-11)
 
 
@@ -19,18 +19,18 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
 
     Where lead is NaN, of a, b, c as they are.
 
-    All are times of samples; the response is followed for 14 time constants of the slowest pole. Where
-    that one is real and far slower than the rest, its tail is known in closed form.
+    All are times of samples; the response is followed until it has stayed within the band for nine time
+    constants of the slowest pole, however far above it a resonance was. Where that pole is real and far
+    slower than the rest, its tail is known in closed form.
     """
     radius = row[RADIUS]
     final = row[FINAL]
     if not (radius < 1.0) or not (abs(final) > 0.0):
         return
-    ticks = int(min(float(LONGEST), max(-FOLLOWED / math.log(radius), n + 2.0)))
+    inside = int(min(float(LONGEST), max(-INSIDE / math.log(radius), n + 2.0)))
     alone = _ticks_until_alone(n, poles, radius)
-    tail = alone < 0.7 * ticks
-    if tail:
-        ticks = int(alone)
+    tail = alone < inside
+    ticks = int(alone) if tail else LONGEST
     fed_back = 0.0 if math.isnan(lead) else 1.0
     for i in range(n):
         state[i] = 0.0
@@ -39,7 +39,9 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
     highest = 0.0
     outside = 0
     y = 0.0
-    for k in range(1, ticks + 1):
+    k = 0
+    while k < ticks and (tail or k - outside < inside):
+        k += 1
         total = 0.0
         for j in range(n):
             total += c[j] * state[j]

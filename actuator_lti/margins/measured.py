@@ -26,7 +26,6 @@ _NOTES = (
     "modulus and disk margin are the smallest values at measured points; over the band and within the noise "
     "they lie in modulus_range and alpha_range",
 )
-_QUIET = "no noise is given (MeasuredResponse takes it, or coherence or repeats): the ranges leave it out"
 
 
 def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
@@ -44,16 +43,16 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
     """
     response = measured_response(data)
-    omega, L, radius = _points(response, band_rad_s)
+    omega, L, radius = measured_points(response, band_rad_s)
     result = bounds(omega, L, radius, delay_s)
-    _refuse_coarse(omega, L, result)
+    refuse_coarse(omega, L, result)
     L = L * np.exp(-1j * omega * delay_s)
     phase_margins, grazed = _phase_margins(omega, result)
     gain_margins, touched = _gain_margins(omega, result)
     distance, alpha = np.abs(1.0 + L), DISK.distance(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
     modulus_range, alpha_range = distance_ranges(L, radius, result)
-    noise = f"noise: {response.source}" if radius.any() else _QUIET
+    noise = f"noise: {response.source}" if radius.any() else "noise: none, the ranges leave it out"
     return StabilityMargins(
         stable=None,
         verdict="undecided",
@@ -69,12 +68,12 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         band_rad_s=(float(omega[0]), float(omega[-1])),
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
-        evidence_reason="measured points: the figures lie in their ranges, stability is not told",
+        evidence_reason=_reason(omega, result),
         notes=(*_NOTES, noise, *_hidden(omega, result), *_lost(omega, result), *grazed, *touched),
     )
 
 
-def _points(data: MeasuredResponse, band: tuple[float, float] | None) -> tuple[Real, Complex, Real]:
+def measured_points(data: MeasuredResponse, band: tuple[float, float] | None) -> tuple[Real, Complex, Real]:
     order = data.omega.argsort()
     omega, L, radius = data.omega[order], data.frdata[order], data.radius[order]
     keep = omega > 0.0
@@ -90,7 +89,7 @@ def _points(data: MeasuredResponse, band: tuple[float, float] | None) -> tuple[R
     return omega, L, radius
 
 
-def _refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
+def refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
     if np.count_nonzero(result.unresolved) <= _MOST_UNRESOLVED * result.unresolved.size:
         return
     k = int(result.unresolved.argmax())
@@ -104,7 +103,7 @@ def _refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
 
 
 @dataclass(frozen=True)
-class _Group:
+class Group:
     """Neighbouring intervals first ... last in which a level may be passed, each in its part [t0, t1]."""
 
     first: int
@@ -120,32 +119,32 @@ class _Group:
         ]
         return min(low for low, _ in spans), max(high for _, high in spans)
 
-    def part(self, first: int, last: int) -> _Group:
+    def part(self, first: int, last: int) -> Group:
         """Only some of its intervals."""
         chosen = slice(first - self.first, last + 1 - self.first)
-        return _Group(first, last, self.t0[chosen], self.t1[chosen])
+        return Group(first, last, self.t0[chosen], self.t1[chosen])
 
     def text(self, omega: Real) -> str:
         """Where, in rad/s."""
         return f"between {omega[self.first]:.6g} and {omega[self.last + 1]:.6g} rad/s"
 
 
-def _groups(strip: Strip, level: float) -> list[_Group]:
+def _groups(strip: Strip, level: float) -> list[Group]:
     t0, t1 = strip.meets(level)
-    out: list[_Group] = []
+    out: list[Group] = []
     start = None
     for k in range(t0.size + 1):
         open_here = k < t0.size and t0[k] <= t1[k]
         joined = open_here and start is not None and t1[k - 1] >= 1.0 and t0[k] <= 0.0
         if start is not None and not joined:
-            out.append(_Group(start, k - 1, t0[start:k], t1[start:k]))
+            out.append(Group(start, k - 1, t0[start:k], t1[start:k]))
             start = None
         if open_here and start is None:
             start = k
     return out
 
 
-def _single_passages(strip: Strip, level: float) -> list[_Group]:
+def single_passages(strip: Strip, level: float) -> list[Group]:
     """The groups, cut at points that surely lie off the level so that none holds two sure passages."""
     out = []
     for group in _groups(strip, level):
@@ -165,7 +164,7 @@ def _single_passages(strip: Strip, level: float) -> list[_Group]:
     return out
 
 
-def _passed(strip: Strip, level: float, group: _Group) -> tuple[int, float] | None:
+def passed(strip: Strip, level: float, group: Group) -> tuple[int, float] | None:
     """Interval and place in it where the level is passed first; ``None``: not surely passed.
 
     Both ends of the group have to lie off the level: at an edge of the band they may not.
@@ -184,8 +183,8 @@ def _passed(strip: Strip, level: float, group: _Group) -> tuple[int, float] | No
 def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
     out, notes = [], []
     gain, phase = result.log_gain, result.phase
-    for group in _single_passages(gain, 0.0):
-        at = _passed(gain, 0.0, group)
+    for group in single_passages(gain, 0.0):
+        at = passed(gain, 0.0, group)
         if at is None:
             if not result.unresolved[group.first : group.last + 1].all():  # told already
                 notes.append(
@@ -200,7 +199,7 @@ def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...]
         if high - low >= 360.0:
             low, high = -180.0, 180.0
         bracket = float(omega[group.first]), float(omega[group.last + 1])
-        out.append(PhaseMargin(deg - turns, _between(omega, k, t), False, bracket, (low, high)))
+        out.append(PhaseMargin(deg - turns, between(omega, k, t), False, bracket, (low, high)))
     return tuple(out), notes
 
 
@@ -212,10 +211,10 @@ def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], 
         math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
     ):
         level = (2 * m + 1) * math.pi
-        for group in _single_passages(phase, level):
+        for group in single_passages(phase, level):
             if result.lost[group.first : group.last + 2].any():
                 continue
-            at = _passed(phase, level, group)
+            at = passed(phase, level, group)
             if at is None:
                 if not result.unresolved[group.first : group.last + 1].all():  # told already
                     notes.append(
@@ -227,13 +226,23 @@ def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], 
             ratio = math.exp(-_chord(gain.middle, *at))
             bracket = float(omega[group.first]), float(omega[group.last + 1])
             out.append(
-                GainMargin(ratio, _between(omega, *at), False, bracket, (_inverse(high), _inverse(low)))
+                GainMargin(ratio, between(omega, *at), False, bracket, (_inverse(high), _inverse(low)))
             )
     return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
 
 
 def _inverse(log_gain: float) -> float:
     return math.exp(-log_gain) if log_gain > -700.0 else math.inf
+
+
+def _reason(omega: Real, result: Bounds) -> str:
+    reason = "measured points: the figures lie in their ranges, stability is not told"
+    if not result.unresolved.any():
+        return reason
+    k, count = int(result.unresolved.argmax()), np.count_nonzero(result.unresolved)
+    where = f"between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s"
+    more = f" and in {count - 1} more places" if count > 1 else ""
+    return f"{reason}; too coarse for the damping {where}{more}: margins there may be missing"
 
 
 def _hidden(omega: Real, result: Bounds) -> list[str]:
@@ -269,5 +278,5 @@ def _chord(y: Real, k: int, t: float) -> float:
     return float(y[k] + t * (y[k + 1] - y[k]))
 
 
-def _between(omega: Real, k: int, t: float) -> float:
+def between(omega: Real, k: int, t: float) -> float:
     return float(omega[k] * (omega[k + 1] / omega[k]) ** t)

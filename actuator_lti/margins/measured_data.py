@@ -14,6 +14,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, Real
 
 CONFIDENCE = 0.99
+_GUESSED = "as points scatter about their neighbours; MeasuredResponse takes what is known"
+_NEIGHBOURS = 17  # points whose scatter tells the noise of one
 
 
 @dataclass(frozen=True)
@@ -139,26 +141,81 @@ class MeasuredResponse:
         return 1
 
 
+def is_measured(system: Any) -> bool:
+    """Whether this is frequency-response data, of either kind."""
+    return isinstance(system, MeasuredResponse) or (
+        hasattr(system, "frdata") and not hasattr(system, "delays_s")
+    )
+
+
+def refuse_measured(system: Any) -> None:
+    """Refuse data where a response in time is asked for."""
+    if is_measured(system):
+        raise InputError(
+            "measured data: a step response needs the frequencies between and beyond the points too; "
+            "allowed: a StateSpace, TransferFunction or DelaySystem (bandwidths and margins take the data)"
+        )
+
+
 def measured_response(data: Any) -> MeasuredResponse:
-    """Bring data of either kind into this form; plain ones count as free of noise.
+    """Bring data of either kind into this form; the noise of plain ones is estimated from their scatter.
 
     Raises
     ------
     InputError
-        More than one input or output.
+        More than one input or output, or frequencies beyond Nyquist.
     """
     if isinstance(data, MeasuredResponse):
         return data
     omega, L, dt = _read(data)
-    return MeasuredResponse(omega, L, np.zeros(L.size), dt, "")
+    return MeasuredResponse(omega, L, _scatter(omega, L), dt, _GUESSED)
+
+
+def _scatter(omega: Real, L: Complex) -> Real:
+    """Radius about each value, from how far points nearby lie off the cubic through their own neighbours.
+
+    Log L over log frequency, two neighbours on either side: the residual has (1 + sum of the squared weights)
+    times the variance of a value. The median counts, so that a resonance between two points does not.
+    """
+    usable = np.flatnonzero((omega > 0.0) & (L != 0.0) & np.isfinite(L))
+    usable = usable[np.argsort(omega[usable])]
+    radius = np.zeros(L.size)
+    u, y = np.log(omega[usable]), np.log(np.abs(L[usable])) + 1j * np.unwrap(np.angle(L[usable]))
+    if u.size < _NEIGHBOURS or (np.diff(u) <= 0.0).any():
+        return radius
+    at = np.arange(2, u.size - 2)
+    beside = at[:, None] + np.array([-2, -1, 1, 2])
+    off = u[at, None] - u[beside]
+    weight = np.ones(off.shape)
+    for i in range(4):
+        for j in range(4):
+            if i != j:
+                weight[:, i] *= off[:, j] / (u[beside[:, i]] - u[beside[:, j]])
+    residual = y[at] - (weight * y[beside]).sum(axis=1)
+    squared = np.abs(residual) ** 2 / (1.0 + (weight**2).sum(axis=1))
+    first = np.clip(np.arange(u.size) - 2 - _NEIGHBOURS // 2, 0, max(at.size - _NEIGHBOURS, 0))
+    window = first[:, None] + np.arange(min(_NEIGHBOURS, at.size))
+    sigma = np.sqrt(np.median(squared[window], axis=1) / math.log(2.0))
+    radius[usable] = np.abs(L[usable]) * sigma * _student(_NEIGHBOURS // 2, CONFIDENCE)
+    return radius
+
+
+def at_once(radius: Real) -> Real:
+    """Radii of circles that all hold at once as surely as each alone (Gaussian tails, Bonferroni)."""
+    return radius * math.sqrt(1.0 + math.log(radius.size) / -math.log(1.0 - CONFIDENCE))
 
 
 def _read(data: Any) -> tuple[Real, Complex, float | None]:
     if data.ninputs != 1 or data.noutputs != 1:
         raise InputError(f"a loop has one input and one output; this has {data.ninputs} and {data.noutputs}")
     dt = float(data.dt) if data.dt not in (None, 0, True) else None
-    L = np.asarray(data.frdata, dtype=complex).reshape(-1)
-    return np.asarray(data.omega, dtype=float), L, dt
+    omega, L = np.asarray(data.omega, dtype=float), np.asarray(data.frdata, dtype=complex).reshape(-1)
+    if dt is not None and (omega > math.pi / dt * (1.0 + 1e-9)).any():
+        raise InputError(
+            f"measured data: {omega.max():.6g} rad/s; allowed: up to the Nyquist frequency, "
+            f"{math.pi / dt:.6g} rad/s"
+        )
+    return omega, L, dt
 
 
 def _per_point(values: ArrayLike, count: int, name: str, high: float) -> Real:

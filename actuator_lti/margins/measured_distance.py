@@ -6,6 +6,7 @@ import numpy as np
 
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured_bounds import Bounds, Strip
+from actuator_lti.margins.measured_data import at_once
 
 _PIECES = 32  # of an interval between two points
 Range = tuple[float, float]
@@ -15,7 +16,8 @@ def distance_ranges(L: Complex, radius: Real, bounds: Bounds) -> tuple[Range, Ra
     """Ranges of min |1 + L| and of min |2 (1 + L)/(1 - L)| over the measured band.
 
     From below: the nearest place of every strip between two points, a piece of a ring about the origin. From
-    above: the circle of a measured point, which holds the true value.
+    above: the circle of a measured point, which holds the true value; all of them at once, as the
+    lowest is taken.
     """
     low, high = _pieces(bounds.log_gain)
     first, last = _pieces(bounds.phase)
@@ -24,7 +26,8 @@ def distance_ranges(L: Complex, radius: Real, bounds: Bounds) -> tuple[Range, Ra
     cos = np.cos(_from_minus_one(first, last))
     near = np.clip(cos, a, b)
     least = np.sqrt(np.maximum(near * near - 2.0 * near * cos + 1.0, 0.0))
-    d, e = np.abs(1.0 + L) + radius, np.abs(1.0 - L) - radius
+    together = at_once(radius)
+    d, e = np.abs(1.0 + L) + together, np.abs(1.0 - L) - together
     with np.errstate(divide="ignore"):
         above = np.where(e > 0.0, 2.0 * d / e, np.inf)
     return (float(least.min()), float(d.min())), (float(_least_alpha(a, b, cos).min()), float(above.min()))

@@ -188,3 +188,41 @@ def test_an_unseen_mode_near_zero_frequency_does_not_matter() -> None:
     for c in ([1.0, 0.0], [1.0, 1e-17]):
         system = control.StateSpace(A, [[0.5], [0.0]], [c], [[0.0]], 0.01, remove_useless_states=False)
         assert step_figures(system).settling_time_s == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("states", [12, 40])
+def test_a_loop_behind_many_samples_of_delay(states: int) -> None:
+    """0.9 y + 0.1 u - 0.002 y of so many samples ago: the recursion itself."""
+    A = np.diag(np.ones(states - 1), -1)
+    A[0, 0], A[0, -1] = 0.9, -0.002
+    b, c = 0.1 * np.eye(states)[:, :1], np.eye(states)[-1:]
+    f = step_figures(control.StateSpace(A, b, c, [[0.0]], 1.0, remove_useless_states=False))
+    x, y = np.zeros(states), []
+    for _ in range(2000):
+        y.append(float((c @ x)[0]))
+        x = A @ x + b[:, 0]
+    truth = sampled_figures(np.array(y) / (0.1 / 0.102))
+    assert (f.rise_time_s, f.settling_time_s) == (truth.rise, truth.settling)
+    assert f.overshoot_percent == pytest.approx(truth.overshoot_percent, rel=1e-8)
+
+
+def test_samples_on_a_level_have_reached_it_and_on_the_band_are_inside() -> None:
+    assert step_figures(control.tf([0.98, 0.02], [1.0, 0.0], 1.0)).settling_time_s == 0.0
+    f = step_figures(control.tf([0.9], [1.0, -0.1], 1.0))  # 0.9, 0.99, ...
+    assert (f.rise_time_s, f.settling_time_s) == (0.0, 2.0)
+
+
+def test_two_resonances_that_beat() -> None:
+    """Settled when the sum of both envelopes allows no more than 2 %, at a crest of the beat."""
+    zeta, w, v = 1e-3, 50.0, 51.0
+    s = control.tf("s")
+    f = step_figures(
+        1 / (s + 1) + 4 * s / (s**2 + 2 * zeta * w * s + w**2) + 4 * s / (s**2 + 2 * zeta * v * s + v**2)
+    )
+    t = np.arange(0.0, 400.0, 1e-4)
+    e = -np.exp(-t)
+    for each in (w, v):
+        damped = each * math.sqrt(1.0 - zeta**2)
+        e += 4.0 / damped * np.exp(-zeta * each * t) * np.sin(damped * t)
+    assert f.settling_time_s == pytest.approx(t[np.flatnonzero(np.abs(e) > 0.02)[-1]], abs=2e-4)
+    assert f.overshoot_percent == pytest.approx(100.0 * e.max(), rel=1e-5, abs=1e-4)

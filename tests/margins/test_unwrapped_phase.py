@@ -85,4 +85,4 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="Nyquist"):
         unwrapped_phase_deg(control.tf([1], [1, 0.5], 0.01), [400.0])
     with pytest.raises(InputError, match="measured"):
-        unwrapped_phase_deg(control.frd([1.0, 0.5], [1.0, 2.0]), [1.0])
+        unwrapped_phase_deg(control.frd([1.0, 0.5], [1.0, 2.0]), [4.0])

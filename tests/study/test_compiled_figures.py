@@ -187,3 +187,25 @@ def test_drive_figures_are_those_of_the_report(name):
     assert accelerated == pytest.approx(truth.acceleration_rad_s2 * degrees)
     if truth.motor_current_A is not None:
         assert drive_figures(population, "motor_current", 3.0)[0] == pytest.approx(truth.motor_current_A)
+
+
+@pytest.mark.parametrize("above", [1e-2, 1.0, 1e3, 1e5])
+def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
+    """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency."""
+    import control
+
+    from actuator_lti.batch import _figures, _step
+
+    s = control.tf("s")
+    system = control.c2d(control.ss(50 * above * s / (s**2 + s + 2500) + 1 / (s + 1)), 1e-3)
+    A, B, C = (np.asarray(part) for part in (system.A, system.B, system.C))
+    n, p = len(A), np.linalg.eigvals(system.A)
+    row = np.zeros(_figures.COLUMNS)
+    row[_figures.RADIUS], row[_figures.FINAL] = np.abs(p).max(), (C @ np.linalg.solve(np.eye(n) - A, B))[0, 0]
+    poles = np.concatenate((np.zeros(2 * n), p.real, p.imag))
+    spaces = np.zeros(2 * n), np.zeros(2 * n * n + 2 * n)
+    _step.step_figures(n, A.ravel().copy(), B.ravel().copy(), C.ravel().copy(), np.nan, poles, row, *spaces)
+    truth = step_figures(system)
+    assert row[_figures.SETTLING] == pytest.approx(truth.settling_time_s / 1e-3, abs=1e-6)
+    assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)
+    assert row[_figures.OVERSHOOT] == pytest.approx(truth.overshoot_percent, rel=1e-7)

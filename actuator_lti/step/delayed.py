@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +11,15 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
+from actuator_lti.exact_fraction import product
 from actuator_lti.margins.collocation import open_loop_matrix
-from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
+from actuator_lti.margins.delay_form import DelayForm, border_values, characteristic, delay_form
 from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step_modes import ModalTail, modal_tail
-from actuator_lti.step_response import Response, Stepped
-from actuator_lti.step_terms import Exponentials, Term
+from actuator_lti.step.motion import Motion
+from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
+from actuator_lti.step.stepped import Stepped
 
 _FEWEST = 12  # steps to the shortest delay
 _FIRST = 10.0  # longest delays to step at first
@@ -28,15 +28,15 @@ _POINTS = 32
 _PARTS = 4  # intervals of a step at whose ends the response is kept
 _ZERO = 1e-12  # of the largest response about the poles
 _MOST = 400_000
+_FORGOTTEN = 25.0  # time constants
+_NEWTON = 8
+_BITS = 256
 
 
-Between = Callable[[int, float], float]
-
-
-def delayed_response(system: Any) -> tuple[Response, float]:
+def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     """Unit step response of a system with inner delays over its final value, and that value.
 
-    The first delays are stepped; after them the response is the sum over the exact poles, which the
+    The first delays are stepped; after them the response is the free motion of the exact poles, which the
     collocation of the delays starts and Newton on the characteristic matrix sharpens. The two have to agree
     where they meet, to 1e-5 of the final value; otherwise stepping goes on.
 
@@ -49,17 +49,18 @@ def delayed_response(system: Any) -> tuple[Response, float]:
     low, order = low_frequency(form)
     poles = sorted_poles(open_loop_matrix(form, _POINTS), False)
     if order or poles.unstable or poles.border_count > 1:
-        raise InputError("the system is not stable: it has no step figures")
+        raise InputError(UNSTABLE)
     final = _final_value(form, low if poles.border_count else 0.0, poles.values)
     head = _FIRST * float(form.delays.max())
     while True:
         h = _grid_step(form.delays, head)
-        values = _stepped(form, h, int(np.ceil(head / h))) / final
-        time, y = h / _PARTS * np.arange(_PARTS * values.shape[0]), values[:, :_PARTS].ravel()
-        tail = modal_tail(form, poles.values, head)
-        late = time > 0.75 * head
-        if np.abs(tail.response(time[late]) / final + 1.0 - y[late]).max() <= _MEET:
-            return Response(Stepped(time, y, quartics(h, values)), _exponentials(tail, final), False), final
+        values = _stepped(form, h, int(np.ceil(head / h))) / final - 1.0
+        exact, weights = _modes(form, poles.values, head)
+        late = np.arange(len(values) * 3 // 4, len(values))
+        modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
+        if np.abs(modes - values[late, 0]).max() <= _MEET:
+            early = Stepped.through(values, h)
+            return early, _motion(exact, weights * np.exp(exact * early.end) / final, early.end), final
         head *= 2.0
 
 
@@ -68,29 +69,61 @@ def _final_value(form: DelayForm, x: float, poles: Complex) -> float:
     around = np.abs(poles[np.abs(poles) > 0.0])
     largest = float(np.abs(border_values(form, around)).max(initial=0.0))
     if abs(final) <= _ZERO * largest:
-        raise InputError(
-            "the final value of the step response is zero: it has no rise, overshoot or settling"
-        )
+        raise InputError(NO_FINAL)
     return final
 
 
-def _exponentials(tail: ModalTail, final: float) -> Exponentials:
-    terms = tuple(
-        Term(flint.acb(complex(p)), (flint.acb(complex(w)),))
-        for p, w in zip(tail.poles, tail.weights, strict=True)
-        if w != 0.0
-    )
-    return Exponentials(terms, final, 64)
+def _modes(form: DelayForm, poles: Complex, start: float) -> tuple[Complex, Complex]:
+    """Poles still alive after ``start`` (s), and their weights: residues of T/s.
+
+    Only those of the upper half plane; where they are not real, a weight counts for the pair.
+    """
+    alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
+    exact: list[complex] = []
+    weights: list[complex] = []
+    for estimate in poles[alive]:
+        pole, residue = _sharpened(form, complex(estimate))
+        if pole is None or residue == 0.0 or any(abs(pole - p) <= 1e-9 * abs(p) for p in exact):
+            continue
+        exact.append(pole)
+        weights.append(residue / pole * (1.0 if pole.imag == 0.0 else 2.0))
+    return np.array(exact, dtype=complex), np.array(weights, dtype=complex)
 
 
-def quartics(h: float, values: Real) -> Between:
-    """The response within its steps, through its five points in each; four grid intervals make a step."""
-    coefficients = values @ np.linalg.inv(np.vander(np.linspace(0.0, 1.0, _PARTS + 1))).T
+def _sharpened(form: DelayForm, pole: complex) -> tuple[complex | None, complex]:
+    """Newton with both null vectors, pole -= (u* F w)/(u* F' w); the residue of T there."""
+    start = pole
+    for _ in range(_NEWTON):
+        F, slope, row, column = characteristic(form, pole)
+        U, _, Vh = np.linalg.svd(F)
+        u, w = U[:, -1], Vh[-1].conj()
+        below = complex(u.conj() @ slope @ w)
+        step = complex(u.conj() @ F @ w) / below
+        pole -= step
+        if abs(step) <= 1e-13 * abs(pole):
+            break
+    if abs(start.imag) <= 1e-9 * abs(start) or abs(pole.imag) <= 1e-12 * abs(pole):
+        pole = complex(pole.real)
+    if abs(pole - start) > 0.1 * abs(start):
+        return None, 0j
+    return pole, complex(row @ w) * complex(u.conj() @ column) / below
 
-    def between(k: int, t: float) -> float:
-        return float(np.polyval(coefficients[k // _PARTS], t / h - k // _PARTS))
 
-    return between
+def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
+    """The motion that is the real part of the sum of weights times exponentials from the start on."""
+    real = poles.imag == 0.0
+    every = [flint.acb(complex(p)) for p in np.concatenate((poles, poles[~real].conj()))]
+    parts = np.concatenate((np.where(real, weights, 0.5 * weights), 0.5 * weights[~real].conj()))
+    bits = _BITS
+    while True:
+        with flint.ctx.workprec(bits):
+            rest = flint.acb_poly([0])
+            for k, weight in enumerate(parts):
+                rest += product(every[:k] + every[k + 1 :]) * flint.acb(complex(weight))
+            motion = free_motion(rest, every, False, start)
+        if motion is not None:
+            return motion
+        bits *= 2
 
 
 def _grid_step(delays: Real, horizon: float) -> float:

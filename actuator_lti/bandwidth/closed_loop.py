@@ -3,120 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any, Literal, overload
+from typing import Any, overload
 
+import flint
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.bandwidth_exact import exact_gain
+from actuator_lti.bandwidth.exact_gain import exact_gain
+from actuator_lti.bandwidth.measured import measured_bandwidth
+from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
-from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, roots
-from actuator_lti.margins.crossings import gain_crossings
+from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
 from actuator_lti.margins.delay_distance import delayed_extreme
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
 from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.delayed import delayed_gain_crossings
 from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
-from actuator_lti.margins.level_crossings import LevelCrossings
 from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
-from actuator_lti.margins.poles import sorted_poles
+from actuator_lti.margins.measured_data import is_measured
 from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import subdivided, variation
 from actuator_lti.plain_system import PlainSystem
 from actuator_lti.rest_mode import without_rest_mode
 
-Level = Literal["1/sqrt(2)", "-3 dB"]
-_SQUARES: dict[str, float] = {"1/sqrt(2)": 0.5, "-3 dB": 10.0**-0.3}
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
-_NEAR_DC = 1e-7
+_TAKEN = flint.fmpq(1, 1000)
 _POLE = "the response has a pole at zero frequency: it is no closed loop with a bandwidth"
-_NO_GAIN = "the response is zero at zero frequency: there is no value to measure the fall from"
-
-
-@dataclass(frozen=True)
-class Bandwidth:
-    """Bandwidths of a closed-loop response T.
-
-    Attributes
-    ----------
-    minus3db_rad_s : float or None
-        Where |T| first falls below ``level`` times its value at zero frequency; ``None``: never. Where it
-        comes back above later (a resonance beyond), the first fall is still the one that is meant.
-    crossings_rad_s : tuple of float
-        Every frequency at which |T| passes that level, falls and rises in turn: the first is
-        ``minus3db_rad_s``.
-    minus90deg_rad_s : float or None
-        Where the unwrapped phase of T first falls below -90 deg against zero frequency.
-    resonance_peak_db : float
-        Largest |T| over its value at zero frequency, dB (0: no resonance).
-    resonance_rad_s : float
-        Where it is reached; 0 where there is no resonance.
-    dc_gain : float
-        T at zero frequency, with its sign.
-    definition : str
-        What "-3 dB" means here: 1/sqrt(2) (half the power) or -3 dB exactly.
-    """
-
-    minus3db_rad_s: float | None
-    minus90deg_rad_s: float | None
-    resonance_peak_db: float
-    resonance_rad_s: float
-    dc_gain: float
-    definition: str
-    crossings_rad_s: tuple[float, ...] = ()
-
-    @property
-    def minus3db_hz(self) -> float | None:
-        """-3 dB bandwidth, Hz."""
-        return None if self.minus3db_rad_s is None else self.minus3db_rad_s / (2.0 * math.pi)
-
-    @property
-    def minus90deg_hz(self) -> float | None:
-        """-90 deg bandwidth, Hz."""
-        return None if self.minus90deg_rad_s is None else self.minus90deg_rad_s / (2.0 * math.pi)
-
-    @property
-    def resonance_hz(self) -> float:
-        """Frequency of the resonance peak, Hz."""
-        return self.resonance_rad_s / (2.0 * math.pi)
-
-    def __str__(self) -> str:
-        def text(hz: float | None) -> str:
-            return "none" if hz is None else f"{hz:.6g} Hz"
-
-        line = (
-            f"bandwidth: {text(self.minus3db_hz)} ({self.definition}), {text(self.minus90deg_hz)} (-90 deg); "
-            f"resonance {self.resonance_peak_db:+.4f} dB at {self.resonance_hz:.6g} Hz"
-        )
-        if len(self.crossings_rad_s) < 2:
-            return line
-        again = ", ".join(text(w / (2.0 * math.pi)) for w in self.crossings_rad_s[1:])
-        return f"{line}; the first fall of the gain is meant, it passes the level again at {again}"
-
-
-@dataclass(frozen=True)
-class Peaks:
-    """Peaks of the sensitivity S = 1/(1 + L) and of the complementary sensitivity T = L/(1 + L).
-
-    Attributes
-    ----------
-    sensitivity_db, complementary_db : float
-        Peak gains, dB.
-    sensitivity_rad_s, complementary_rad_s : float
-        Where they are reached (0 and infinity are possible).
-    """
-
-    sensitivity_db: float
-    sensitivity_rad_s: float
-    complementary_db: float
-    complementary_rad_s: float
-
-    def __str__(self) -> str:
-        return (
-            f"peak of S {self.sensitivity_db:.4f} dB at {self.sensitivity_rad_s / (2 * math.pi):.6g} Hz, "
-            f"of T {self.complementary_db:.4f} dB at {self.complementary_rad_s / (2 * math.pi):.6g} Hz"
-        )
+_NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
 
 
 def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
@@ -124,8 +37,8 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
 
     Parameters
     ----------
-    system : StateSpace, TransferFunction or DelaySystem
-        T, one input, one output; continuous or sampled.
+    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
+        T, one input, one output; continuous or sampled. Measured data: each figure comes with its range.
     delay_s : float, optional
         Exact delay in series with T, s: it leaves the -3 dB bandwidth and takes phase.
     level : {"1/sqrt(2)", "-3 dB"}
@@ -142,20 +55,23 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     >>> print(closed_loop_bandwidth(control.tf([1], [1, 1])))
     bandwidth: 0.159155 Hz (1/sqrt(2)), none (-90 deg); resonance +0.0000 dB at 0 Hz
     """
-    if level not in _SQUARES:
-        raise InputError(f"level = {level!r}: one of {list(_SQUARES)}")
+    if level not in SQUARES:
+        raise InputError(f"level = {level!r}: one of {list(SQUARES)}")
+    if is_measured(system):
+        return measured_bandwidth(system, delay_s, level)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
             return _of_delays(system, delay_s, level)
         system = system.to_state_space()
-    system = _shown(system)
+    system = _without_rest_mode(system)
     loop = rational_loop(system)
     fraction = exact_fraction(system)
-    gain = exact_gain(fraction, loop.in_z)
+    seen = shown(fraction, loop)
+    gain = exact_gain(seen, loop.in_z)
     if gain is None:
         raise InputError(_POLE)
-    if _slow_pole(fraction, loop):
-        return _by_response(loop, delay_s, level)
+    if seen is not fraction and _taken(fraction, gain.dc, 1 if loop.in_z else 0):
+        raise InputError(_NO_GAIN)
     if abs(double(gain.dc)) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     peak, place = gain.largest()
@@ -163,12 +79,18 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     if delay_s:
         turn = _first_turn(from_rational(loop, delay_s), double(gain.dc))
         turn = None if turn is None else loop.frequency(turn) if loop.in_z else turn
-    crossings = [_unwarped(w, loop) for w in gain.crossings(_SQUARES[level])]
+    crossings = [_unwarped(w, loop) for w in gain.crossings(SQUARES[level])]
     return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
                       _unwarped(place, loop), double(gain.dc), level)  # fmt: skip
 
 
-def _shown(system: Any) -> Any:
+def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
+    """Whether a mode seen at zero frequency alone takes the gain away there: a spring, however weak."""
+    below = fraction.den(at)
+    return bool(below != 0 and abs(fraction.num(at) / below) < _TAKEN * abs(dc))
+
+
+def _without_rest_mode(system: Any) -> Any:
     """A state space without a mode at zero frequency that it does not show."""
     if not hasattr(system, "A") or system.ninputs != 1 or system.noutputs != 1:
         return system
@@ -202,38 +124,13 @@ def _unwarped(w: float | None, loop: RationalLoop) -> float | None:
     return 2.0 * math.atan(w) / loop.period_s
 
 
-def _slow_pole(fraction: Fraction, loop: RationalLoop) -> bool:
-    """Whether a state space has a pole that is at zero frequency but for rounding, and perhaps not seen."""
-    if loop.numerator is not None or fraction.den.degree() < 1:
-        return False
-    p = np.array([complex(root) for root, _ in roots(fraction.den)])
-    near = np.abs(p - 1.0) if loop.in_z else np.abs(p) / float(np.abs(loop.A).max())
-    return bool((near < _NEAR_DC).any())
-
-
-def _by_response(loop: RationalLoop, delay_s: float, level: Level) -> Bandwidth:
-    """From the response alone, which a hidden mode at zero frequency leaves as it is."""
-    form = from_rational(loop, delay_s)
-    unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
-    dc = _dc(form)
-    falls = _rational_falls(loop, abs(dc) * math.sqrt(_SQUARES[level]))
-    return _assembled(form, falls, rational_extreme(loop, PEAK, dc), dc, unit, level)
-
-
 def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
     form = delay_form(system, delay_s)
     dc = _dc(form)
-    falls = delayed_gain_crossings(form.without_series(), abs(dc) * math.sqrt(_SQUARES[level]))
-    return _assembled(form, list(falls), delayed_extreme(form.without_series(), PEAK), dc, 1.0, level)
-
-
-def _assembled(
-    form: DelayForm, falls: list[float], extreme: tuple[float, float], dc: float, unit: float, level: Level
-) -> Bandwidth:
-    turn = _first_turn(form, dc)
-    turn = None if turn is None else turn * unit
-    peak_db = -20.0 * math.log10(extreme[0] * abs(dc)) if extreme[0] > 0.0 else math.inf
-    return _bandwidth([x * unit for x in falls], turn, peak_db, extreme[1] * unit, dc, level)
+    falls = delayed_gain_crossings(form.without_series(), abs(dc) * math.sqrt(SQUARES[level]))
+    least, place = delayed_extreme(form.without_series(), PEAK)
+    peak_db = -20.0 * math.log10(least * abs(dc)) if least > 0.0 else math.inf
+    return _bandwidth(list(falls), _first_turn(form, dc), peak_db, place, dc, level)
 
 
 def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
@@ -246,6 +143,10 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
     delay_s : float, optional
         Exact delay in series with L, s.
     """
+    if is_measured(system):
+        raise InputError(
+            "measured data: the peak of S is 1 over stability_margins(L).modulus_margin, in its range"
+        )
     inner = hasattr(system, "delays_s") and system.delays_s.size > 0
     if inner or delay_s:
         form = (
@@ -290,18 +191,6 @@ def _value_at_rest(form: DelayForm, low: float) -> float:
     except np.linalg.LinAlgError:
         value = math.nan
     return value if math.isfinite(value) else float(border_values(form, np.array([low]))[0].real)
-
-
-def _rational_falls(loop: RationalLoop, level: float) -> list[float]:
-    if not loop.order:
-        return []
-    scaled = replace(
-        loop,
-        c=loop.c / level,
-        d=loop.d / level,
-        numerator=None if loop.numerator is None else loop.numerator / level,
-    )
-    return gain_crossings(scaled, LevelCrossings(scaled, sorted_poles(loop.A, loop.in_z).values)).tolist()
 
 
 def _first_turn(form: DelayForm, dc: float) -> float | None:

@@ -1,0 +1,140 @@
+"""Bandwidths of a measured closed loop: each with the range in which it lies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
+from actuator_lti.errors import InputError
+from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.measured import Group, measured_points, passed, refuse_coarse, single_passages
+from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
+from actuator_lti.margins.measured_data import MeasuredResponse, at_once, measured_response
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """ln |T| at zero frequency, how far it may lie below and above that, its sign, and how it is known."""
+
+    log_gain: float
+    down: float
+    up: float
+    sign: float
+    note: str
+
+
+@dataclass(frozen=True)
+class _Passage:
+    """Where a level is first passed for sure, and from where on it may have been."""
+
+    at: float | None
+    within: Range | None
+    all: tuple[float, ...]
+
+
+def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
+    """Bandwidths from `control.FrequencyResponseData` or `MeasuredResponse` of a closed loop T.
+
+    T at zero frequency is the point measured there; without one the lowest point, which may lie off it by as
+    much as the gain changes over the first octave (a third of that for the first term in w^2).
+
+    Raises
+    ------
+    InputError
+        Data as `stability_margins` refuses them, or a phase at the lowest point that leaves the sign open.
+    """
+    response = measured_response(data)
+    omega, T, radius = measured_points(response, None)
+    result = bounds(omega, T, radius, delay_s)
+    refuse_coarse(omega, T, result)
+    rest = _at_rest(response, omega, T, result)
+    gain = _relative(result.log_gain, rest)
+    falls = _first_fall(omega, gain, 0.5 * math.log(SQUARES[level]))
+    start = 0.0 if rest.sign > 0.0 else math.copysign(math.pi, float(np.angle(T[0])))
+    turns = _first_fall(omega, result.phase, start - 0.5 * math.pi)
+    k = int(gain.middle.argmax())
+    peak = max(float(gain.middle[k]), 0.0)
+    largest = float(np.log(np.maximum(np.abs(T) - at_once(radius), 1e-300)).max()) - rest.log_gain - rest.up
+    return Bandwidth(
+        minus3db_rad_s=falls.at,
+        minus90deg_rad_s=turns.at,
+        resonance_peak_db=_db(peak),
+        resonance_rad_s=float(omega[k]) if peak else 0.0,
+        dc_gain=rest.sign * math.exp(rest.log_gain),
+        definition=level,
+        crossings_rad_s=falls.all,
+        minus3db_range_rad_s=falls.within,
+        minus90deg_range_rad_s=turns.within,
+        resonance_range_db=(_db(max(largest, 0.0)), _db(max(float(gain.high.max()), 0.0))),
+        notes=(rest.note, *_coarse(omega, result), f"noise: {response.source or 'none'}"),
+    )
+
+
+def _at_rest(response: MeasuredResponse, omega: Real, T: Complex, result: Bounds) -> _Rest:
+    down, up = float(result.log_gain.down[0]), float(result.log_gain.up[0])
+    zero = np.flatnonzero(response.omega == 0.0)
+    if zero.size:
+        value = float(response.frdata[zero[0]].real)
+        if not abs(value) > 0.0:
+            raise InputError("DC gain is 0: no -3 dB bandwidth")
+        return _Rest(math.log(abs(value)), down, up, math.copysign(1.0, value), "T(0) is measured")
+    off = abs(math.remainder(float(np.angle(T[0])), math.pi)) + float(result.phase.up[0])
+    if off > 0.25 * math.pi:
+        raise InputError(
+            f"measured data: at the lowest point, {omega[0]:.6g} rad/s, the phase of T is "
+            f"{np.degrees(np.angle(T[0])):.1f} deg; T at zero frequency is not known: measure lower"
+        )
+    middle = result.log_gain.middle
+    octave = min(int(np.searchsorted(omega, 2.0 * omega[0])), omega.size - 1)
+    bend = abs(float(middle[octave] - middle[0]))
+    note = (
+        f"T(0) is taken from the lowest point, {omega[0]:.6g} rad/s, to "
+        f"{_db(-down - bend):+.3f} and {_db(up + bend):+.3f} dB"
+    )
+    return _Rest(float(middle[0]), down + bend, up + bend, math.copysign(1.0, T[0].real), note)
+
+
+def _relative(strip: Strip, rest: _Rest) -> Strip:
+    """The gain over that at zero frequency, wider by what is not known of it."""
+    return replace(
+        strip,
+        middle=strip.middle - rest.log_gain,
+        down=strip.down + rest.up,
+        up=strip.up + rest.down,
+        low=strip.low - rest.log_gain - rest.up,
+        high=strip.high - rest.log_gain + rest.down,
+    )
+
+
+def _first_fall(omega: Real, strip: Strip, level: float) -> _Passage:
+    groups = single_passages(strip, level)
+    sure = [(group, at) for group in groups if (at := passed(strip, level, group)) is not None]
+    if not sure:
+        return _Passage(None, None, ())
+    low, high = _frequency(omega, groups[0], 0), _frequency(omega, sure[0][0], -1)
+    crossings = tuple(float(omega[k] * (omega[k + 1] / omega[k]) ** t) for _, (k, t) in sure)
+    return _Passage(crossings[0], (low, high), crossings)
+
+
+def _frequency(omega: Real, group: Group, end: int) -> float:
+    """Where a group begins (0) or ends (-1)."""
+    k, t = (group.last, group.t1[-1]) if end else (group.first, group.t0[0])
+    return float(omega[k] * (omega[k + 1] / omega[k]) ** t)
+
+
+def _coarse(omega: Real, result: Bounds) -> tuple[str, ...]:
+    if not result.unresolved.any():
+        return ()
+    k = int(result.unresolved.argmax())
+    return (
+        f"too coarse for the damping between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s: "
+        "the gain there is not known",
+    )
+
+
+def _db(log_gain: float) -> float:
+    return 20.0 / math.log(10.0) * log_gain
