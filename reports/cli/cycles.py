@@ -57,11 +57,9 @@ def _json(limit_cycles: LimitCycles) -> Tree:
         "steps": [
             {
                 "load": one.load_Nm,
-                "step": one.settling.amplitude_rad,
-                "hunting": one.settling.hunting,
-                "limited": one.settling.limited,
-                "amplitude": one.settling.hunting_rad,
-                "frequency_hz": one.settling.hunting_hz,
+                "step": one.amplitude_rad,
+                "hunting": one.hunting,
+                **vars(one.rest),
             }
             for one in limit_cycles.rests
         ],

@@ -12,14 +12,16 @@ import pytest
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design
 from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.cycles import LimitCycles, Settling
+from analyses.friction_effects.cycles import LimitCycles
 from analyses.friction_effects.result import FrictionPoint
 from analyses.loop_figures import loop_figures
+from analyses.settling import Settling
 from analyses.validation import QUICK, validate
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.ledger import Entry, to_the_command
 from analyses.validation.result import Validation
 from analyses.validation.unstable import growth_1_s, unstable_entry
+from nonlinear.rest import Rest
 from reports.sections.sweep import _described_agreement
 from reports.sections.validation import summary
 
@@ -67,8 +69,16 @@ def test_the_headline_names_the_unstable_loop() -> None:
     assert "not confirmed" not in str(made["findings"])
 
 
+def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
+    rest = Rest(
+        verdict="limit cycle", error=0.0, amplitude=swing_rad, motor_amplitude=swing_rad, frequency_hz=hertz,
+        periods=8, limited=(), after_s=1.0, ticks=1,
+    )  # fmt: skip
+    return Settling(step_rad, 0.0, rest)
+
+
 def test_a_hunting_drive_fails_by_name() -> None:
-    swing = Settling(0.01, 1.0, 1e-4, True, False, True, 2e-3, 0.13)
+    swing = hunting(0.01, 2e-3, 0.13)
     point = FrictionPoint(0.0, 0.1, None, None, LimitCycles((), None, (swing,)))
     rows = (Entry("position", "bandwidth", "Hz", "", 1.0, 1.0, 0.1, True),)
     quiet = Validation(
@@ -105,10 +115,7 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
     """Seed 100035 hunts by 8e-14 rad of 4e-4 (plain integration says the same): a verdict of no use."""
     design = load_design("ilr33-amber")
     size = part * design.validation.full_deflection_rad
-    swing = Settling(
-        amplitude_rad=size, wait_s=1.0, error_rad=0.0, at_rest=False, limited=False,
-        hunting=True, hunting_rad=size, hunting_hz=3.0,
-    )  # fmt: skip
+    swing = hunting(size, size, 3.0)
     cycles = LimitCycles((), None, (swing,))
     point = FrictionPoint(0.0, 1e-3, None, None, cycles)
     result = validate(design, QUICK)
