@@ -16,11 +16,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import inf
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.drift import DRIFT, MOST_LEAPS, STILL, change, even, eventless, leap, matter, small
 from nonlinear.running import Piece, Running
@@ -100,6 +102,25 @@ def judge(running: Running, most_ticks: int = MOST_TICKS) -> Rest | None:
     return None if drive is None else _Watch(drive, most_ticks).judged()
 
 
+def first_motion_s(running: Running, most_ticks: int = MOST_TICKS) -> float:
+    """Time after which the motor first moves from where it is; inf: never, as far as the work goes.
+
+    Raises
+    ------
+    InputError
+        Where command, load or supply still change of themselves.
+    """
+    drive = running.held()
+    if drive is None:
+        raise InputError("first motion: command, load and supply must stay as they are")
+    watch, start = _Watch(drive, most_ticks), drive.s[at.S_ANGLE]
+    while watch.ticks < most_ticks and not watch.quiet():
+        moved = np.concatenate([seen[2] for seen in watch.seen[-2:]]) != start / drive.p[at.RATIO]
+        if moved.any():
+            return float(np.concatenate(watch.times[-2:])[np.argmax(moved)])
+    return inf
+
+
 @dataclass
 class _Watch:
     """The drive and what was seen of it."""
@@ -127,7 +148,7 @@ class _Watch:
             piece = self._advance(periods)
             if piece.status != "ok":
                 return self._rest("diverging")
-            if self._quiet():
+            if self.quiet():
                 return self._rest("at rest")
             if len(self.seen) >= due:
                 due += due // 2
@@ -164,7 +185,7 @@ class _Watch:
             return np.stack([columns[0], columns[place], w])
         return np.stack([columns[0], w, w])
 
-    def _quiet(self) -> bool:
+    def quiet(self) -> bool:
         """Whether nothing changes any more; an even drift is leapt over, up to what happens next."""
         drive, places = self.drive, matter(self.drive)
         states, pieces = [drive.s[places]], []
@@ -178,7 +199,7 @@ class _Watch:
             return True
         if not all(eventless(piece) for piece in pieces) or not even(step, before, scale):
             return False
-        windows, ticks = leap(drive, places, step, scale)
+        windows, ticks = leap(drive, places, step, before, scale)
         self.periods, self.ticks = self.periods + windows * DRIFT, self.ticks + ticks
         return windows >= MOST_LEAPS
 
