@@ -198,6 +198,9 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
+    if shown.coarser:
+        points_shown = f"{shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
+        caption += f" The drive settles slowly: a coarser grid, {points_shown}."
     return doc.figure("map", data, caption=caption, alt=_map_words(shown))
 
 
