@@ -174,12 +174,13 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint16)
     out = np.zeros(at.OUT_SIZE)
     p, s = parameters(row)
+    begun = Running(p.copy(), s.copy(), tables)
     status = _call(p, s, tables, history, flags, out, progress)
     done = (int(out[at.OUT_TICKS]) + every - 1) // every
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
     run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
-    left = Running(p, s, tables)
+    left = Running(p, s, tables) if begun.held() is None else begun
     return replace(run, load_Nm=_load(row, history), limits=_named_limits(run), running=left)
 
 

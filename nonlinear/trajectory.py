@@ -196,7 +196,8 @@ class Trajectory:
     parameters_hash : str
         SHA-256 of the kernel's parameters.
     running : Running or None
-        The drive as the run left it; it can go on from there (`nonlinear.rest`).
+        The drive as the run left it; at its start, if command and load are constant from there on, so that
+        what it ends in (`nonlinear.rest`) is the same whatever the length of the run.
     """
 
     design_name: str

@@ -21,6 +21,8 @@ from nonlinear.rest import first_motion_s, judge
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from random_drives import full_drive, is_stable
 
+from tests.nonlinear.rest_agreement import answers
+
 HERE = Path(__file__).parent
 AMBER = load_design("ilr33-amber")
 DEG = 180.0 / np.pi
@@ -29,14 +31,12 @@ DEG = 180.0 / np.pi
 def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
     design = load_design("joint")
     whole = simulate(design, commands.step(0.02), 0.1)
-    drive = simulate(design, commands.step(0.02), 0.02).running
-    assert drive is not None
-    held = drive.held()
-    assert held is not None
-    left = whole.time_s.size - round(0.02 / whole.period_s)
-    pieces = [held.advance(n) for n in (8, 1000, left - 1008)]
+    rows = Rows.of(design)
+    rows.step("command", 0.02)
+    drive = rows.running()
+    pieces = [drive.advance(n) for n in (8, 1000, whole.time_s.size - 1008)]
     output = np.concatenate([piece.columns[1] for piece in pieces])
-    assert (output == whole.output_angle_rad[-left:]).all()
+    assert (output == whole.output_angle_rad).all()
 
 
 @pytest.mark.parametrize(
@@ -191,6 +191,15 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
         assert spans[0] < 1e-8 * step
     if rest.verdict == "limit cycle" and rest.frequency_hz is not None and rest.frequency_hz * waited > 20.0:
         assert spans[0] == pytest.approx(2.0 * rest.amplitude, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
+def test_all_who_ask_get_one_answer(seed: int) -> None:
+    """The wait of `cycles`, and `simulate` after two lengths; three hundred: rest_agreement.py."""
+    design = full_drive(seed)
+    if not is_stable(design) or design.controller.outermost != "position":
+        pytest.skip("no stable position loop")
+    assert len(set(answers(design))) == 1
 
 
 def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
