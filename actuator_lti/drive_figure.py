@@ -27,7 +27,7 @@ def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
     --------
     >>> from actuator_lti.design import load_design
     >>> f"{drive_figure(load_design('fin'), 'lost_motion'):.4f} deg"
-    '0.0931 deg'
+    '0.1375 deg'
     """
     if name not in DRIVE_QUANTITIES:
         raise InputError(f"quantity {name!r}: one of {', '.join(DRIVE_QUANTITIES)}")

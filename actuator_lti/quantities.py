@@ -169,7 +169,7 @@ _LIST = (
              "static stiffness", "static_stiffness_Nm_rad", 1, "N/m", source="stiffness"),
     Quantity("least_stiffness", "N*m/rad", "drive", "least moment over deflection, 0.1 to 1000 Hz",
              "least dynamic stiffness", "least_stiffness_Nm_rad", 1, "N/m", source="stiffness"),
-    Quantity("lost_motion", "deg", "drive", "play of the coupling and the twist that friction holds",
+    Quantity("lost_motion", "deg", "drive", "between the middles of hysteresis at +-3 % of load.moment_max",
              "lost motion", "lost_motion_rad", -1, "m", size=0.1, source="stiffness"),
     Quantity("hard_over_time", "s", "analysis", "from the hard-over of the power stage to failure.stop",
              "time from hard-over to the stop", "hard_over_time_s", 1, source="analysis"),

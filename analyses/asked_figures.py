@@ -71,7 +71,7 @@ class AskedFigures:
     def limit_cycle_rad(self) -> float:
         """Largest swing that a step of the drive as it is ends in; 0: it rests."""
         swing = self._cycles.hunting
-        return 0.0 if swing is None else swing.settling.hunting_rad or 0.0
+        return 0.0 if swing is None else inf if swing.rest.verdict == "diverging" else swing.swing_rad
 
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""

@@ -119,20 +119,34 @@ def call(
     row: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats, shared: Floats
 ) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
+    return resume(*parameters(row), tables, history, flags, out, shared)
+
+
+def resume(
+    p: Floats, s: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats,
+    shared: Floats,
+) -> int:  # fmt: skip
+    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``; see `call`."""
     opened = _running()
     if opened is None:
         with told_if_slow(COMPILING):
-            from nonlinear._kernels.call import call as numba_call
+            from nonlinear._kernels.call import resume as numba_resume
 
-            return numba_call(row, tables, history, flags, out, shared)
-    return call_library(opened, row, tables, history, flags, out, shared)
+            return numba_resume(p, s, tables, history, flags, out, shared)
+    return _resume_library(opened, p, s, tables, history, flags, out, shared)
 
 
 def call_library(
     opened: Any, row: Floats, tables: Floats, history: Floats, flags: Any, out: Floats, shared: Floats
 ) -> int:
     """Run one row by an opened library; see `call`."""
-    p, s = _prepared(opened, row)
+    return _resume_library(opened, *_prepared(opened, row), tables, history, flags, out, shared)
+
+
+def _resume_library(
+    opened: Any, p: Floats, s: Floats, tables: Floats, history: Floats, flags: Any, out: Floats,
+    shared: Floats,
+) -> int:  # fmt: skip
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
     rows = _Bytes(flags.ctypes.data, flags.size)
     ours = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))

@@ -29,6 +29,7 @@ from nonlinear.batch import Progress, run_rows
 from nonlinear.parameters import design_rows
 from nonlinear.probe import Probe, write_probe
 from nonlinear.reduced import COLUMNS, BatchResult
+from nonlinear.running import Running
 from nonlinear.setup import Tables
 from nonlinear.simulation import run_row
 from nonlinear.trajectory import Trajectory
@@ -166,6 +167,12 @@ class Rows:
     def run(self, *, threads: int | None = None, progress: Progress | None = None) -> BatchResult:
         """Run all rows over the cores; what is kept of each is in the result."""
         return run_rows(self.values, self.tables.joined(), threads=threads, progress=progress)
+
+    def running(self, k: int = 0) -> Running:
+        """One row at its start, to go on from piece by piece."""
+        from nonlinear.native import parameters
+
+        return Running(*parameters(self.values[k].copy()), self.tables.joined())
 
     def trajectory(self, k: int = 0) -> Trajectory:
         """Run one row with its history."""

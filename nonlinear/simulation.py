@@ -20,6 +20,7 @@ from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
 from nonlinear.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
 from nonlinear.probe import Probe
+from nonlinear.running import Running
 from nonlinear.setup import (
     Tables,
     check_frequency,
@@ -161,6 +162,8 @@ def simulate(
 
 def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | None = None) -> Trajectory:
     """Run one row of parameters with its history."""
+    from nonlinear.native import parameters
+
     ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
     probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
     rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
@@ -170,12 +173,15 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
         raise InputError(f"{message}; use record_every, or simulate_many with reducers")
     history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint16)
     out = np.zeros(at.OUT_SIZE)
-    status = _call(row, tables, history, flags, out, progress)
+    p, s = parameters(row)
+    begun = Running(p.copy(), s.copy(), tables)
+    status = _call(p, s, tables, history, flags, out, progress)
     done = (int(out[at.OUT_TICKS]) + every - 1) // every
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
     run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
-    return replace(run, load_Nm=_load(row, history), limits=_named_limits(run))
+    left = Running(p, s, tables) if begun.held() is None else begun
+    return replace(run, load_Nm=_load(row, history), limits=_named_limits(run), running=left)
 
 
 def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
@@ -196,19 +202,20 @@ def _load(row: Floats, history: Floats) -> Floats | None:
 
 
 def _call(
-    row: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None
-) -> int:
+    p: Floats, s: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats,
+    progress: Progress | None,
+) -> int:  # fmt: skip
     """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
-    from nonlinear.native import call
+    from nonlinear.native import resume
 
     shared = np.zeros(2)
     look = watch()
     if progress is None and look is None:
-        return call(row, tables, history, flags, out, shared)
+        return resume(p, s, tables, history, flags, out, shared)
     result: list[int] = []
-    thread = Thread(target=lambda: result.append(call(row, tables, history, flags, out, shared)))
+    thread = Thread(target=lambda: result.append(resume(p, s, tables, history, flags, out, shared)))
     thread.start()
-    total = int(row[at.TICKS])
+    total = int(p[at.TICKS])
     try:
         while thread.is_alive():
             thread.join(0.1)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
+    from nonlinear.running import Running
+
 Floats = npt.NDArray[np.float64]
 COMMANDED: dict[Stage, str] = {
     "position": "reference_rad",
@@ -193,6 +195,9 @@ class Trajectory:
         Moment on the output shaft, all of it; ``None`` where there is none.
     parameters_hash : str
         SHA-256 of the kernel's parameters.
+    running : Running or None
+        The drive as the run left it; at its start, if command and load are constant from there on, so that
+        what it ends in (`nonlinear.rest`) is the same whatever the length of the run.
     """
 
     design_name: str
@@ -223,6 +228,7 @@ class Trajectory:
     parameters_hash: str = ""
     stage: Stage = "position"
     ratio: float = 1.0
+    running: Running | None = field(default=None, repr=False, compare=False)
 
     @property
     def followed(self) -> Floats:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
 BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
+LOST_MOTION_SHARE = 0.03  # of the rated moment
 _SLOW_HZ = 1e-5  # where the limit at zero frequency is read
 
 
@@ -50,7 +51,7 @@ class StiffnessFigures:
 
     @property
     def lost_motion_rad(self) -> Any:
-        """2 (b + C0_l/k)/N_r; 0 of a rigid drive train."""
+        """At +-3 % of the largest load moment; 0 of a rigid drive train."""
         return lost_motion_rad(self.design)
 
     @cached_property
@@ -66,7 +67,7 @@ def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
     >>> from actuator_lti.design import load_design
     >>> result = stiffness_figures(load_design("fin"))
     >>> f"{result.static_stiffness_Nm_rad:.0f} N m/rad, {1e3 * result.lost_motion_rad:.3f} mrad"
-    '1324 N m/rad, 1.625 mrad'
+    '1324 N m/rad, 2.400 mrad'
     """
     return StiffnessFigures(design)
 
@@ -94,12 +95,20 @@ def static_stiffness(response: Compliance) -> Any:
 
 
 def lost_motion_rad(design: Design) -> Any:
-    """2 (b + C0_l/k)/N_r at the output: the play, and the twist that the load's dry friction holds."""
+    """Lost motion at the output as gear makers read it: the hysteresis of the twist under a slow moment, the
+    motor held, between the middles of its width at +-`LOST_MOTION_SHARE` of the largest load moment.
+
+    On either branch the spring carries the moment less or more the load's dry friction.  At m > C0_l that is
+    2 (b + m/k)/N_r; below it the play lies within the width.  Without a load moment: the play.
+    """
     coupling, friction = design.coupling, design.load.friction
     if coupling is None:
         return 0.0
     dry = 0.0 if friction is None else friction.dry_torque_Nm
-    return (coupling.play_rad + 2.0 * dry / coupling.stiffness_Nm_rad) / design.ratio_behind_coupling
+    m = LOST_MOTION_SHARE * np.asarray(design.load.moment_max_Nm) / design.ratio_behind_coupling
+    branches = (m - dry, m + dry)
+    twist = sum(T / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad * np.sign(T) for T in branches)
+    return _plain(np.where(m == 0.0, coupling.play_rad, twist) / design.ratio_behind_coupling)
 
 
 def _plain(value: Any) -> Any:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.failures.asked import Asked
+from analyses.settling import Settling
 
 Floats = npt.NDArray[np.float64]
 
@@ -50,12 +51,21 @@ class FailureCase:
 
 @dataclass(frozen=True)
 class Failures:
-    """All cases of a design; ``left_out`` says by name which ones do not exist for it and why."""
+    """All cases of a design.
+
+    Attributes
+    ----------
+    left_out : dict of str to str
+        By name: why a case does not exist for the drive.
+    before : tuple of Settling
+        What holding each start ends in, the drive whole.
+    """
 
     design: Design
     asked: Asked
     cases: tuple[FailureCase, ...]
     left_out: dict[str, str]
+    before: tuple[Settling, ...]
 
     def case(self, name: str) -> FailureCase:
         """A case by its name.

@@ -14,6 +14,7 @@ from analyses.drive_figures import drive_figures
 from analyses.failures.cases import Case, cases_of
 from analyses.failures.result import Asked, FailureCase, Failures, Floats
 from analyses.failures.rig import Rig
+from analyses.settling import settle
 
 SETTLED = 1e-3
 LONGEST_S = 5.0  # of waiting before a failure
@@ -51,7 +52,8 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
     cases, left_out = cases_of(design, asked)
     settled = {start: _settled(design, asked, start, wait) for start in {case.start_rad for case in cases}}
     made = tuple(_run(settled[case.start_rad].copy(), asked, case) for case in cases)
-    return Failures(design, asked, made, left_out)
+    before = tuple(settle(design, asked.load_Nm, start) for start in sorted(settled))
+    return Failures(design, asked, made, left_out, before)
 
 
 def _settling_s(design: Design, asked: Asked) -> float:

@@ -13,12 +13,10 @@ from analyses.drive_figures import drive_figures
 from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
 from analyses.friction_effects.stick_slip import StickSlipCycle
 from analyses.large_signal.steady_start import PLACES
-from nonlinear import Rows, commands, simulate
+from analyses.settling import Settling, largest_swing, settle
+from nonlinear import Rows
 
-WAIT_TICKS = 40_000
 BELOW = 0.3
-STEADY_SHARE = 0.9  # of the span one window before: still there
-QUIET = 1e-3  # of the step: what counts as motion
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 12.0
 
@@ -48,36 +46,6 @@ class Confirmation:
 
 
 @dataclass(frozen=True)
-class Settling:
-    """The end of a long wait after a step.
-
-    Attributes
-    ----------
-    amplitude_rad, wait_s : float
-        The step and how long was waited.
-    error_rad : float
-        Command less output at the end (output side); mean of the last quarter if it still moves.
-    at_rest : bool
-        Whether the rotor rests at the end.
-    limited : bool
-        Whether a limit acts in the last quarter: then a cycle is one of the limits, not of friction.
-    hunting : bool
-        Whether the output still swings in the last quarter, by at least 0.9 of the quarter before.
-    hunting_rad, hunting_hz : float or None
-        Half the span of the output, and its frequency.
-    """
-
-    amplitude_rad: float
-    wait_s: float
-    error_rad: float
-    at_rest: bool
-    limited: bool
-    hunting: bool
-    hunting_rad: float | None
-    hunting_hz: float | None
-
-
-@dataclass(frozen=True)
 class LimitCycles:
     """Everything about limit cycles at one load torque.
 
@@ -97,14 +65,13 @@ class LimitCycles:
 
     @property
     def hunting(self) -> Settling | None:
-        """The largest cycle that a step ended in, if any did."""
-        swings = [one for one in self.settlings if one.hunting]
-        return max(swings, key=lambda one: one.hunting_rad or 0.0, default=None)
+        """The largest motion of a step that does not come to rest; None: all do."""
+        return largest_swing(self.settlings)
 
     @property
     def by_friction(self) -> bool:
         """Whether a step ended in a cycle in which no limit acts."""
-        return self.hunting is not None and not self.hunting.limited
+        return self.hunting is not None and not self.hunting.rest.limited
 
     @property
     def described(self) -> bool:
@@ -204,29 +171,6 @@ def simulate_row(row: Rows, ticks: int) -> float | None:
     row["ticks"] = ticks
     run = row.trajectory()
     return _frequency(run.time_s, run.motor_speed_rad_s)
-
-
-def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
-    """Step, wait, and look at the last quarter."""
-    Ts = design.controller.period_s
-    run = simulate(design, commands.step(step_rad), WAIT_TICKS * Ts, load_Nm, raise_on_failure=False)
-    error = run.reference_rad - run.output_angle_rad
-    quarter = WAIT_TICKS // 4
-    last, before = error[-quarter:], error[-2 * quarter : -quarter]
-    span, earlier = float(np.ptp(last)), float(np.ptp(before))
-    frequency = _frequency(run.time_s[-2 * quarter :], error[-2 * quarter :] - error[-2 * quarter :].mean())
-    moves = not math.isfinite(span) or (span > QUIET * step_rad and span >= STEADY_SHARE * earlier)
-    hunting = moves and frequency is not None
-    return Settling(
-        amplitude_rad=step_rad,
-        wait_s=WAIT_TICKS * Ts,
-        error_rad=float(last.mean()) if hunting else float(last[-1]),
-        at_rest=bool(run.at_rest[-1]),
-        limited=bool(run.limited[-quarter:].any()),
-        hunting=hunting,
-        hunting_rad=0.5 * span if hunting else None,
-        hunting_hz=frequency if hunting else None,
-    )
 
 
 def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:

@@ -118,7 +118,7 @@ def _point(
     design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[ForeseenCycle, ...]
 ) -> FrictionPoint:
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
-    result = threshold(design, load_Nm, settling_ticks)
+    result = threshold(design, load_Nm)
     loop = None if result is None else hysteresis(design, load_Nm, result.static, settling_ticks)
     dry = float(dry_torque(design, load_Nm, 1))
     breakaway = None if result is None else result.static.forward_rad

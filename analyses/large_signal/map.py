@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int], None]
 AMPLITUDES, FREQUENCIES = 25, 40
 BELOW_ONSET = 0.95
+MOST_TICKS = 20_000_000  # of a map, its repetitions apart; a drive that settles slowly has a coarser grid
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class AmplitudeMap:
         tones, which acts later than they are simulated (`analyses.large_signal.border.slow_protection`).
     ticks : int
         Simulated in all.
+    coarser : bool
+        Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`.
     """
 
     load_Nm: float
@@ -67,6 +70,7 @@ class AmplitudeMap:
     linear: np.ndarray
     onset_rad: Mapping[str, np.ndarray]
     ticks: int
+    coarser: bool = False
 
     @property
     def gain_db(self) -> np.ndarray:
@@ -136,10 +140,11 @@ def amplitude_map(
     load_Nm : float
         Load torque.
     counts : (int, int)
-        Amplitudes and frequencies.
+        Amplitudes and frequencies; fewer where they would take more than `MOST_TICKS`.
     progress : callable, optional
         Called with (runs done, runs in all).
     """
+    asked, counts = counts, _within(design, loops, counts)
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
@@ -168,4 +173,14 @@ def amplitude_map(
         linear=start.output,
         onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
         ticks=int(result.column("ticks").sum()),
+        coarser=counts != asked,
     )
+
+
+def _within(design: Design, loops: Loops, counts: tuple[int, int]) -> tuple[int, int]:
+    """The grid asked for, or one of the same shape whose first run takes at most `MOST_TICKS`."""
+    frequencies = tones(design, loops, counts[1])
+    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    work = counts[0] * sum(settling + 2 * tone.ticks for tone in frequencies)
+    part = min(np.sqrt(MOST_TICKS / work), 1.0)
+    return max(int(part * counts[0]), 2), max(int(part * counts[1]), 2)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_lti.design.model import Design
-from analyses.friction_effects.cycles import Settling
+from analyses.settling import Settling, largest_swing
 
 Cause = Literal["play", "quantisation", "motor-quantisation"]
 Verdict = Literal["confirmed", "refuted"]
@@ -66,14 +66,6 @@ class Confirmation:
 
 
 @dataclass(frozen=True)
-class Rest:
-    """What a step ends in, the drive as it is."""
-
-    load_Nm: float
-    settling: Settling
-
-
-@dataclass(frozen=True)
 class LimitCycles:
     """Cycles of one design.
 
@@ -81,7 +73,7 @@ class LimitCycles:
     ----------
     confirmations : tuple of Confirmation
         Every foreseen cycle.
-    rests : tuple of Rest
+    rests : tuple of Settling
         Steps of two sizes at every load of the design, waited for.
     looked_for : tuple of str
         The causes that the design has.
@@ -89,14 +81,13 @@ class LimitCycles:
 
     design: Design
     confirmations: tuple[Confirmation, ...]
-    rests: tuple[Rest, ...]
+    rests: tuple[Settling, ...]
     looked_for: tuple[str, ...]
 
     @property
-    def hunting(self) -> Rest | None:
-        """The largest cycle that a step of the drive as it is ended in; None: it rests."""
-        swings = [one for one in self.rests if one.settling.hunting]
-        return max(swings, key=lambda one: one.settling.hunting_rad or 0.0, default=None)
+    def hunting(self) -> Settling | None:
+        """The largest motion of a step of the drive as it is that does not come to rest; None: all do."""
+        return largest_swing(self.rests)
 
     @property
     def passed(self) -> bool:

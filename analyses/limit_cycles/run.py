@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.friction_effects.cycles import settle, simulate_row
+from analyses.friction_effects.cycles import simulate_row
 from analyses.large_signal.steady_start import PLACES
 from analyses.limit_cycles.foreseen import (
     counts_matter,
@@ -16,7 +16,8 @@ from analyses.limit_cycles.foreseen import (
     cycles_of_quantisation,
     without_nonlinearities,
 )
-from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles, Rest
+from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
+from analyses.settling import settle
 from nonlinear import Rows
 
 SCALES = np.geomspace(0.4, 2.5, 41)
@@ -48,7 +49,7 @@ def limit_cycles(design: Design) -> LimitCycles:
     foreseen += cycles_of_quantisation(design)
     full = design.validation.full_deflection_rad
     rests = tuple(
-        Rest(load, settle(design, load, share * full))
+        settle(design, load, share * full)
         for load in design.validation.loads_Nm
         for share in (min(design.validation.amplitude_fractions), 1e-3)
     )

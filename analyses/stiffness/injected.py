@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, log
+from math import ceil, log, sqrt
 
 import numpy as np
 
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.compliance import compliance
-from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
+from actuator_lti.loops.stiffness import LOST_MOTION_SHARE, lost_motion_rad, stiffness_at
 from analyses.stiffness.result import AtRest, Check, LostMotion
 from nonlinear import commands, simulate
 from nonlinear.loads import series
@@ -19,7 +19,7 @@ from nonlinear.loads import series
 _SETTLED = 1e-7
 _MOST_TICKS = 400_000
 SKIPPED = 6  # periods at rest, before one is looked at
-LOST_MOTION_S = 2.0
+PERIODS_WITHIN = 10
 _DEFLECTION = 1e-4  # of the full deflection: far inside every limit, so that a pendulum is linear too
 
 
@@ -96,33 +96,43 @@ def _injected(design: Design, amplitude: float, ticks: int, linear: bool, skippe
 
 
 def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
-    """Lost motion of a coupling, 2 (b + C0_l/k) / N_r; None for a rigid drive train."""
+    """Lost motion of a coupling (`actuator_lti.loops.stiffness`); None for a rigid drive train."""
     if design.coupling is None:
         return None
     play = design.coupling.play_rad / design.ratio_behind_coupling
-    return LostMotion(play, lost_motion_rad(design), lost_motion_seen(design) if seen else None)
+    read = lost_motion_seen(design) if seen and design.load.moment_max_Nm > 0.0 else None
+    return LostMotion(play, lost_motion_rad(design), read)
 
 
 def lost_motion_seen(design: Design) -> float:
-    """Lost motion in the simulator: a slow moment to either side and back, the motor's sensor holding.
+    """Lost motion in the simulator, the motor's sensor holding: 0, + peak, - peak, + peak, slowly.
 
-    Its peak is three times the load's dry friction (twice is enough), or a hundredth of the largest moment.
+    The peak is the largest load moment, or thrice what the load's friction breaks away at.  It is slow enough
+    for `PERIODS_WITHIN` oscillations of the load within the part that is read.
+
+    Raises
+    ------
+    InputError
+        Without a coupling, a position loop or a largest load moment.
     """
-    coupling, friction = design.coupling, design.load.friction
-    if coupling is None or design.controller.position is None:
-        raise InputError("stiffness: lost motion needs a coupling and a position loop")
-    dry = (friction.dry_torque_Nm if friction else 0.0) * design.ratio_behind_coupling
-    moment_Nm = max(3.0 * dry, 0.01 * design.load.moment_max_Nm)
-    position = replace(design.controller.position, sensor="motor")
+    coupling, friction, rated = design.coupling, design.load.friction, design.load.moment_max_Nm
+    if coupling is None or design.controller.position is None or rated <= 0.0:
+        raise InputError("stiffness: lost motion needs a coupling, a position loop and load.moment_max")
+    dry = friction.dry_torque_Nm * friction.breakaway_ratio if friction else 0.0
+    peak = max(rated, 3.0 * dry * design.ratio_behind_coupling)
+    share = LOST_MOTION_SHARE * rated / peak
     held = replace(
         design,
-        controller=replace(design.controller, position=position),
+        controller=replace(design.controller, position=replace(design.controller.position, sensor="motor")),
         load=design.load.bare(),
     )
-    quarter = LOST_MOTION_S / 5.0
-    times = quarter * np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
-    moments = moment_Nm * np.array([0.0, 1.0, 0.0, -1.0, 0.0, 0.0])
-    run = simulate(held, commands.hold(), LOST_MOTION_S, series(times, moments))
-    at = [int(k * quarter / design.controller.period_s) for k in (2, 4)]
-    twist_out = run.output_angle_rad - run.motor_angle_rad / design.total_ratio
-    return float(twist_out[at[0]] - twist_out[at[1]])
+    turn_s = 2.0 * np.pi * sqrt(design.load_side_inertia_kgm2 / coupling.stiffness_Nm_rad)
+    ticks = min(ceil(PERIODS_WITHIN * turn_s / (share * design.controller.period_s)), _MOST_TICKS)
+    quarter = ticks * design.controller.period_s
+    loading = series(quarter * np.array([0.0, 1.0, 3.0, 5.0]), peak * np.array([0.0, 1.0, -1.0, 1.0]))
+    every = max(ticks // 4000, 1)
+    run = simulate(held, commands.hold(), 5.0 * quarter, loading, record_every=every)
+    twist = run.output_angle_rad - run.motor_angle_rad / design.total_ratio
+    at = quarter * np.array([2.0 - share, 4.0 + share, 2.0 + share, 4.0 - share])
+    read = np.interp(at, run.time_s, twist)
+    return float(0.5 * (read[0] + read[1] - read[2] - read[3]))

@@ -98,7 +98,7 @@ class Validation:
         points = () if self.friction is None else self.friction.points
         swings = [point.cycles.hunting for point in points]
         least = NOTICED * self.design.validation.full_deflection_rad
-        return any(one is not None and (one.hunting_rad or 0.0) >= least for one in swings)
+        return any(one is not None and one.swing_rad >= least for one in swings)
 
     @property
     def failures(self) -> tuple[str, ...]:

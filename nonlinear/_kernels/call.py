@@ -50,7 +50,14 @@ def call(
     shared: Floats,
 ) -> int:
     """Run one row (see `run`); ``history`` is (columns, rows) or empty."""
-    p, s = parameters(row)
+    return resume(*parameters(row), tables, history, flags, out, shared)
+
+
+def resume(
+    p: Floats, s: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats,
+    shared: Floats,
+) -> int:  # fmt: skip
+    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``; see `call`."""
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
-    rare = 1.0 if row[layout.LAW] > 0.0 or row[layout.ELASTIC_DRIVE] > 0.0 else None
+    rare = 1.0 if p[layout.LAW] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0 else None
     return int(run(p, s, io, block, tables, history.reshape(-1), flags, out, shared, rare))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from analyses.settling import words
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from analyses.limit_cycles import Confirmation, LimitCycles, Rest
+    from analyses.limit_cycles import Confirmation, LimitCycles
+    from analyses.settling import Settling
 
 CAUSES = {
     "play": "play",
@@ -38,11 +40,11 @@ def section(result: LimitCycles) -> Section:
         )
         blocks.append(doc.text(f"No limit cycle of {causes} is foreseen."))
     blocks.append(_rests(result, fine, small))
-    words = summary(result)
+    text = summary(result)
     severity: Any = "info" if result.hunting is None else "warn"
     return doc.section(
-        "cycles", "Limit cycles", blocks, result=words, intro=intro, status=severity,
-        findings=[Finding(severity=severity, text=words, where="cycles")],
+        "cycles", "Limit cycles", blocks, result=text, intro=intro, status=severity,
+        findings=[Finding(severity=severity, text=text, where="cycles")],
     )  # fmt: skip
 
 
@@ -55,10 +57,8 @@ def summary(result: LimitCycles) -> str:
     tail = f"; {seen} of {count} foreseen cycles confirmed" if count else "; none is foreseen"
     if swing is None:
         return f"The drive as it is comes to rest after every step{tail}."
-    one = swing.settling
-    size = f"±{fine * (one.hunting_rad or 0.0):.3g} {small} at {one.hunting_hz:.3g} Hz"
-    at = f"{swing.load_Nm:g} {load_unit(result.design)}" + (", a limit acting" if one.limited else "")
-    return f"The drive as it is does not come to rest: {size} under {at}{tail}."
+    at = f"{swing.load_Nm:g} {load_unit(result.design)}"
+    return f"The drive as it is does not come to rest: {words(swing.rest, fine, small)} under {at}{tail}."
 
 
 def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
@@ -107,15 +107,12 @@ def _rests(result: LimitCycles, fine: float, small: str) -> Block:
     return doc.table("What steps end in", columns, rows, note)
 
 
-def _rest_row(rest: Rest, fine: float) -> Row:
-    one = rest.settling
-    swing = None if one.hunting_rad is None else fine * one.hunting_rad
-    end = "at rest" if not one.hunting else "in a cycle of its limits" if one.limited else "in a cycle"
+def _rest_row(one: Settling, fine: float) -> Row:
     return {
-        "load": rest.load_Nm,
+        "load": one.load_Nm,
         "step": fine * one.amplitude_rad,
-        "end": end,
-        "size": swing,
-        "hz": one.hunting_hz,
+        "end": one.rest.verdict + (", a limit acting" if one.rest.limited else ""),
+        "size": fine * one.swing_rad if one.hunting else None,
+        "hz": one.rest.frequency_hz,
         "_status": "warn" if one.hunting else None,
     }

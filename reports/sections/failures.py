@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.settling import largest_swing, words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -35,8 +36,12 @@ def section(result: Failures) -> Section:
     load, asked = load_unit(result.design), result.asked
     stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
     detected = f"{1e3 * asked.detection_s:.4g} ms"
+    swing = largest_swing(result.before)
+    held = "has come to rest"
+    if swing is not None:
+        held = f"does not come to rest ({words(swing.rest, scale, unit)})"
     intro = (
-        f"Each failure is simulated from a drive that has settled under {asked.load_Nm:g} {load} (positive "
+        f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} {load} (positive "
         f"pushes forward). Deflection counts from where the output was; the stop is {stop} away, and "
         f"detection takes {detected}. The moment is that in the coupling; in a rigid train the motor's "
         "torque times the reduction."
@@ -45,9 +50,9 @@ def section(result: Failures) -> Section:
     blocks += [
         doc.text(f"{NAMES[name]}: not for this drive, as {why}.") for name, why in result.left_out.items()
     ]
-    words = summary(result)
-    finding = Finding(severity="info", text=words, where="failures")
-    return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, findings=[finding])
+    text = summary(result)
+    finding = Finding(severity="info" if swing is None else "warn", text=text, where="failures")
+    return doc.section("failures", "Failure cases", blocks, result=text, intro=intro, findings=[finding])
 
 
 def summary(result: Failures) -> str:
@@ -57,6 +62,8 @@ def summary(result: Failures) -> str:
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
     stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
+    if largest_swing(result.before) is not None:
+        stop += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
 
 

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.settling import largest_swing
+from analyses.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -52,18 +54,16 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
     cycles, swing = point.cycles, point.cycles.hunting
     foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
-        result = f"none after steps of {len(cycles.settlings)} sizes"
+        result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
-        kind = "limits sustain" if swing.limited else "friction sustains"
-        size = fine * (swing.hunting_rad or 0.0)
-        result = f"{kind} a cycle of ±{size:.3g} {small} at {swing.hunting_hz:.3g} Hz"
+        result = end_words(swing.rest, fine, small)
     agree = "as predicted" if cycles.as_foreseen else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle at {point.load_Nm:g} {load}",
-        value=0.0 if swing is None else fine * (swing.hunting_rad or 0.0),
+        value=0.0 if swing is None else fine * swing.swing_rad,
         limit=0.0,
         unit=small,
         distance=None,
@@ -156,25 +156,19 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
         doc.column("step", "Step", small, format="sig:3"),
         doc.column("wait", "Waited", "s", format="sig:2"),
         doc.column("error", "Remaining error", small, format="sig:2"),
-        doc.column("rest", "Rotor at rest", format="yesno"),
-        doc.column("hunting", "Hunting"),
+        doc.column("end", "The drive"),
     ]
     rows = []
     for point in result.points:
         for one in point.cycles.settlings:
-            swing = "no"
-            if one.hunting:
-                swing = f"±{fine * (one.hunting_rad or 0.0):.3g} {small}, {one.hunting_hz:.3g} Hz"
-                swing += " (limits act)" if one.limited else ""
-            error = fine * one.error_rad
+            error = fine * one.rest.error
             rows.append(
                 {
                     "load": point.load_Nm,
                     "step": fine * one.amplitude_rad,
-                    "wait": one.wait_s,
+                    "wait": one.rest.after_s,
                     "error": error if abs(error) > 1e-6 * fine * one.amplitude_rad else 0.0,
-                    "rest": one.at_rest,
-                    "hunting": swing,
+                    "end": end_words(one.rest, fine, small),
                     "_status": "warn" if one.hunting else None,
                 }
             )
@@ -224,17 +218,15 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
 def _summary(result: FrictionEffects, fine: float, small: str) -> tuple[str, str]:
     """Say what becomes of the steady-state error, and a remark."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
-    if any(one.hunting for one in settlings):
-        return "The drive hunts: after a step the output does not come to rest.", ""
+    swing = largest_swing(settlings)
+    if swing is not None:
+        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}.", ""
     if result.integrator:
-        left = [one for one in settlings if abs(one.error_rad) > LEFT * one.amplitude_rad]
+        left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
         if left:
-            most = max(left, key=lambda one: abs(one.error_rad))
-            words = f"an error of up to {fine * abs(most.error_rad):.3g} {small} is left"
-            return (
-                f"The {result.integrator} controller integrates; {most.wait_s:.2g} s after a step {words}.",
-                "",
-            )
+            most = max(abs(one.rest.error) for one in left)
+            words = f"an error of up to {fine * most:.3g} {small} is left at rest"
+            return f"The {result.integrator} controller integrates; {words}.", ""
         return (
             f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
             "integrator removes the error.",

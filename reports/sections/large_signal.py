@@ -158,7 +158,11 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
-    return doc.figure("map", map_chart(result, scale, unit), caption=caption, alt=_map_words(result.map))
+    if shown.coarser:
+        points_shown = f"{shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
+        caption += f" The drive settles slowly: a coarser grid, {points_shown}."
+    chart = map_chart(result, scale, unit)
+    return doc.figure("map", chart, caption=caption, alt=_map_words(shown))
 
 
 def _map_words(amplitude_map: AmplitudeMap) -> str:

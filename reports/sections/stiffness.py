@@ -127,8 +127,8 @@ def _lost_motion(result: Stiffness) -> Block:
         {"what": "lost motion", "foreseen": scale * lost.foreseen_rad, "seen": seen},
     ]
     note = (
-        "Lost motion: how far the output stays apart after a slow moment to either side has gone, the motor "
-        "held: the play and the twist that the load's dry friction holds."
+        "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
+        "the largest load moment, which goes slowly to either side."
     )
     return doc.table("Lost motion at the output", columns, rows, note)
 

@@ -71,7 +71,8 @@ def test_compiling_by_numba_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         return 0
 
     monkeypatch.setenv(native.SWITCH, "numba")
-    monkeypatch.setattr(numba_call, "call", slow)
-    native.call(np.zeros(layout.SIZE), *[np.zeros(0)] * 2, np.zeros(0, np.uint16), *[np.zeros(0)] * 2)
+    monkeypatch.setattr(numba_call, "resume", slow)
+    nothing = np.zeros(0)
+    native.resume(np.zeros(layout.SIZE), *[nothing] * 3, np.zeros(0, np.uint16), *[nothing] * 2)
     assert "numba compiles the simulator" in terminal.getvalue()
     assert terminal.getvalue().count("\n") == 1

@@ -64,14 +64,14 @@ def test_static_stiffness_by_hand() -> None:
 
 
 def test_requirements_on_stiffness_and_lost_motion() -> None:
-    """K of drive E is 400 N m/rad; the fin has 1.5 mrad of play, and friction holds 2 * 0.05/800 rad."""
+    """K of drive E is 400 N m/rad; the fin has 1.5 mrad of play and 2 * 0.36/800 rad of twist."""
     stiff = [
         Requirement(id="soft", quantity="static_stiffness", unit="N*m/rad", minimum=399.0),
         Requirement(id="stiff", quantity="static_stiffness", unit="N*m/rad", minimum=401.0),
     ]
     verdicts = evaluate_requirements(replace(drive_e(), requirements=tuple(stiff)))
     assert [one.verdict for one in verdicts] == ["met", "not met"]
-    lost = Requirement(id="lost", quantity="lost_motion", unit="deg", maximum=0.1, load_Nm=8.0)
+    lost = Requirement(id="lost", quantity="lost_motion", unit="deg", maximum=0.2, load_Nm=8.0)
     (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
-    assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.05 / 800.0), rel=1e-12)
+    assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
     assert result.verdict == "met"

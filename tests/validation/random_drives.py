@@ -664,7 +664,7 @@ def validate_one(design: Design, settings: Settings, tally: Tally) -> None:
     for swing in (point.cycles.hunting for point in points):
         if swing is not None:
             print(
-                f"    HUNTS +-{swing.hunting_rad} rad at {swing.hunting_hz} Hz after {swing.amplitude_rad} rad"
+                f"    HUNTS +-{swing.swing_rad} rad at {swing.rest.frequency_hz} Hz after {swing.amplitude_rad} rad"
                 f"{', limited' * swing.limited}"
             )
     if not judged:

@@ -12,7 +12,8 @@ from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
-from analyses.friction_effects.cycles import limit_cycles, settle
+from analyses.friction_effects.cycles import limit_cycles
+from analyses.settling import settle
 from analyses.static_threshold import static_threshold
 from reports.sections.friction_effects import section
 
@@ -42,8 +43,8 @@ def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-6)
     threshold = static_threshold(design)
     for one in point.cycles.settlings:
-        assert one.at_rest
-        assert 0.0 < abs(one.error_rad) <= max(threshold.forward_rad, threshold.backward_rad)
+        assert one.rest.verdict == "at rest"
+        assert 0.0 < abs(one.rest.error) <= max(threshold.forward_rad, threshold.backward_rad)
 
 
 def test_a_small_step_waits_for_the_integral(amber: Design) -> None:
@@ -70,7 +71,7 @@ def test_the_integral_takes_lost_motion_and_error_away(amber: Design) -> None:
         assert abs(loop.lost_motion_rad) < 1e-9 * loop.amplitude_rad
         assert loop.largest_rad > 0.5 * static_threshold(amber, point.load_Nm).forward_rad
         for one in point.cycles.settlings:
-            assert abs(one.error_rad) < 1e-6 * one.amplitude_rad
+            assert abs(one.rest.error) < 1e-6 * one.amplitude_rad
 
 
 @pytest.mark.parametrize(
@@ -94,12 +95,12 @@ def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
     if cycles.hunting is not None:
-        assert not cycles.hunting.limited
-        assert cycles.hunting.hunting_hz == pytest.approx(9.59, rel=0.01)
-        assert cycles.hunting.hunting_rad == pytest.approx(0.0991 * threshold, rel=0.02)
+        assert not cycles.hunting.rest.limited
+        assert cycles.hunting.rest.frequency_hz == pytest.approx(9.59, rel=0.01)
+        assert cycles.hunting.swing_rad == pytest.approx(0.0991 * threshold, rel=0.02)
         # the same from any start: it is a cycle, not a slow decay
         again = settle(design, 0.0, 3.0 * threshold)
-        assert again.hunting_rad == pytest.approx(cycles.hunting.hunting_rad, rel=0.01)
+        assert again.swing_rad == pytest.approx(cycles.hunting.swing_rad, rel=0.01)
 
 
 @pytest.mark.parametrize("load", [0.0, 8.0])
@@ -143,8 +144,8 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
     assert cycles.as_foreseen
     swing = cycles.settlings[-1]
     assert swing.hunting
-    assert swing.hunting_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
-    assert swing.hunting_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
+    assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
+    assert swing.rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
 
 
 def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design) -> None:

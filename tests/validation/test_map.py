@@ -270,3 +270,15 @@ def test_two_limiters_reached_together_are_both_foreseen(apart: float, passed: b
         each_rad={"current": np.array([0.2]), "voltage": np.array([0.2 * (1.0 + apart)])},
     )
     assert border.passed is passed
+
+
+def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
+    amber: Design, amber_map: AmplitudeMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Work is counted in ticks, so the same drive has the same map on every machine."""
+    assert not amber_map.coarser
+    monkeypatch.setattr("analyses.large_signal.map.MOST_TICKS", amber_map.ticks // 9)
+    small = amplitude_map(amber, assemble_loops(amber), counts=(17, 16))
+    assert small.coarser
+    assert small.cause.size < 0.2 * amber_map.cause.size
+    assert small.ticks < amber_map.ticks / 4  # what is not steady is run again, longer

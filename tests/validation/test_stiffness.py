@@ -12,7 +12,7 @@ from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load
 from actuator_lti.errors import InputError
 from actuator_lti.loops.compliance import compliance
-from actuator_lti.loops.stiffness import stiffness_at
+from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
 from analyses.stiffness import (
     check_stiffness,
     lost_motion_seen,
@@ -87,20 +87,25 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
     assert not replace(result, checks=(wrong,)).passed
 
 
-@pytest.mark.parametrize("play", [0.0, 2e-4, 3e-3])
-@pytest.mark.parametrize("dry", [0.02, 0.2])
-def test_lost_motion_is_play_and_what_dry_friction_holds(play: float, dry: float) -> None:
-    """2 b + 2 C0_l / k at the output."""
+@pytest.mark.parametrize(
+    ("play", "dry"),
+    [(0.0, 0.02), (2e-4, 0.02), (3e-3, 0.02), (0.0, 0.2), (2e-4, 0.2), (2e-4, 0.5), (3e-3, 0.5)],
+)
+def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: float) -> None:
+    """0.36 N m of 12: 2 b + 2 m/k as it moves the load; where friction is larger play is in the width."""
     design = load_design("fin")
     assert design.coupling is not None
     assert design.load.friction is not None
+    assert design.load.moment_max_Nm == 12.0
     friction = replace(design.load.friction, dry_torque_Nm=dry)
     changed = replace(
         design,
         coupling=replace(design.coupling, play_rad=play),
         load=replace(design.load, friction=friction),
     )
-    assert lost_motion_seen(changed) == pytest.approx(play + 2 * dry / 800.0, rel=5e-3)
+    expected = 2 * 0.36 / 800.0 + (play if dry < 0.36 else 0.0)
+    assert lost_motion_rad(changed) == pytest.approx(expected, rel=1e-12)
+    assert lost_motion_seen(changed) == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize("moment", [0.5, 2.0, 8.0])

@@ -1,4 +1,4 @@
-"""What a validation says: an unstable loop, a drive that hunts, rows that are not met, and the words for each."""
+"""What a validation says: an unstable loop, a drive that hunts, rows that are not met, and their words."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
 from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.cycles import LimitCycles, Settling
+from analyses.friction_effects.cycles import LimitCycles
 from analyses.friction_effects.result import FrictionPoint
+from analyses.settling import Settling
 from analyses.validation import CHECKS, Validation, validate
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.places import Bench
 from analyses.validation.row import judged
 from nonlinear import tangent
+from nonlinear.rest import Rest
 from reports.sections.from_rest import described
 from reports.sections.validation import summary
 
@@ -60,8 +62,16 @@ def test_an_unstable_loop_is_not_met_and_its_response_still_is() -> None:
     assert any(item["verdict"] == "not met" and "unstable" in item["label"] for item in items)
 
 
+def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
+    rest = Rest(
+        verdict="limit cycle", error=0.0, amplitude=swing_rad, motor_amplitude=swing_rad, frequency_hz=hertz,
+        periods=8, limited=(), after_s=1.0, ticks=1,
+    )  # fmt: skip
+    return Settling(step_rad, 0.0, rest)
+
+
 def test_a_hunting_drive_fails_by_name() -> None:
-    swing = Settling(0.01, 1.0, 1e-4, True, False, True, 2e-3, 0.13)
+    swing = hunting(0.01, 2e-3, 0.13)
     point = FrictionPoint(0.0, 0.1, None, None, LimitCycles((), None, (swing,)))
     rows = (judged("bandwidth", "position", 1.0, 1.0, 0.1, unit="Hz"),)
     quiet = Validation(design=EMPS, rows=rows, figures={})
@@ -75,10 +85,7 @@ def test_a_hunting_drive_fails_by_name() -> None:
 def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> None:
     """Seed 100035 hunts by 8e-14 rad of 4e-4 (plain integration says the same): a verdict of no use."""
     size = part * EMPS.validation.full_deflection_rad
-    swing = Settling(
-        amplitude_rad=size, wait_s=1.0, error_rad=0.0, at_rest=False, limited=False,
-        hunting=True, hunting_rad=size, hunting_hz=3.0,
-    )  # fmt: skip
+    swing = hunting(size, size, 3.0)
     point = FrictionPoint(0.0, 1e-3, None, None, LimitCycles((), None, (swing,)))
     friction = FrictionEffects(EMPS, (point,), "velocity")
     assert Validation(design=EMPS, rows=(), figures={}, friction=friction).hunting is hunts

@@ -1,0 +1,213 @@
+"""The judge of rest, against closed forms, plain long runs, and drives described in words."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from analyses.friction_effects import friction_effects
+from analyses.settling import settle
+from nonlinear import Rows, State, commands, simulate
+from nonlinear._kernels import layout as at
+from nonlinear.drift import overload
+from nonlinear.rest import first_motion_s, judge
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
+from random_drives import full_drive, is_stable
+
+from tests.nonlinear.rest_agreement import answers
+
+HERE = Path(__file__).parent
+AMBER = load_design("ilr33-amber")
+DEG = 180.0 / np.pi
+
+
+def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
+    design = load_design("joint")
+    whole = simulate(design, commands.step(0.02), 0.1)
+    rows = Rows.of(design)
+    rows.step("command", 0.02)
+    drive = rows.running()
+    pieces = [drive.advance(n) for n in (8, 1000, whole.time_s.size - 1008)]
+    output = np.concatenate([piece.columns[1] for piece in pieces])
+    assert (output == whole.output_angle_rad).all()
+
+
+@pytest.mark.parametrize(
+    ("command", "held"),
+    [
+        (commands.step(0.01), True),
+        (commands.ramp(0.1), False),
+        (commands.ramp(0.1, stop_s=0.05), True),
+        (commands.sine(0.01, 2.0), False),
+        (commands.sampled([0.0, 0.05], [0.0, 0.01]), True),
+        (commands.step(0.01, start_s=0.2), False),
+    ],
+)
+def test_only_what_stays_is_judged(command: commands.Command, held: bool) -> None:
+    run = simulate(AMBER, command, 0.1)
+    assert run.running is not None
+    rest = judge(run.running)
+    assert (rest is not None) == held
+    if rest is not None:
+        assert rest.verdict == "at rest"
+
+
+def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
+    """Breakaway 1.5, an integral of 100 s: the closed form of the stick foresees some hours a period."""
+    values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 100.0}
+    design = with_values(AMBER, values)
+    cycles = friction_effects(design).points[0].cycles
+    assert cycles.stick_slip is not None
+    rest = cycles.settlings[-1].rest
+    assert rest.verdict == "limit cycle"
+    assert rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
+    assert rest.amplitude == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
+    assert rest.ticks < 1e-3 * rest.after_s / design.controller.period_s
+
+
+def test_waiting_is_that_of_the_closed_form() -> None:
+    """A step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work."""
+    design = with_values(AMBER, {"control.velocity.integral_time": 600.0})
+    threshold = friction_effects(AMBER).points[0].threshold
+    assert threshold is not None
+    size = 0.1 * threshold.static.forward_rad
+    rows = Rows.of(design)
+    rows.step("command", size)
+    assert first_motion_s(rows.running()) == pytest.approx(600.0 * 9.0, rel=1e-3)
+    rest = judge(rows.running(), most_ticks=100_000)
+    assert rest is not None
+    assert 600.0 * 9.0 < rest.after_s < 600.0 * 9.0 + 10.0
+
+
+def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
+    p, s = np.zeros(at.SIZE + 400), np.zeros(at.S_QUEUE)
+    p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT] = 3e-4, 5.0
+    s[at.S_CURRENT], s[at.S_OVERLOAD] = -1.0, 0.3
+    x, n = 0.3, 5000
+    for k in range(n):
+        x += 3e-4 * (((-1.0 + 3.5 * k / n) / 5.0) ** 2 - x)
+    assert overload(p, s, 2.5, n) == pytest.approx(x, rel=1e-9)
+    assert overload(p, s, -1.0, 0) == 0.3
+
+
+def test_without_limits_an_unstable_drive_diverges() -> None:
+    loud = with_values(AMBER, {"control.position.gain": 4000.0})
+    run = simulate(loud, commands.step(0.01), 0.001, limits_on=False)
+    assert run.running is not None
+    rest = judge(run.running)
+    assert rest is not None
+    assert rest.verdict == "diverging"
+
+
+def test_a_drive_that_its_load_carries_off_diverges() -> None:
+    """Twice the peak torque of a back-drivable drive."""
+    joint = load_design("joint")
+    most = 2.0 * joint.limits.peak_current_A * (joint.motor.torque_constant_Nm_A or 0.0) * joint.total_ratio
+    rest = settle(joint, -most, 0.01).rest
+    assert rest.verdict == "diverging"
+    assert "current" in rest.limited
+
+
+def test_a_gimbal_with_a_spring_and_play_hunts() -> None:
+    """+-0.40 deg at 0.12 Hz."""
+    rest = settle(load_design(HERE / "gimbal.toml"), 0.0, 0.1).rest
+    assert rest.verdict == "limit cycle"
+    assert DEG * rest.amplitude == pytest.approx(0.40, abs=0.01)
+    assert rest.frequency_hz == pytest.approx(0.12, abs=0.005)
+    assert rest.limited == ()
+
+
+def test_a_steering_motor_crosses_its_play_for_ever() -> None:
+    """0.213 Hz, 0.458 deg peak to peak of the motor at the output's side, 0.3 deg of it play."""
+    rest = settle(load_design(HERE / "steering.toml"), 0.0, 0.002).rest
+    assert rest.verdict == "limit cycle"
+    assert 2.0 * DEG * rest.motor_amplitude == pytest.approx(0.458, abs=0.004)
+    assert rest.frequency_hz == pytest.approx(0.213, abs=0.003)
+    assert rest.amplitude < 0.2 * rest.motor_amplitude
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05, 0.25, 1.0])
+@pytest.mark.parametrize("counts", [586, None])
+def test_a_coarse_encoder_read_by_difference_never_settles(counts: int | None, share: float) -> None:
+    """586 counts at 35 us: one count is 306 rad/s; without counts the same drive comes to rest."""
+    values = {"control.period": 35e-6, "control.position.gain": 250.0, "control.velocity.integral_time": 3e-3}
+    design = with_values(AMBER, values)
+    encoder = replace(design.encoder, speed="difference", counts_per_rev=counts)
+    rest = settle(replace(design, encoder=encoder), 0.0, share * design.validation.full_deflection_rad).rest
+    assert rest.verdict == ("at rest" if counts is None else "limit cycle")
+
+
+def test_the_joint_crosses_its_friction_every_209_s() -> None:
+    """A plain run of 15 min, looked at by its extremes: no leap, no judge."""
+    joint = load_design("joint")
+    step = 0.1 * joint.validation.full_deflection_rad
+    rest = settle(joint, 0.0, step).rest
+    assert rest.verdict == "limit cycle"
+    rows = Rows.of(joint)
+    rows.step("command", step)
+    rows["ticks"] = 440.0 / joint.controller.period_s
+    rows.window(round(215.0 / joint.controller.period_s), 1, 0)
+    low, high = rows.run().span("output_angle_rad")
+    assert rest.amplitude == pytest.approx(0.5 * float(high[0] - low[0]), rel=0.02)
+    assert rest.frequency_hz == pytest.approx(1.0 / 209.3, rel=0.01)
+
+
+PLAIN_TICKS = 300_000
+
+
+@pytest.mark.parametrize("seed", range(1, 31))
+def test_random_drives_against_a_plain_run(seed: int) -> None:
+    """What is said to be at rest by then has stopped; a cycle that it saw often enough has the same size."""
+    design = full_drive(seed)
+    if not is_stable(design) or design.controller.outermost != "position":
+        pytest.skip("no stable position loop")
+    quiet = replace(
+        design,
+        instruments=replace(
+            design.instruments,
+            current_noise_A=0.0,
+            angle_noise_rad=0.0,
+            output_angle_noise_rad=0.0,
+            jitter_s=0.0,
+        ),
+    )
+    step = 0.01 * design.validation.full_deflection_rad
+    rest = settle(design, 0.0, step).rest
+    rows = Rows.of(quiet)
+    rows.step("command", step)
+    rows["ticks"] = PLAIN_TICKS
+    rows.window(PLAIN_TICKS // 5, 1, 0)
+    plain = rows.run()
+    spans = [float(np.subtract(*plain.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
+    waited = PLAIN_TICKS * design.controller.period_s
+    if rest.verdict == "at rest" and rest.after_s < 0.6 * waited:
+        assert spans[0] < 1e-8 * step
+    if rest.verdict == "limit cycle" and rest.frequency_hz is not None and rest.frequency_hz * waited > 20.0:
+        assert spans[0] == pytest.approx(2.0 * rest.amplitude, rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
+def test_all_who_ask_get_one_answer(seed: int) -> None:
+    """The wait of `cycles`, and `simulate` after two lengths; three hundred: rest_agreement.py."""
+    design = full_drive(seed)
+    if not is_stable(design) or design.controller.outermost != "position":
+        pytest.skip("no stable position loop")
+    assert len(set(answers(design))) == 1
+
+
+def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
+    """A run that starts where another one is at rest is at rest."""
+    start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
+    run = simulate(AMBER, commands.hold(0.01), 0.01, initial=start)
+    assert run.running is not None
+    rest = judge(run.running)
+    assert rest is not None
+    assert rest.comes_to_rest
+    assert rest.error == pytest.approx(0.0, abs=1e-12)
