@@ -5,12 +5,13 @@ All values are in SI units on the motor side unless a name says otherwise.  For 
 """
 
 from dataclasses import dataclass, replace
-from math import inf, pi, sin
+from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
+from actuator_lti.design.over_angle import OverAngle, Wave
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -138,10 +139,6 @@ class Gravity:
         "offset", "rad", "", "angle from upright at output angle zero", low=-7.0, high=7.0,
         example="180 deg")] = 0.0
 
-    def moment_Nm(self, angle_rad: float) -> float:
-        """Moment on the output shaft at an output angle, in N m; positive pushes forward."""
-        return self.peak_Nm * sin(angle_rad + self.offset_rad)
-
     @property
     def peak_Nm(self) -> float:
         """m g l."""
@@ -181,10 +178,23 @@ class Load:
 
     def moment_Nm(self, angle_rad: Any, rate_rad_s: Any = 0.0) -> Any:
         """The load's own moment on the output shaft at an angle and a speed of it; floats or arrays."""
-        moment = self.moment_slope_Nm_rad * angle_rad - self.moment_damping_Nms_rad * rate_rad_s
+        return self.over_angle.at(angle_rad) - self.moment_damping_Nms_rad * rate_rad_s
+
+    @property
+    def over_angle(self) -> OverAngle:
+        """What of its own moment depends on the output angle."""
+        waves = []
         if self.gravity is not None:
-            moment = moment + self.gravity.peak_Nm * np.sin(angle_rad + self.gravity.offset_rad)
-        return moment
+            waves.append(Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad))
+        return OverAngle(self.moment_slope_Nm_rad, tuple(waves))
+
+    def straight(self) -> "Load":
+        """The same without what bends with the angle."""
+        return replace(self, gravity=None)
+
+    def level(self) -> "Load":
+        """The same without what depends on the angle."""
+        return replace(self.straight(), moment_slope_Nm_rad=0.0)
 
     def acting(self) -> tuple[str, ...]:
         """The keys of the moments that act by themselves."""
@@ -197,7 +207,7 @@ class Load:
 
     def bare(self) -> "Load":
         """The same without moments of its own."""
-        return replace(self, moment_slope_Nm_rad=0.0, moment_damping_Nms_rad=0.0, gravity=None)
+        return replace(self.level(), moment_damping_Nms_rad=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at
+from actuator_lti.drive.angle import moment_slope
+from actuator_lti.drive.operating import CONTACT, Operating, slope_at
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:

@@ -1,0 +1,51 @@
+"""What a drive feels that depends on its angle: whether there is any, what holds it, its slope.
+
+Nothing else asks which effects these are: the load says it of itself (`Load.over_angle`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.drive.operating import Operating
+
+
+def follows_angle(design: Design) -> bool:
+    """Whether the motor feels a torque that changes with the angle: no constant speed is a steady motion."""
+    felt = design.load.path == "back-drivable" or design.friction.load_coefficient > 0.0
+    return design.load.over_angle.follows and (felt or design.coupling is not None)
+
+
+def bends_with_angle(design: Design) -> bool:
+    """Whether such a torque is no straight line: the linear loops hold about one angle only."""
+    return design.load.over_angle.bends
+
+
+def holding_moment_Nm(design: Design, angle_rad: float = 0.0) -> float:
+    """Moment on the output shaft that holds the load's own one at an output angle."""
+    return -float(design.load.over_angle.at(angle_rad))
+
+
+def moment_slope(design: Design, at: Operating) -> Any:
+    """dM_ext/d(output angle) in N m/rad at the operating point; a float, or an array of stacked designs."""
+    if at.torques_held:
+        return 0.0
+    return design.load.over_angle.slope_at(at.angle_rad, moving=at.speed_rad_s != 0.0)
+
+
+def pushes_away(design: Design, at: Operating) -> Any:
+    """Whether a torque grows with the deflection that it makes; a bool, or an array of stacked designs."""
+    return moment_slope(design, at) > 0
+
+
+def level(design: Design) -> Design:
+    """The same drive without what changes with the angle."""
+    return replace(design, load=design.load.level())
+
+
+def straight(design: Design) -> Design:
+    """The same drive without what bends with the angle."""
+    return replace(design, load=design.load.straight())
