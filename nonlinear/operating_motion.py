@@ -1,9 +1,9 @@
 """Constant speed under a test: the motion on which dry friction is a constant torque (model.md section 4).
 
 Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
-at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive whose load
-changes with the angle has no operating motion: it stands, without dry friction, and a constant moment holds
-gravity.
+at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive that
+feels a torque that changes with the angle has no such motion: it stands, without dry friction, and constant
+moments hold it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.drive.angle import follows_angle, holding_moment_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
 from nonlinear.filters import section
@@ -78,7 +79,7 @@ class OperatingMotion:
         """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
             return Operating(point="driving", speed_rad_s=self.speed_rad_s)
-        return Operating(speed_rad_s=self.speed_rad_s)
+        return Operating(speed_rad_s=self.speed_rad_s, twist_rad=self.twist_rad)
 
 
 def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
@@ -125,11 +126,8 @@ def needs_press(design: Design) -> bool:
 
 
 def has_to_stand(design: Design) -> bool:
-    """Whether the load changes with the angle, in a way that the motor feels."""
-    load = design.load
-    changes = load.moment_slope_Nm_rad != 0.0 or load.gravity is not None
-    felt = load.path == "back-drivable" or design.friction.load_coefficient > 0.0
-    return changes and (felt or design.coupling is not None)
+    """Whether no constant speed is a steady motion: a torque changes with the angle."""
+    return follows_angle(design)
 
 
 def bent_about_rest(design: Design) -> bool:
@@ -159,12 +157,11 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 
 
 def standing(design: Design) -> OperatingMotion:
-    """At rest at zero without dry friction; a constant moment holds gravity and presses a coupling with play.
+    """At rest at zero without dry friction, held by constant moments; they press a coupling with play.
 
     The drive is one that `may_stand`, `on_its_stand`.
     """
-    load, coupling = design.load, design.coupling
-    moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
+    load, coupling, moment = design.load, design.coupling, holding_moment_Nm(design)
     if coupling is None or coupling.play_rad == 0.0:
         return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
