@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
+from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -136,12 +137,18 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
 
 
 def _load(design: Design, row: Floats) -> None:
-    """Slope and gravity of the design act in every run, told or not."""
-    row[at.LOAD_SLOPE] = design.load.moment_slope_Nm_rad
+    """The load's own moments act in every run, told or not."""
+    over_angle = design.load.over_angle
+    row[at.LOAD_SLOPE] = over_angle.slope_Nm_rad
     row[at.LOAD_DAMPING] = design.load.moment_damping_Nms_rad
-    if design.load.gravity is not None:
-        row[at.GRAVITY] = design.load.gravity.peak_Nm
-        row[at.GRAVITY_ANGLE] = design.load.gravity.offset_rad
+    _waves(row, over_angle, at.MOMENT_PEAK, at.MOMENT_ORDER)
+
+
+def _waves(row: Floats, over_angle: OverAngle, peak_at: int, order_at: int) -> None:
+    """Peak, order and phase of what bends with an angle."""
+    for j, wave in enumerate(over_angle.waves):
+        row[peak_at + j] = wave.peak_Nm
+        row[order_at + 2 * j], row[order_at + 2 * j + 1] = wave.order, wave.phase_rad
 
 
 def _controllers(design: Design, row: Floats) -> None:

@@ -72,8 +72,7 @@ from actuator_lti.drive import signals
     LOAD,  # constant part of M_ext
     LOAD_SLOPE,  # N m per rad of output angle
     LOAD_DAMPING,  # N m against the motion per rad/s of the output
-    GRAVITY,  # m g l, N m
-    GRAVITY_ANGLE,  # offset
+    MOMENT_PEAK,  # of moments that bend with the output angle, N m: peak sin(order y + phase)
     LOAD_TABLE,  # offset into the tables
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
@@ -145,8 +144,10 @@ from actuator_lti.drive import signals
     LOAD_SPEED_START,  # W
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
+    MOMENT_ORDER,  # of each such moment
+    MOMENT_PHASE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(128)
+) = range(129)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -178,6 +179,9 @@ TORQUE_CHAIN = SPEED_CHAIN + MAX_SECTIONS * SECTION
 # --- friction map, used where ELASTIC_DRIVE is 1 ----------------------------------------------------
 MAX_POINTS = 16  # per side
 MAP = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # points (|w|, T) for w > 0, then for w < 0
+
+# --- torques that bend with an angle: as many as have a place above -----------------------------------
+MOMENT_WAVES = LOAD_TABLE - MOMENT_PEAK
 
 # --- limiters: place of the limit, bit in the flags; those without a name above have their places here -----
 LIMITERS = tuple(signals.LIMITERS)
@@ -365,7 +369,7 @@ SUPPLY_LIMITS, SUPPLY_SCALES = 2.0, 3.0
 # --- inputs and outputs of one tick -------------------------------------------------------------------
 (
     IN_COMMAND,  # of the outermost stage; output shaft
-    IN_LOAD,  # hinge moment beside constant, slope and gravity
+    IN_LOAD,  # hinge moment beside the load's own
     IN_TORQUE,  # extra torque at the motor shaft
     IN_CURRENT,  # measured: what the controller sees
     IN_SPEED,

@@ -15,9 +15,15 @@ from nonlinear._kernels.smooth import tanh_segment
 FINITE = 1e15
 
 
+@inlined
+def wave_angle(p, at, angle):  # type: ignore[no-untyped-def]
+    """Order times angle plus phase, of the wave whose order and phase stand at ``p[at]``."""
+    return p[at] * angle + p[at + 1]
+
+
 @scalar
 def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
-    """M_ext of this tick: constant, series, slope, damping and gravity."""
+    """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
     M = p[layout.LOAD] + p[layout.LOAD_SLOPE] * y + io[layout.IN_LOAD]
     if p[layout.LOAD_DAMPING] != 0.0:
@@ -25,8 +31,9 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
         M -= p[layout.LOAD_DAMPING] * (
             s[layout.S_OUTPUT_SPEED] if elastic else s[layout.S_SPEED] / p[layout.RATIO]
         )
-    if p[layout.GRAVITY] != 0.0:
-        M += p[layout.GRAVITY] * math.sin(y + p[layout.GRAVITY_ANGLE])
+    for j in range(layout.MOMENT_WAVES):
+        if p[layout.MOMENT_PEAK + j] != 0.0:
+            M += p[layout.MOMENT_PEAK + j] * math.sin(wave_angle(p, layout.MOMENT_ORDER + 2 * j, y))
     return M
 
 
