@@ -49,7 +49,12 @@ class OverAngle:
     @property
     def bends(self) -> bool:
         """Whether it is no straight line over the angle, so that its slope is another at another angle."""
-        return bool(self.waves)
+        return any(bool(np.any(wave.peak_Nm)) for wave in self.waves)
+
+    @property
+    def ripple_Nm(self) -> Any:
+        """The most that the waves have that average: what starting costs at the worst angle."""
+        return sum(wave.peak_Nm for wave in self.waves if wave.averages)
 
     def at(self, angle_rad: Any) -> Any:
         """The torque at an angle; floats or arrays."""
@@ -63,7 +68,7 @@ class OverAngle:
 
         ``moving``: of a drive in motion, to which waves that average have none.
         """
-        acting = [wave for wave in self.waves if not (moving and wave.averages)]
+        acting = [w for w in self.waves if np.any(w.peak_Nm) and not (moving and w.averages)]
         slope, size = self.slope_Nm_rad, abs(self.slope_Nm_rad)
         for wave in acting:
             steepest, phase = wave.peak_Nm * wave.order, wave.order * angle_rad + wave.phase_rad

@@ -145,6 +145,26 @@ class Gravity:
         return self.mass_kg * STANDARD_GRAVITY_m_s2 * self.arm_m
 
 
+MOST_PHASE_rad = 0.5  # of a wave in a tick over which it is held
+
+
+def no_load_speed(design: "Design") -> float:
+    """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
+    kE = design.effective_motor.back_emf_constant_Vs_rad
+    return inf if kE is None else design.limits.voltage_V / kE
+
+
+def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, str]:
+    """Largest order of a wave over an angle that turns at the top speed of the motor over ``ratio``."""
+    if not peak_Nm:
+        return inf, ""
+    speed, Ts = min(design.limits.speed_rad_s, no_load_speed(design)) / ratio, design.controller.period_s
+    if speed == inf:
+        return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
+    most = MOST_PHASE_rad / (speed * Ts)
+    return most, f"held over a tick, of which {speed:.4g} 1/s passes more than {MOST_PHASE_rad} rad"
+
+
 def _largest_damping(design: "Design") -> tuple[float, str]:
     """J/Ts, J all that turns with the output (with a coupling: behind it), at the output shaft."""
     inertia = design.inertia_kgm2 * design.total_ratio**2
@@ -158,7 +178,8 @@ class Load:
     """What hangs on the output shaft, and how its moment reaches the motor.
 
     M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle
-    - ``moment_damping_Nms_rad`` * output speed + gravity.
+    - ``moment_damping_Nms_rad`` * output speed + gravity + the gear error, which a drive in motion passes so
+    fast that its mean, none, is its slope.
     """
 
     inertia_kgm2: Annotated[float, not_negative(
@@ -173,6 +194,18 @@ class Load:
     moment_damping_Nms_rad: Annotated[float, not_negative(
         "moment_damping", "{torque}*s/{angle}", "D", "load moment against the motion, per output speed",
         most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
+    gear_error_Nm: Annotated[float, not_negative(
+        "gear_error", "{torque}", "A",
+        "kinematic error of a gear as a moment on the output, A sin(n angle + phase)",
+        example="0.1 N*m")] = 0.0
+    gear_error_periods: Annotated[float, positive(
+        "gear_error_periods", "rad/{angle}", "n",
+        "periods of the gear error per revolution of the output (linear axis: rad per m)",
+        most=lambda design: _most_order(design, design.load.gear_error_Nm, design.total_ratio),
+        example="2")] = 1.0
+    gear_error_phase_rad: Annotated[float, quantity(
+        "gear_error_phase", "rad", "", "phase of the gear error at output angle zero", low=-7.0, high=7.0,
+        example="0 deg")] = 0.0
     friction: LoadFriction | None = None
     gravity: Gravity | None = None
 
@@ -183,14 +216,13 @@ class Load:
     @property
     def over_angle(self) -> OverAngle:
         """What of its own moment depends on the output angle."""
-        waves = []
-        if self.gravity is not None:
-            waves.append(Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad))
-        return OverAngle(self.moment_slope_Nm_rad, tuple(waves))
+        gear = Wave(self.gear_error_Nm, self.gear_error_periods, self.gear_error_phase_rad, averages=True)
+        pendulum = () if self.gravity is None else (Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad),)
+        return OverAngle(self.moment_slope_Nm_rad, (gear, *pendulum))
 
     def straight(self) -> "Load":
         """The same without what bends with the angle."""
-        return replace(self, gravity=None)
+        return replace(self, gear_error_Nm=0.0, gravity=None)
 
     def level(self) -> "Load":
         """The same without what depends on the angle."""
@@ -201,6 +233,7 @@ class Load:
         there = {
             "load.moment_slope": np.any(self.moment_slope_Nm_rad),
             "load.moment_damping": np.any(self.moment_damping_Nms_rad),
+            "load.gear_error": np.any(self.gear_error_Nm),
             "load.gravity": self.gravity is not None,
         }
         return tuple(key for key, acts in there.items() if acts)

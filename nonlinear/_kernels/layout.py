@@ -72,7 +72,8 @@ from actuator_lti.drive import signals
     LOAD,  # constant part of M_ext
     LOAD_SLOPE,  # N m per rad of output angle
     LOAD_DAMPING,  # N m against the motion per rad/s of the output
-    MOMENT_PEAK,  # of moments that bend with the output angle, N m: peak sin(order y + phase)
+    MOMENT_PEAK,  # of moments that bend with the output angle: peak sin(order y + phase)
+    MOMENT_PEAK_2,
     LOAD_TABLE,  # offset into the tables
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
@@ -144,10 +145,12 @@ from actuator_lti.drive import signals
     LOAD_SPEED_START,  # W
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
-    MOMENT_ORDER,  # of each such moment
+    MOMENT_ORDER,
     MOMENT_PHASE,
+    MOMENT_ORDER_2,
+    MOMENT_PHASE_2,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(129)
+) = range(132)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------

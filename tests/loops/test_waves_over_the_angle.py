@@ -1,0 +1,187 @@
+"""Torques that bend with the angle: closed forms of both writings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import acos, asin, cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+from actuator_lti import InputError, load_design
+from actuator_lti.design import read_design_text
+from actuator_lti.design.model import Controller, Design, Friction, Gear, Limits, Load, Motor, Validation
+from actuator_lti.design.writing import write_design
+from actuator_lti.drive.angle import bends_with_angle, follows_angle, level, straight
+from actuator_lti.drive.facts import breakaway_torque_Nm, capability
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.tick import TickProgram
+from nonlinear import State, commands, simulate
+
+J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
+
+
+@dataclass(frozen=True)
+class Case:
+    """An effect of peak A at the motor; ``order`` periods in a turn of the motor."""
+
+    name: str
+    order: float
+
+    def torque(self, angle: float) -> float:
+        return A * sin(self.order * angle + PHASE)
+
+    @property
+    def stable(self) -> float:
+        """The angle of the motor nearest to zero at which it holds the rotor."""
+        return (pi - PHASE) / self.order
+
+    def put(self, design: Design) -> Design:
+        """Add it to a drive."""
+        load = replace(
+            design.load,
+            gear_error_Nm=A * N,
+            gear_error_periods=self.order * N,
+            gear_error_phase_rad=PHASE,
+        )
+        return replace(design, load=load)
+
+
+CASES = [Case("gear error", 24.0 / N)]
+each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+
+
+def rotor(viscous: float = 0.0) -> Design:
+    """A torque source without a controller on a drive train that the load turns."""
+    return Design(
+        name="rotor",
+        motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
+        gears=(Gear(name="one", ratio=N),),
+        controller=Controller(period_s=Ts, computing_delay_s=0.0),
+        limits=Limits(voltage_V=10.0),
+        validation=Validation(full_deflection_rad=1.0),
+        load=Load(path="back-drivable"),
+        friction=Friction(viscous_Nms_rad=viscous),
+    )
+
+
+def held_recursion(case: Case, angle: float, speed: float, ticks: int) -> np.ndarray:
+    """Angles of a frictionless rotor under a torque that is held over each tick."""
+    angles = []
+    for _ in range(ticks):
+        angles.append(angle)
+        rate = case.torque(angle) / J
+        angle, speed = angle + speed * Ts + 0.5 * rate * Ts**2, speed + rate * Ts
+    return np.array(angles)
+
+
+@each
+def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
+    start = case.stable + 0.9 / case.order
+    run = simulate(case.put(rotor()), commands.hold(), 0.1, initial=State(motor_angle_rad=start))
+    assert run.motor_angle_rad == pytest.approx(held_recursion(case, start, 0.0, 1000), rel=1e-11)
+
+
+@each
+def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> None:
+    """omega = sqrt(A Z/J); held over the tick, x = (A Z/J) Ts^2/2: poles of trace 2 - x and product 1 + x."""
+    design, x = case.put(rotor()), A * case.order / J * Ts**2 / 2.0
+    growth, turn = sqrt(1.0 + x), acos((1.0 - 0.5 * x) / sqrt(1.0 + x))
+    assert turn / Ts == pytest.approx(sqrt(A * case.order / J), rel=1e-3)
+    at = Operating(angle_rad=case.stable / N)
+    poles = np.linalg.eigvals(TickProgram(wire(design, at), "voltage").tick(0).A)
+    assert np.max(np.abs(poles)) == pytest.approx(growth, rel=1e-12)
+    assert np.max(np.angle(poles)) == pytest.approx(turn, rel=1e-9)
+    off = 1e-7 / case.order
+    run = simulate(design, commands.hold(), 0.3, initial=State(motor_angle_rad=case.stable + off))
+    swing, k = run.motor_angle_rad - case.stable, np.arange(run.time_s.size)
+    lead = ((1.0 - x) / growth - cos(turn)) / sin(turn)  # after one tick 1 - x is left
+    expected = growth**k * (np.cos(turn * k) + lead * np.sin(turn * k))
+    assert np.max(np.abs(swing / off - expected)) < 1e-5 * growth ** k[-1]
+
+
+@each
+def test_a_constant_torque_turns_the_rotor_to_where_it_is_held(case: Case) -> None:
+    """A sin(Z th + phase) + T = 0, on the stable side."""
+    T = 0.6 * A
+    run = simulate(
+        case.put(rotor(viscous=4e-4)), commands.hold(), 2.5, disturbance_Nm=T,
+        initial=State(motor_angle_rad=case.stable),
+    )  # fmt: skip
+    assert run.motor_angle_rad[-1] == pytest.approx(case.stable + asin(0.6) / case.order, rel=1e-9)
+    assert run.motor_speed_rad_s[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@each
+def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
+    design, speed = case.put(rotor()), 40.0
+    at = Operating(speed_rad_s=speed, angle_rad=0.3)
+    plain = TickProgram(wire(rotor(), at), "voltage").tick(0)
+    assert np.array_equal(TickProgram(wire(design, at), "voltage").tick(0).A, plain.A)
+    run = simulate(design, commands.hold(), 2.0, initial=State(motor_speed_rad_s=speed))
+    turned = run.motor_angle_rad[-1] - run.motor_angle_rad[0]
+    # J w^2/2 + A/Z cos(Z th + phase) is kept but for the hold: a torque A would have added 400 rad/s
+    energy = 0.5 * J * speed**2 + A / case.order * cos(PHASE)
+    w = np.sqrt(2.0 / J * (energy - A / case.order * np.cos(case.order * run.motor_angle_rad + PHASE)))
+    assert run.motor_speed_rad_s == pytest.approx(w, abs=0.1)
+    assert turned == pytest.approx(2.0 * np.mean(w), rel=1e-3)
+
+
+@each
+def test_slope_at_the_operating_angle(case: Case) -> None:
+    """One tick's derivative of speed over angle is A Z cos(Z th + phase) Ts/J."""
+    design = case.put(rotor())
+    for angle in (0.0, 0.1, -0.7):
+        tick = TickProgram(wire(design, Operating(angle_rad=angle / N)), "voltage").tick(0)
+        expected = A * case.order * cos(case.order * angle + PHASE) * Ts / J
+        assert np.max(np.abs(np.abs(tick.A) - abs(expected)) < 1e-12)
+
+
+@each
+def test_it_is_asked_without_its_name(case: Case) -> None:
+    plain = rotor()
+    design = case.put(plain)
+    assert follows_angle(design)
+    assert bends_with_angle(design)
+    for other in (plain, level(design), straight(design)):
+        assert not follows_angle(other)
+        assert not bends_with_angle(other)
+    held = TickProgram(wire(design, Operating(torques_held=True)), "voltage").tick(0)
+    assert np.array_equal(held.A, TickProgram(wire(plain), "voltage").tick(0).A)
+
+
+@each
+def test_the_drive_must_get_over_its_peak(case: Case) -> None:
+    dry = replace(rotor(), friction=Friction(dry_torque_Nm=3e-3))
+    design = case.put(dry)
+    assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(3e-3 + A, rel=1e-12)
+    assert capability(design).torque_margin == pytest.approx(10.0 / (3e-3 + A), rel=1e-12)
+    assert capability(design).output_rate_rad_s == capability(dry).output_rate_rad_s
+
+
+@each
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-tanh", "joint", "ilr33-amber-compliant"])
+def test_energy_balances(case: Case, name: str) -> None:
+    design = case.put(load_design(name))
+    run = simulate(design, commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3, energy=True)
+    without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
+    assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
+    assert run.energy is not None
+    assert run.energy.relative_error < 1e-9
+
+
+def test_keys_of_the_gear_error() -> None:
+    fin = load_design("fin")
+    values = {"load.gear_error": "0.1 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "90 deg"}
+    design = fin.with_values(values)
+    assert design.load.moment_Nm(0.2) - fin.load.moment_Nm(0.2) == pytest.approx(0.1 * cos(0.6), rel=1e-12)
+    assert "load.gear_error" in design.load.acting()
+    assert not design.load.bare().acting()
+    assert read_design_text(write_design(design)).load == design.load
+    with pytest.raises(
+        InputError, match=r"load\.gear_error_periods = .*: held over a tick, .*; allowed: at most"
+    ):
+        fin.with_values({**values, "load.gear_error_periods": 1e6})
+    with pytest.raises(InputError, match=r"load\.gear_error_periods = .* limits\.speed; allowed"):
+        load_design("emps").with_values({"load.gear_error": "1 N", "load.gear_error_periods": "600 rad/m"})
