@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
-from actuator_lti.drive.angle import follows_angle, holding_moment_Nm
+from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
 from nonlinear.filters import section
@@ -49,7 +49,7 @@ class OperatingMotion:
     twist_rad, coupling_Nm : float
         Of the coupling, at its own shaft; 0 where the drive train is rigid.
     extra_Nm : float
-        Constant torque at the motor shaft, which holds what presses the coupling of a drive that stands.
+        Constant torque at the motor shaft of a drive that stands, against what presses it and its own.
     room_rad_s : float
         How far the motor speed may move before the friction is another.
     """
@@ -163,12 +163,12 @@ def standing(design: Design) -> OperatingMotion:
     """
     load, coupling, moment = design.load, design.coupling, holding_moment_Nm(design)
     if coupling is None or coupling.play_rad == 0.0:
-        return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
+        return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment, extra_Nm=holding_torque_Nm(design))
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
     twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
     passed = 1.0 if load.path == "back-drivable" else 0.0
-    held = passed * coupling_Nm / design.ratio_to_coupling
+    held = passed * coupling_Nm / design.ratio_to_coupling + holding_torque_Nm(design, 0.0, twist)
     return OperatingMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
 
 

@@ -137,15 +137,15 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
 
 
 def _load(design: Design, row: Floats) -> None:
-    """The load's own moments act in every run, told or not."""
-    over_angle = design.load.over_angle
-    row[at.LOAD_SLOPE] = over_angle.slope_Nm_rad
+    """The drive's own moments and torques act in every run, told or not."""
     row[at.LOAD_DAMPING] = design.load.moment_damping_Nms_rad
-    _waves(row, over_angle, at.MOMENT_PEAK, at.MOMENT_ORDER)
+    _over_angle(row, design.load.over_angle, at.LOAD_SLOPE, at.MOMENT_PEAK, at.MOMENT_ORDER)
+    _over_angle(row, design.motor.over_angle, at.TORQUE_SLOPE, at.TORQUE_PEAK, at.TORQUE_ORDER)
 
 
-def _waves(row: Floats, over_angle: OverAngle, peak_at: int, order_at: int) -> None:
-    """Peak, order and phase of what bends with an angle."""
+def _over_angle(row: Floats, over_angle: OverAngle, slope_at: int, peak_at: int, order_at: int) -> None:
+    """Slope of a torque over its angle; peak, order and phase of what bends."""
+    row[slope_at] = over_angle.slope_Nm_rad
     for j, wave in enumerate(over_angle.waves):
         row[peak_at + j] = wave.peak_Nm
         row[order_at + 2 * j], row[order_at + 2 * j + 1] = wave.order, wave.phase_rad

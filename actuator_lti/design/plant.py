@@ -57,6 +57,19 @@ class Motor:
         """Whether the current is a state."""
         return self.source_gain_Nm_V is None
 
+    @property
+    def over_angle(self) -> OverAngle:
+        """What of its torque depends on its angle."""
+        return OverAngle()
+
+    def straight(self) -> "Motor":
+        """The same without what bends with the angle."""
+        return self
+
+    def level(self) -> "Motor":
+        """The same without what depends on the angle."""
+        return self.straight()
+
 
 @dataclass(frozen=True, kw_only=True)
 class Gear:

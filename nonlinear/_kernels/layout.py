@@ -78,6 +78,8 @@ from actuator_lti.drive import signals
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
     TORQUE_TABLE_LENGTH,
+    TORQUE_SLOPE,  # of the motor's own torque over its angle
+    TORQUE_PEAK,  # of one that bends with it: peak sin(order th + phase)
     SUPPLY_TABLE,  # bus voltage
     SUPPLY_TABLE_LENGTH,
     MAX_EVENTS,  # per tick
@@ -149,8 +151,10 @@ from actuator_lti.drive import signals
     MOMENT_PHASE,
     MOMENT_ORDER_2,
     MOMENT_PHASE_2,
+    TORQUE_ORDER,
+    TORQUE_PHASE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(132)
+) = range(136)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -184,7 +188,7 @@ MAX_POINTS = 16  # per side
 MAP = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # points (|w|, T) for w > 0, then for w < 0
 
 # --- torques that bend with an angle: as many as have a place above -----------------------------------
-MOMENT_WAVES = LOAD_TABLE - MOMENT_PEAK
+MOMENT_WAVES, TORQUE_WAVES = LOAD_TABLE - MOMENT_PEAK, SUPPLY_TABLE - TORQUE_PEAK
 
 # --- limiters: place of the limit, bit in the flags; those without a name above have their places here -----
 LIMITERS = tuple(signals.LIMITERS)

@@ -38,6 +38,18 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @scalar
+def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
+    """Extra torque at the motor shaft: from outside, and the motor's own over its angle."""
+    th, T = s[layout.S_ANGLE], io[layout.IN_TORQUE]
+    if p[layout.TORQUE_SLOPE] != 0.0:
+        T += p[layout.TORQUE_SLOPE] * th
+    for j in range(layout.TORQUE_WAVES):
+        if p[layout.TORQUE_PEAK + j] != 0.0:
+            T += p[layout.TORQUE_PEAK + j] * math.sin(wave_angle(p, layout.TORQUE_ORDER + 2 * j, th))
+    return T
+
+
+@scalar
 def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
     """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
     dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
@@ -130,7 +142,7 @@ def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
     s[last] = applied_voltage(p, s, io)
     if p[layout.RARE_LOAD] > 0.0:
         io[layout.IO_MOMENT] = hinge_moment(p, s, io)
-        put_load(p, s, io[layout.IO_MOMENT], io[layout.IN_TORQUE])
+        put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:

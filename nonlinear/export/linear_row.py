@@ -17,7 +17,7 @@ from nonlinear.export.entries import emitted, init
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.OFFSET, layout.LOAD,
-    *range(layout.MOMENT_PEAK, layout.LOAD_TABLE),
+    *range(layout.MOMENT_PEAK, layout.LOAD_TABLE), *range(layout.TORQUE_PEAK, layout.SUPPLY_TABLE),
     layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
     layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION,
     layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED,
@@ -65,6 +65,8 @@ def linear_row(p, q):
         q[k] = p[k]
     peak, order = layout.MOMENT_PEAK, layout.MOMENT_ORDER
     q[layout.LOAD_SLOPE] = slope_at_zero(p, p[layout.LOAD_SLOPE], layout.MOMENT_WAVES, peak, order)
+    peak, order = layout.TORQUE_PEAK, layout.TORQUE_ORDER
+    q[layout.TORQUE_SLOPE] = slope_at_zero(p, p[layout.TORQUE_SLOPE], layout.TORQUE_WAVES, peak, order)
     q[layout.VISCOUS] = map_slope(p)
     for k in range(CLEARED.shape[0]):
         q[CLEARED[k]] = 0.0
