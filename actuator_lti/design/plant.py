@@ -29,7 +29,8 @@ class Motor:
     """The motor: either R, L, kM, kE, or an ideal torque source with a gain.
 
     ``L di/dt = u - R i - kE w`` and torque ``kM i`` (paper, equations 1 and 2); without electrical
-    dynamics the torque is ``source_gain_Nm_V * u``.
+    dynamics the torque is ``source_gain_Nm_V * u``.  Cogging is a torque over the angle besides, whose mean,
+    none, is the slope of a drive in motion.
     """
 
     rotor_inertia_kgm2: Annotated[float, positive(
@@ -47,6 +48,18 @@ class Motor:
     source_gain_Nm_V: Annotated[float | None, positive(
         "source_gain", "{torque}/V", "g", "gain of an ideal torque source, instead of R, L, kM, kE",
         example="35.15 N/V")] = None
+    cogging_Nm: Annotated[float, not_negative(
+        "cogging", "{torque}", "",
+        "cogging or torque ripple: peak of a torque sin(Z angle + phase) that the motor makes by itself",
+        example="5 mN*m")] = 0.0
+    cogging_periods: Annotated[float, positive(
+        "cogging_periods", "rad/{angle}", "Z",
+        "periods of the cogging per revolution of the motor (linear axis: rad per m)",
+        most=lambda design: _most_order(design, design.motor.cogging_Nm, 1.0),
+        example="84")] = 1.0
+    cogging_phase_rad: Annotated[float, quantity(
+        "cogging_phase", "rad", "", "phase of the cogging at motor angle zero; 180 deg: it holds there",
+        low=-7.0, high=7.0, example="180 deg")] = 0.0
     constants: Annotated[MotorConstants, choice(
         "constants",
         "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
@@ -60,11 +73,12 @@ class Motor:
     @property
     def over_angle(self) -> OverAngle:
         """What of its torque depends on its angle."""
-        return OverAngle()
+        cogging = Wave(self.cogging_Nm, self.cogging_periods, self.cogging_phase_rad, averages=True)
+        return OverAngle(waves=(cogging,))
 
     def straight(self) -> "Motor":
         """The same without what bends with the angle."""
-        return self
+        return replace(self, cogging_Nm=0.0)
 
     def level(self) -> "Motor":
         """The same without what depends on the angle."""

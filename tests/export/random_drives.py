@@ -49,6 +49,9 @@ def random_drive(rng: Rng) -> Design:
             resistance_ohm=scaled(rng, motor.resistance_ohm),
             inductance_H=scaled(rng, motor.inductance_H),
             rotor_inertia_kgm2=scaled(rng, motor.rotor_inertia_kgm2),
+            cogging_Nm=maybe(own, scaled(own, 1e-3), 0.0),
+            cogging_periods=scaled(own, 40.0),
+            cogging_phase_rad=own.uniform(0.0, 3.0),
         ),
         controller=_controller(rng, design),
         friction=replace(

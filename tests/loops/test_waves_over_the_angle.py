@@ -10,14 +10,26 @@ import pytest
 
 from actuator_lti import InputError, load_design
 from actuator_lti.design import read_design_text
-from actuator_lti.design.model import Controller, Design, Friction, Gear, Limits, Load, Motor, Validation
+from actuator_lti.design.model import (
+    Command,
+    Controller,
+    Design,
+    Friction,
+    Gear,
+    Limits,
+    Load,
+    Motor,
+    Validation,
+)
 from actuator_lti.design.writing import write_design
-from actuator_lti.drive.angle import bends_with_angle, follows_angle, level, straight
+from actuator_lti.drive.angle import bends_with_angle, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
+from nonlinear._kernels import layout
+from nonlinear.operating_motion import operating_motion
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
 
@@ -39,6 +51,9 @@ class Case:
 
     def put(self, design: Design) -> Design:
         """Add it to a drive."""
+        if self.name == "cogging":
+            motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
+            return replace(design, motor=motor)
         load = replace(
             design.load,
             gear_error_Nm=A * N,
@@ -48,7 +63,7 @@ class Case:
         return replace(design, load=load)
 
 
-CASES = [Case("gear error", 24.0 / N)]
+CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
 each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
@@ -171,6 +186,15 @@ def test_energy_balances(case: Case, name: str) -> None:
     assert run.energy.relative_error < 1e-9
 
 
+def test_every_wave_has_its_place_in_the_row() -> None:
+    design = load_design("joint")
+    assert design.load.gravity is not None
+    assert len(design.load.over_angle.waves) == layout.MOMENT_WAVES
+    assert len(design.motor.over_angle.waves) == layout.TORQUE_WAVES
+    assert layout.MOMENT_ORDER + 2 * layout.MOMENT_WAVES == layout.TORQUE_ORDER
+    assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
+
+
 def test_keys_of_the_gear_error() -> None:
     fin = load_design("fin")
     values = {"load.gear_error": "0.1 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "90 deg"}
@@ -185,3 +209,84 @@ def test_keys_of_the_gear_error() -> None:
         fin.with_values({**values, "load.gear_error_periods": 1e6})
     with pytest.raises(InputError, match=r"load\.gear_error_periods = .* limits\.speed; allowed"):
         load_design("emps").with_values({"load.gear_error": "1 N", "load.gear_error_periods": "600 rad/m"})
+
+
+def test_keys_of_the_cogging() -> None:
+    fin = load_design("fin")
+    values = {"motor.cogging": "5 mN*m", "motor.cogging_periods": 4, "motor.cogging_phase": "90 deg"}
+    design = fin.with_values(values)
+    assert design.motor.over_angle.at(0.01) == pytest.approx(5e-3 * cos(0.04), rel=1e-12)
+    assert read_design_text(write_design(design)).motor == design.motor
+    with pytest.raises(
+        InputError, match=r"motor\.cogging_periods = .*: held over a tick, .*; allowed: at most"
+    ):
+        fin.with_values({**values, "motor.cogging_periods": 1e6})
+    screw = load_design("ballscrew").with_values(
+        {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
+    )
+    assert screw.screw is not None
+    travel = screw.screw.travel_m_rad
+    assert screw.motor.over_angle.at(0.3 * travel) == pytest.approx(5e-3 / travel * sin(5 * 0.3), rel=1e-9)
+
+
+def test_a_self_locking_drive_feels_its_cogging() -> None:
+    """It holds the rotor against a torque below its peak, whatever the load path."""
+    amber = load_design("ilr33-amber")
+    plain = replace(amber, friction=Friction(viscous_Nms_rad=2e-4))
+    design = CASES[1].put(plain)
+    assert design.load.path == "self-locking"
+    assert follows_angle(design)
+    assert not follows_angle(CASES[0].put(plain))
+    start = State(motor_angle_rad=CASES[1].stable)
+    open_loop = replace(
+        design, controller=replace(design.controller, position=None, velocity=None, current=None)
+    )
+    volts = 0.5 * A * plain.motor.resistance_ohm / plain.motor.torque_constant_Nm_A
+    run = simulate(open_loop, commands.step(volts), 1.0, initial=start)
+    assert run.motor_angle_rad[-1] == pytest.approx(CASES[1].stable + asin(0.5) / 12.0, rel=1e-6)
+
+
+def test_behind_a_coupling_the_motor_stands_where_its_twist_puts_it() -> None:
+    """The slope is that at N angle + N_c twist, and the holding torque is that of the same angle."""
+    design = CASES[1].put(load_design("ilr33-amber-compliant"))
+    at = Operating(angle_rad=0.01, twist_rad=2e-3)
+    angle = design.total_ratio * 0.01 + design.ratio_to_coupling * 2e-3
+    assert wire(design, at).plant.torque["th"] == pytest.approx(
+        12.0 * A * cos(12.0 * angle + PHASE), rel=1e-12
+    )
+    assert holding_torque_Nm(design, 0.01, 2e-3) == pytest.approx(-CASES[1].torque(angle), rel=1e-12)
+
+
+@each
+@pytest.mark.parametrize("name", ["joint", "ilr33-amber-compliant", "fin"])
+def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: Case, name: str) -> None:
+    """Nothing moves; the loops are those of the operating angle, and a small push grows as they say."""
+    shipped = load_design(name)
+    back = replace(shipped.load, path="back-drivable", friction=None)
+    design = case.put(replace(shipped, load=back, friction=Friction(viscous_Nms_rad=1e-5)))
+    motion = operating_motion(design)
+    assert motion.speed_rad_s == 0.0
+    start = State(motor_angle_rad=design.ratio_to_coupling * motion.twist_rad, output_angle_rad=0.0)
+    control = replace(design.controller, position=None, velocity=None, current=None)
+    free = replace(design, controller=control, command=Command())
+    turned = [
+        simulate(
+            free,
+            commands.step(volts),
+            0.01,
+            motion.load_Nm,
+            disturbance_Nm=motion.extra_Nm,
+            initial=start,
+            friction_on=False,
+            limits_on=False,
+        ).motor_angle_rad
+        for volts in (0.0, 1e-4, -1e-4)
+    ]
+    assert np.max(np.abs(turned[0] - start.motor_angle_rad)) < 1e-9
+    tick = TickProgram(wire(free, motion.operating(free)), "voltage").tick(0)
+    x, expected = np.zeros(len(tick.A)), []
+    for _ in turned[0]:
+        expected.append(tick.signals["th"][: x.size] @ x)
+        x = tick.A @ x + tick.B[:, 0] * 1e-4
+    seen = 0.5 * (turned[1] - turned[2])
+    assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
