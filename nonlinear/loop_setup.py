@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import inf, lcm
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from actuator_lti.errors import InputError
 from nonlinear.operating_motion import (
     OperatingMotion,
     current_state,
+    full_torque_Nm,
     may_stand,
     operating_motion,
     standing,
@@ -66,11 +67,13 @@ class LoopSetup:
     @cached_property
     def outer(self) -> str:
         """Outermost stage that runs."""
-        return self.loop if self.loop in STAGES else self.stages[-1]
+        return self.loop if self.loop in STAGES or not self.stages else self.stages[-1]
 
     @cached_property
     def point(self) -> str:
         """Where the instrument sits."""
+        if self.loop in PATHS:
+            return target(self.design, self.outer) if self.stages else "u"
         return target(self.design, self.loop) if self.loop in STAGES else self.loop
 
     @property
@@ -91,7 +94,10 @@ class LoopSetup:
     @cached_property
     def base_ticks(self) -> int:
         """Ticks after which everything repeats."""
-        return max(every(self.design, stage) for stage in self._running)
+        current = self.design.controller.current
+        fed = current is not None and current.back_emf_feedforward != 0.0 and not self.held
+        stages = self._running + (("velocity",) if fed and "velocity" in self.stages else ())
+        return lcm(*(every(self.design, stage) for stage in stages))
 
     @property
     def period_s(self) -> float:
@@ -100,7 +106,7 @@ class LoopSetup:
 
     @property
     def _running(self) -> tuple[str, ...]:
-        return self.stages[: self.stages.index(self.outer) + 1]
+        return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
 
     @property
     def condition(self) -> str:
@@ -139,7 +145,8 @@ class LoopSetup:
     def _base(self) -> Rows:
         """The row without instrument and state."""
         row = Rows.of(self.design, friction_on=self.bias.friction_on, limits_on=self.limits_on)
-        for name in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
+        dropped = ("friction_feedforward",) if self.loop in PATHS else FEED_FORWARD
+        for name in dropped:
             row[name] = 0.0
         if self.outer != "position":
             for name in GAINS["position"]:
@@ -221,6 +228,22 @@ class LoopSetup:
         row.step(point, value, -1.0)
 
     @cached_property
+    def range(self) -> float:
+        """What would be a large signal at the place, in its unit."""
+        design, limits = self.design, self.design.limits
+        full = design.validation.full_deflection_rad
+        speed = min(limits.speed_rad_s, self.bias.speed_rad_s or inf)
+        ranges = {"u": limits.voltage_V, "i_ref": limits.peak_current_A, "w_ref": speed, "output": full}
+        if self.loop == "load":
+            return full_torque_Nm(design) * design.total_ratio
+        if self.loop == "command":
+            outermost = design.controller.outermost
+            ranges |= {"position": full, "velocity": speed / design.total_ratio}
+            ranges |= {"current": limits.peak_current_A, "voltage": limits.voltage_V}
+            return ranges[outermost]
+        return ranges[self.point]
+
+    @cached_property
     def room(self) -> dict[str, float]:
         """How far each signal may move from its steady value: to its limit, and the speed to zero."""
         row, limits = self.row(), self.design.limits
@@ -234,6 +257,8 @@ class LoopSetup:
         return room
 
 
+FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
+PATHS = ("command", "load")  # of the whole drive, to its output
 GAINS = {
     "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),
     "velocity": ("velocity_gain", "velocity_integral"),
@@ -252,7 +277,7 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     InputError
         If the design has no such loop or break point, or has no operating motion.
     """
-    known = (*stages_of(design), *points_of(design))
+    known = (*stages_of(design), *points_of(design), *PATHS)
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     result = LoopSetup(design, loop, operating_motion(design), limits_on, held)

@@ -1,8 +1,8 @@
 """Margins at small, medium and large amplitude, with dry friction and without: the drive let go from there.
 
 There is no operating motion: the drive is released from an initial deviation (angle, speed or current, a
-part of its full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which the
-oscillation that follows does not die out.  Saturation takes gain away, friction takes energy away: the
+part of its full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which
+the oscillation that follows does not die out.  Saturation takes gain away, friction takes energy away: the
 border found need not be the linear one, and is reported, not judged.
 """
 

@@ -45,3 +45,24 @@ def state_kinds(p: npt.NDArray[np.float64]) -> npt.NDArray[np.str_]:
     places = sorted(starts)
     lengths = np.diff([*places, int(p[layout.STATE_SIZE])])
     return np.repeat([starts[place] for place in places], lengths)
+
+
+def places_of(p: npt.NDArray[np.float64], *kinds: str) -> npt.NDArray[np.intp]:
+    """Places in the state of the numbers of some kinds."""
+    return np.flatnonzero(np.isin(state_kinds(p), kinds))
+
+
+def names_of(places: npt.NDArray[np.intp]) -> tuple[str, ...]:
+    """Names of numbers of the state: the layout's, and how far behind it for one of a chain or line."""
+    named = {
+        getattr(part, name): name[len(prefix) :].lower()
+        for part, prefix in ((layout, "S_"), (elastic_layout, "ES_"))
+        for name in get_type_hints(part)
+        if name.startswith(prefix)
+    }
+    starts = np.array(sorted(named))
+    begins = starts[np.searchsorted(starts, places, "right") - 1]
+    return tuple(
+        named[begin] if place == begin else f"{named[begin]}_{place - begin}"
+        for begin, place in zip(begins.tolist(), places.tolist(), strict=True)
+    )
