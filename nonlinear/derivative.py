@@ -78,6 +78,8 @@ class Tangent:
         Names of the numbers of the state that the injection moves, as the layout has them.
     stated_error : float
         Largest error of the response, relative, by what two step sizes differ in.
+    places : ndarray of int, shape (n,)
+        Where the states lie in the row of the state.
     """
 
     place: str
@@ -88,7 +90,8 @@ class Tangent:
     period_s: float
     hold_s: float
     states: tuple[str, ...]
-    stated_error: float = field(repr=False)
+    stated_error: float
+    places: npt.NDArray[np.intp] = field(repr=False, default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def system(self) -> Any:
@@ -229,6 +232,7 @@ class _Bench:
             hold_s=self.hold * tick_s,
             states=names_of(self.moved),
             stated_error=float(np.max(np.einsum("zi,ik,zk->z", seen[0], off, right))),
+            places=self.moved,
         )
 
     def _columns(

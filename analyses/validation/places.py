@@ -120,7 +120,7 @@ class Bench:
             assert loops.moment_system is not None
             return loops.moment_system(), none
         scale = self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
-        return (lambda z: scale * np.asarray(loops.plain_response(z))), none  # type: ignore[misc]
+        return (lambda z: scale * np.asarray(loops.plain_response(z), complex)), none
 
     def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
         """A break point with all loops closed."""

@@ -279,16 +279,16 @@ def _loop_margins(place: Place, figures: LoopFigures) -> Iterator[Row]:
     hold = place.tangent.hold_s
     for margin in figures.margins.gain_margins:
         yield _gain_row(place, "gain_margin", margin.ratio, margin.frequency_rad_s * hold, None)
-    for margin in figures.margins.phase_margins:
-        z = np.array([np.exp(1j * margin.frequency_rad_s * hold)])
+    for phase in figures.margins.phase_margins:
+        z = np.array([np.exp(1j * phase.frequency_rad_s * hold)])
         seen = complex(place.tangent.open(z)[0])
-        turned = seen / -np.exp(1j * np.radians(margin.deg))
+        turned = seen / -np.exp(1j * np.radians(phase.deg))
         off = degrees(float(np.angle(turned)))
         error = max(degrees(abs(abs(turned) - 1.0)), abs(off))
         allowed = degrees(place.allowed * max(1.0, abs(1.0 + seen)))
-        words = f"{margin.frequency_rad_s / (2.0 * pi):.6g} Hz; |L| = 1 {abs(turned) - 1.0:+.1e}"
+        words = f"{phase.frequency_rad_s / (2.0 * pi):.6g} Hz; |L| = 1 {abs(turned) - 1.0:+.1e}"
         row = place.judged("phase_margin", 0.0, error, allowed, "deg", words)
-        yield replace(row, predicted=margin.deg, found=margin.deg + off)
+        yield replace(row, predicted=phase.deg, found=phase.deg + off)
 
 
 def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
