@@ -75,11 +75,16 @@ class OperatingMotion:
         """Whether a reversal or a parting of the coupling would change what is tested."""
         return self.friction_on or self.coupling_Nm != 0.0
 
+    def output_rad(self, design: Design) -> float:
+        """Output angle where the motor is at zero, which is where a drive stands."""
+        return -self.twist_rad / design.ratio_behind_coupling
+
     def operating(self, design: Design) -> Operating:
         """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
             return Operating(point="driving", speed_rad_s=self.speed_rad_s)
-        return Operating(speed_rad_s=self.speed_rad_s, twist_rad=self.twist_rad)
+        angle = self.output_rad(design)
+        return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
 
 
 def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
@@ -157,19 +162,20 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 
 
 def standing(design: Design) -> OperatingMotion:
-    """At rest at zero without dry friction, held by constant moments; they press a coupling with play.
+    """At rest, motor at zero, no dry friction; constant moments hold it and press a coupling with play.
 
     The drive is one that `may_stand`, `on_its_stand`.
     """
-    load, coupling, moment = design.load, design.coupling, holding_moment_Nm(design)
+    load, coupling, torque = design.load, design.coupling, holding_torque_Nm(design)
     if coupling is None or coupling.play_rad == 0.0:
-        return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment, extra_Nm=holding_torque_Nm(design))
+        return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
     twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
     passed = 1.0 if load.path == "back-drivable" else 0.0
-    held = passed * coupling_Nm / design.ratio_to_coupling + holding_torque_Nm(design, 0.0, twist)
-    return OperatingMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
+    torque += passed * coupling_Nm / design.ratio_to_coupling
+    moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
+    return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
 
 
 def full_torque_Nm(design: Design) -> float:

@@ -175,11 +175,9 @@ def _run(
     row = Rows.of(design, friction_on=motion.friction_on, limits_on=False)
     motion.load(row)
     row["twist_start"] = motion.twist_rad
-    if not motion.speed_rad_s and motion.twist_rad and design.controller.position is not None:
-        angle = design.ratio_to_coupling * motion.twist_rad  # the output stands at zero
-        row["angle_start"] = angle
-        if design.controller.position.sensor == "motor":
-            row.step("bias", angle / design.total_ratio, -1.0)
+    position = design.controller.position
+    if not motion.speed_rad_s and motion.twist_rad and position is not None and position.sensor == "output":
+        row.step("bias", motion.output_rad(design), -1.0)  # the motor stands at zero
     row["friction_feedforward"] = 0.0  # the sign of the command's motion: no part of a linear response
     row["ticks"], row["record_every"] = ticks, base
     if hertz > 0.0:

@@ -266,7 +266,7 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     design = case.put(replace(shipped, load=back, friction=Friction(viscous_Nms_rad=1e-5)))
     motion = operating_motion(design)
     assert motion.speed_rad_s == 0.0
-    start = State(motor_angle_rad=design.ratio_to_coupling * motion.twist_rad, output_angle_rad=0.0)
+    start = State(motor_angle_rad=0.0, output_angle_rad=motion.output_rad(design))
     control = replace(design.controller, position=None, velocity=None, current=None)
     free = replace(design, controller=control, command=Command())
     turned = [
