@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.resolvent import balanced
 from actuator_lti.verdict import Verdict
 from analyses.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
@@ -132,9 +133,9 @@ def _marks(place: Place) -> list[float]:
 
 def _poles(place: Place) -> Row:
     """Each predicted pole beside the tangent's nearest eigenvalue, by their rates."""
-    from scipy.linalg import eig, matrix_balance
+    from scipy.linalg import eig
 
-    A = matrix_balance(place.tangent.A, permute=False)[0]
+    A = balanced(place.tangent.A)[0]
     found, left, right = eig(A, left=True)
     sharp = np.abs(np.sum(left.conj() * right, axis=0))  # of unit vectors: 1 over the condition number
     rounding = ROUNDING * float(np.linalg.norm(A))
