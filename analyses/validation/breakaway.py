@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.angle import bends_with_angle, straight
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
@@ -33,9 +34,9 @@ def breakaway_entry(design: Design, model: Design) -> Entry | None:
     if friction.dry_Nm(0.0) == 0.0 and not friction.points:
         return None
     condition = CONDITION
-    if design.load.gravity is not None:  # which pulls at rest: friction is what is asked for
+    if bends_with_angle(design):  # which pulls at rest: friction is what is asked for
         condition = f"{CONDITION}, without the load's weight"
-        design, model = (replace(one, load=replace(one.load, gravity=None)) for one in (design, model))
+        design, model = straight(design), straight(model)
     reason = _not_comparable(design)
     if reason:
         return not_judged(name, "breakaway_torque", "N*m", None, None, reason, condition)
@@ -65,7 +66,8 @@ def _relaxed(design: Design) -> Design:
     """What a motor at rest at zero feels: before a coupling that is not wound up, itself alone."""
     if design.coupling is None:
         return design
-    return replace(design, coupling=None, load=replace(design.load, friction=None, gravity=None))
+    design = straight(design)
+    return replace(design, coupling=None, load=replace(design.load, friction=None))
 
 
 def _started(design: Design, low: float, high: float) -> tuple[float, float | None]:

@@ -6,11 +6,10 @@ steady state does: ``kM i = T_f(w) + offset + what the load takes`` (equations 2
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.angle import level
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from analyses.validation.ledger import Entry, entry, not_judged
@@ -109,8 +108,3 @@ def _resolution(design: Design, speed_rad_s: float) -> float:
     gain = motor.torque_constant_Nm_A if motor.source_gain_Nm_V is None else motor.source_gain_Nm_V
     assert gain is not None
     return float(np.spacing(speed_rad_s)) * design.inertia_kgm2 / (design.controller.period_s * gain)
-
-
-def level(design: Design) -> Design:
-    """A drive without what its load adds over the angle: no slope, no gravity."""
-    return replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0, gravity=None))

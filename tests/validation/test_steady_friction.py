@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.drive.angle import level
 from analyses.validation import validate
-from analyses.validation.steady import level, steady_entry
+from analyses.validation.steady import steady_entry
 from nonlinear.on_the_bench import on_the_bench
 from nonlinear.operating_motion import operating_motion
 from tests.validation.random_drives import full_drive
