@@ -34,7 +34,8 @@ def balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     if not A.size or not np.isfinite(A).all():
         return A, np.ones(len(A))
-    balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    with np.errstate(invalid="ignore"):  # of the order, which is not asked for, made of the scales
+        balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
     return balanced, scale
 
 

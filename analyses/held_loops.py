@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from actuator_lti.design.model import Design
-from actuator_lti.drive.operating import moment_slope
-from actuator_lti.loops import assemble_loops
+from actuator_lti.drive.angle import pushes_away
+from actuator_lti.loops.assemble import loops_at
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loop, Loops
@@ -29,27 +28,10 @@ def held_loop(loops: Loops, name: str) -> Loop | None:
     at = loops.operating
     if name not in HELD or name == loops.design.controller.outermost:
         return None
-    if not moment_slope(loops.design, at) > 0:  # nothing pushes away: the loop's own fault
+    if not pushes_away(loops.design, at):  # the loop's own fault
         return None
-    design = loops.design if name == "current" else constant_load(loops.design)
-    held = assemble_loops(
-        design,
-        form=loops.form,
-        operating_point=at.point,
-        load_Nm=at.load_Nm,
-        speed_amplitude_rad_s=at.speed_amplitude_rad_s,
-        direction=at.direction,
-        rotor="locked" if name == "current" else "free",
-        inner_loops=loops.inner_loops,
-        speed_rad_s=at.speed_rad_s,
-        angle_rad=at.angle_rad,
-    )
-    return held.present[name]
-
-
-def constant_load(design: Design) -> Design:
-    """The same drive under a load whose moment does not follow the angle."""
-    return replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0, gravity=None))
+    held = replace(at, rotor="locked") if name == "current" else replace(at, torques_held=True)
+    return loops_at(loops.design, held, loops.form, loops.inner_loops).present[name]
 
 
 def by_itself(name: str) -> str:

@@ -166,7 +166,6 @@ class LoopSetup:
         self.bias.load(row)
         row["speed_start"], row["current_start"] = self.bias.speed_rad_s, self.bias.current_A
         row["twist_start"] = self.bias.twist_rad
-        row["angle_start"] = self.twisted
         row["load_speed_start"] = self.bias.speed_rad_s / self.design.ratio_to_coupling
         wanted: Value = self.bias.voltage_V
         point = "u"
@@ -207,18 +206,14 @@ class LoopSetup:
 
     def _position(self, row: Rows, wanted: Value) -> None:
         """Let the command run with the drive, the motor behind it by what the controller needs."""
-        row["angle_start"] = self.twisted - wanted / row["position_gain"]
-        seen = 0.0 if self.design.controller.position_loop.sensor == "output" else self.twisted
+        row["angle_start"] = -wanted / row["position_gain"]
+        at_output = self.design.controller.position_loop.sensor == "output"
+        seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
         if self.bias.speed_rad_s == 0.0:
             row.step("bias", seen / self.design.total_ratio, -1.0)
             return
         row["angle_start"] -= seen
         row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
-
-    @property
-    def twisted(self) -> float:
-        """Motor angle at which the output stands at zero."""
-        return self.design.ratio_to_coupling * self.bias.twist_rad
 
     @property
     def steady_start(self) -> bool:

@@ -1,9 +1,9 @@
 """Constant speed under a test: the motion on which dry friction is a constant torque (model.md section 4).
 
 Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
-at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive whose load
-changes with the angle has no operating motion: it stands, without dry friction, and a constant moment holds
-gravity.
+at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive that
+feels a torque that changes with the angle has no such motion: it stands, without dry friction, and constant
+moments hold it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
 from nonlinear.filters import section
@@ -48,7 +49,7 @@ class OperatingMotion:
     twist_rad, coupling_Nm : float
         Of the coupling, at its own shaft; 0 where the drive train is rigid.
     extra_Nm : float
-        Constant torque at the motor shaft, which holds what presses the coupling of a drive that stands.
+        Constant torque at the motor shaft of a drive that stands, against what presses it and its own.
     room_rad_s : float
         How far the motor speed may move before the friction is another.
     """
@@ -74,11 +75,16 @@ class OperatingMotion:
         """Whether a reversal or a parting of the coupling would change what is tested."""
         return self.friction_on or self.coupling_Nm != 0.0
 
+    def output_rad(self, design: Design) -> float:
+        """Output angle where the motor is at zero, which is where a drive stands."""
+        return -self.twist_rad / design.ratio_behind_coupling
+
     def operating(self, design: Design) -> Operating:
         """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
             return Operating(point="driving", speed_rad_s=self.speed_rad_s)
-        return Operating(speed_rad_s=self.speed_rad_s)
+        angle = self.output_rad(design)
+        return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
 
 
 def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
@@ -125,11 +131,8 @@ def needs_press(design: Design) -> bool:
 
 
 def has_to_stand(design: Design) -> bool:
-    """Whether the load changes with the angle, in a way that the motor feels."""
-    load = design.load
-    changes = load.moment_slope_Nm_rad != 0.0 or load.gravity is not None
-    felt = load.path == "back-drivable" or design.friction.load_coefficient > 0.0
-    return changes and (felt or design.coupling is not None)
+    """Whether no constant speed is a steady motion: a torque changes with the angle."""
+    return follows_angle(design)
 
 
 def bent_about_rest(design: Design) -> bool:
@@ -159,20 +162,20 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 
 
 def standing(design: Design) -> OperatingMotion:
-    """At rest at zero without dry friction; a constant moment holds gravity and presses a coupling with play.
+    """At rest, motor at zero, no dry friction; constant moments hold it and press a coupling with play.
 
     The drive is one that `may_stand`, `on_its_stand`.
     """
-    load, coupling = design.load, design.coupling
-    moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
+    load, coupling, torque = design.load, design.coupling, holding_torque_Nm(design)
     if coupling is None or coupling.play_rad == 0.0:
-        return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
+        return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
     twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
     passed = 1.0 if load.path == "back-drivable" else 0.0
-    held = passed * coupling_Nm / design.ratio_to_coupling
-    return OperatingMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
+    torque += passed * coupling_Nm / design.ratio_to_coupling
+    moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
+    return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
 
 
 def full_torque_Nm(design: Design) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
+from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -136,12 +137,18 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
 
 
 def _load(design: Design, row: Floats) -> None:
-    """Slope and gravity of the design act in every run, told or not."""
-    row[at.LOAD_SLOPE] = design.load.moment_slope_Nm_rad
+    """The drive's own moments and torques act in every run, told or not."""
     row[at.LOAD_DAMPING] = design.load.moment_damping_Nms_rad
-    if design.load.gravity is not None:
-        row[at.GRAVITY] = design.load.gravity.peak_Nm
-        row[at.GRAVITY_ANGLE] = design.load.gravity.offset_rad
+    _over_angle(row, design.load.over_angle, at.LOAD_SLOPE, at.MOMENT_PEAK, at.MOMENT_ORDER)
+    _over_angle(row, design.motor.over_angle, at.TORQUE_SLOPE, at.TORQUE_PEAK, at.TORQUE_ORDER)
+
+
+def _over_angle(row: Floats, over_angle: OverAngle, slope_at: int, peak_at: int, order_at: int) -> None:
+    """Slope of a torque over its angle; peak, order and phase of what bends."""
+    row[slope_at] = over_angle.slope_Nm_rad
+    for j, wave in enumerate(over_angle.waves):
+        row[peak_at + j] = wave.peak_Nm
+        row[order_at + 2 * j], row[order_at + 2 * j + 1] = wave.order, wave.phase_rad
 
 
 def _controllers(design: Design, row: Floats) -> None:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.batch.parameters import Population
-from actuator_lti.drive.operating import Operating, OperatingPoint, moment_slope
+from actuator_lti.drive.angle import pushes_away
+from actuator_lti.drive.operating import Operating, OperatingPoint
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block
@@ -260,18 +261,12 @@ def linear_figures(
 def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
     """Put the figures of a held loop in the place of one that is unstable only by itself."""
     whole = out[:, LOOPS.index(population.design.controller.outermost), 0] == 1.0
-    pushed = moment_slope(population.stacked, at) > 0
+    pushed = pushes_away(population.stacked, at)
     chosen = np.flatnonzero(whole & pushed & (out[:, LOOPS.index(loop), 0] == 0.0))
     if not chosen.size:
         return
-    some, operating = population.part(chosen), at
-    if loop == "current":
-        operating = replace(at, rotor="locked")
-    else:
-        load = replace(population.design.load, moment_slope_Nm_rad=0.0, gravity=None)
-        gone = ("load.moment_slope", "load.gravity.")
-        values = {path: array for path, array in some.values.items() if not path.startswith(gone)}
-        some = Population(replace(population.design, load=load), values, some.count)
+    some = population.part(chosen)
+    operating = replace(at, rotor="locked") if loop == "current" else replace(at, torques_held=True)
     rows = np.full((some.count, *out.shape[1:]), np.nan)
     for group in some.alike():
         _fill(wire(some.part(group).stacked, operating), group, time_figures, rows, only=loop)

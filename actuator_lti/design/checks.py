@@ -11,6 +11,7 @@ from actuator_lti.design.checks_control import check_control
 from actuator_lti.design.checks_elastic import check_elastic, check_place
 from actuator_lti.design.fields import Structure, fields_in
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import parts_of
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
@@ -131,12 +132,6 @@ def _sampling(design: Design, where: str) -> None:
             f"{control.computing_delay_s:g} s",
             f"allowed: at most 100 ticks of {control.period_s:g} s",
         )
-
-
-def no_load_speed(design: Design) -> float:
-    """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
-    kE = design.effective_motor.back_emf_constant_Vs_rad
-    return inf if kE is None else design.limits.voltage_V / kE
 
 
 def _limits(design: Design, where: str) -> None:

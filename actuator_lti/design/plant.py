@@ -5,12 +5,13 @@ All values are in SI units on the motor side unless a name says otherwise.  For 
 """
 
 from dataclasses import dataclass, replace
-from math import inf, pi, sin
+from math import inf, pi
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
 from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
+from actuator_lti.design.over_angle import OverAngle, Wave
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -28,7 +29,8 @@ class Motor:
     """The motor: either R, L, kM, kE, or an ideal torque source with a gain.
 
     ``L di/dt = u - R i - kE w`` and torque ``kM i`` (paper, equations 1 and 2); without electrical
-    dynamics the torque is ``source_gain_Nm_V * u``.
+    dynamics the torque is ``source_gain_Nm_V * u``.  Cogging is a torque over the angle besides, whose mean,
+    none, is the slope of a drive in motion.
     """
 
     rotor_inertia_kgm2: Annotated[float, positive(
@@ -46,6 +48,18 @@ class Motor:
     source_gain_Nm_V: Annotated[float | None, positive(
         "source_gain", "{torque}/V", "g", "gain of an ideal torque source, instead of R, L, kM, kE",
         example="35.15 N/V")] = None
+    cogging_Nm: Annotated[float, not_negative(
+        "cogging", "{torque}", "",
+        "cogging or torque ripple: peak of a torque sin(Z angle + phase) that the motor makes by itself",
+        example="5 mN*m")] = 0.0
+    cogging_periods: Annotated[float, positive(
+        "cogging_periods", "rad/{angle}", "Z",
+        "periods of the cogging per revolution of the motor (linear axis: rad per m)",
+        most=lambda design: _most_order(design, design.motor.cogging_Nm, 1.0),
+        example="84")] = 1.0
+    cogging_phase_rad: Annotated[float, quantity(
+        "cogging_phase", "rad", "", "phase of the cogging at motor angle zero; 180 deg: it holds there",
+        low=-7.0, high=7.0, example="180 deg")] = 0.0
     constants: Annotated[MotorConstants, choice(
         "constants",
         "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
@@ -55,6 +69,20 @@ class Motor:
     def has_electrical_dynamics(self) -> bool:
         """Whether the current is a state."""
         return self.source_gain_Nm_V is None
+
+    @property
+    def over_angle(self) -> OverAngle:
+        """What of its torque depends on its angle."""
+        cogging = Wave(self.cogging_Nm, self.cogging_periods, self.cogging_phase_rad, averages=True)
+        return OverAngle(waves=(cogging,))
+
+    def straight(self) -> "Motor":
+        """The same without what bends with the angle."""
+        return replace(self, cogging_Nm=0.0)
+
+    def level(self) -> "Motor":
+        """The same without what depends on the angle."""
+        return self.straight()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,14 +166,30 @@ class Gravity:
         "offset", "rad", "", "angle from upright at output angle zero", low=-7.0, high=7.0,
         example="180 deg")] = 0.0
 
-    def moment_Nm(self, angle_rad: float) -> float:
-        """Moment on the output shaft at an output angle, in N m; positive pushes forward."""
-        return self.peak_Nm * sin(angle_rad + self.offset_rad)
-
     @property
     def peak_Nm(self) -> float:
         """m g l."""
         return self.mass_kg * STANDARD_GRAVITY_m_s2 * self.arm_m
+
+
+MOST_PHASE_rad = 0.5  # of a wave in a tick over which it is held
+
+
+def no_load_speed(design: "Design") -> float:
+    """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
+    kE = design.effective_motor.back_emf_constant_Vs_rad
+    return inf if kE is None else design.limits.voltage_V / kE
+
+
+def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, str]:
+    """Largest order of a wave over an angle that turns at the top speed of the motor over ``ratio``."""
+    if not peak_Nm:
+        return inf, ""
+    speed, Ts = min(design.limits.speed_rad_s, no_load_speed(design)) / ratio, design.controller.period_s
+    if speed == inf:
+        return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
+    most = MOST_PHASE_rad / (speed * Ts)
+    return most, f"held over a tick, of which {speed:.4g} 1/s passes more than {MOST_PHASE_rad} rad"
 
 
 def _largest_damping(design: "Design") -> tuple[float, str]:
@@ -161,7 +205,8 @@ class Load:
     """What hangs on the output shaft, and how its moment reaches the motor.
 
     M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle
-    - ``moment_damping_Nms_rad`` * output speed + gravity.
+    - ``moment_damping_Nms_rad`` * output speed + gravity + the gear error, which a drive in motion passes so
+    fast that its mean, none, is its slope.
     """
 
     inertia_kgm2: Annotated[float, not_negative(
@@ -176,28 +221,53 @@ class Load:
     moment_damping_Nms_rad: Annotated[float, not_negative(
         "moment_damping", "{torque}*s/{angle}", "D", "load moment against the motion, per output speed",
         most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
+    gear_error_Nm: Annotated[float, not_negative(
+        "gear_error", "{torque}", "A",
+        "kinematic error of a gear as a moment on the output, A sin(n angle + phase)",
+        example="0.1 N*m")] = 0.0
+    gear_error_periods: Annotated[float, positive(
+        "gear_error_periods", "rad/{angle}", "n",
+        "periods of the gear error per revolution of the output (linear axis: rad per m)",
+        most=lambda design: _most_order(design, design.load.gear_error_Nm, design.total_ratio),
+        example="2")] = 1.0
+    gear_error_phase_rad: Annotated[float, quantity(
+        "gear_error_phase", "rad", "", "phase of the gear error at output angle zero", low=-7.0, high=7.0,
+        example="0 deg")] = 0.0
     friction: LoadFriction | None = None
     gravity: Gravity | None = None
 
     def moment_Nm(self, angle_rad: Any, rate_rad_s: Any = 0.0) -> Any:
         """The load's own moment on the output shaft at an angle and a speed of it; floats or arrays."""
-        moment = self.moment_slope_Nm_rad * angle_rad - self.moment_damping_Nms_rad * rate_rad_s
-        if self.gravity is not None:
-            moment = moment + self.gravity.peak_Nm * np.sin(angle_rad + self.gravity.offset_rad)
-        return moment
+        return self.over_angle.at(angle_rad) - self.moment_damping_Nms_rad * rate_rad_s
+
+    @property
+    def over_angle(self) -> OverAngle:
+        """What of its own moment depends on the output angle."""
+        gear = Wave(self.gear_error_Nm, self.gear_error_periods, self.gear_error_phase_rad, averages=True)
+        pendulum = () if self.gravity is None else (Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad),)
+        return OverAngle(self.moment_slope_Nm_rad, (gear, *pendulum))
+
+    def straight(self) -> "Load":
+        """The same without what bends with the angle."""
+        return replace(self, gear_error_Nm=0.0, gravity=None)
+
+    def level(self) -> "Load":
+        """The same without what depends on the angle."""
+        return replace(self.straight(), moment_slope_Nm_rad=0.0)
 
     def acting(self) -> tuple[str, ...]:
         """The keys of the moments that act by themselves."""
         there = {
             "load.moment_slope": np.any(self.moment_slope_Nm_rad),
             "load.moment_damping": np.any(self.moment_damping_Nms_rad),
+            "load.gear_error": np.any(self.gear_error_Nm),
             "load.gravity": self.gravity is not None,
         }
         return tuple(key for key, acts in there.items() if acts)
 
     def bare(self) -> "Load":
         """The same without moments of its own."""
-        return replace(self, moment_slope_Nm_rad=0.0, moment_damping_Nms_rad=0.0, gravity=None)
+        return replace(self.level(), moment_damping_Nms_rad=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

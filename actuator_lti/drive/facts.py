@@ -127,10 +127,12 @@ def breakaway_torque_Nm(design: Design, load_Nm: float, direction: int) -> Any:
 
 
 def _held_torque(design: Design, load_Nm: float, direction: int) -> Any:
-    """Largest static friction, and the offset: what the drive torque has to exceed without a load."""
+    """Largest static friction, offset, and ripple: what the drive torque has to exceed without a load."""
     friction, behind = design.friction, design.load.friction
     ratio = friction.breakaway_ratio if friction.law == "coulomb" else 0.0
     total = dry_torque(design, load_Nm, direction) * ratio + direction * friction.offset_torque_Nm
+    ripple = design.load.over_angle.ripple_Nm / design.ratio_behind_coupling
+    total = total + design.motor.over_angle.ripple_Nm + _through_train(design, ratio) * ripple
     if behind is None or design.coupling is None:
         return total
     locked = behind.dry_torque_Nm * behind.breakaway_ratio + direction * behind.offset_torque_Nm

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 OperatingPoint = Literal["sliding", "rest", "describing-function", "driving", "driven", "gap"]
 RotorState = Literal["free", "locked"]
-ROUNDED = 1e-15  # a slope of so small a part of its terms, and of the angle's own rounding, is none
 CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the load-dependent friction
 
 
@@ -42,7 +41,11 @@ class Operating:
     speed_rad_s : float
         Motor speed at which the slope of a friction map is taken.
     angle_rad : float
-        Output angle at which gravity is made linear.
+        Output angle at which torques that bend with the angle are made linear.
+    twist_rad : float
+        Twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist.
+    torques_held : bool
+        Whether torques that depend on the angle are taken as they stand, without their slopes.
     """
 
     point: OperatingPoint = "sliding"
@@ -52,6 +55,8 @@ class Operating:
     rotor: RotorState = "free"
     speed_rad_s: float = 0.0
     angle_rad: float = 0.0
+    twist_rad: float = 0.0
+    torques_held: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no operating point."""
@@ -63,7 +68,7 @@ class Operating:
             raise InputError(f"direction = {self.direction!r}: 1 or -1")
         if self.rotor not in get_args(RotorState):
             raise InputError(f"rotor = {self.rotor!r}: free or locked")
-        for name in ("load_Nm", "speed_rad_s", "angle_rad"):
+        for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
             if not isfinite(getattr(self, name)):
                 raise InputError(f"{name} = {getattr(self, name)}: must be finite")
         amplitude = self.speed_amplitude_rad_s
@@ -164,17 +169,3 @@ def dead_zone(x: float) -> float:
     (1.0, 0.0, 0.391002)
     """
     return 0.0 if x >= 1 else 1.0 - 2.0 / pi * float(np.arcsin(x) + x * np.sqrt(1 - x * x))
-
-
-def moment_slope(design: Design, at: Operating) -> Any:
-    """dM_ext/d(output angle) in N m/rad: the load's slope and gravity's at the operating angle.
-
-    ``k + m g l cos(angle)``; 0 where that is no more than rounding leaves of it, as at a quarter turn.
-    """
-    load = design.load
-    if load.gravity is None:
-        return load.moment_slope_Nm_rad
-    peak, angle = load.gravity.peak_Nm, at.angle_rad + load.gravity.offset_rad
-    slope = load.moment_slope_Nm_rad + peak * np.cos(angle)
-    size = abs(load.moment_slope_Nm_rad) + peak * (abs(np.cos(angle)) + abs(angle))
-    return slope * (abs(slope) > ROUNDED * size)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at
+from actuator_lti.drive.angle import moment_slope, torque_slope
+from actuator_lti.drive.operating import CONTACT, Operating, slope_at
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,9 +43,9 @@ class Plant:
     B_u, B_T, B_M : ndarray, shape (..., n)
         Effect of the voltage (V, or the drive signal of a torque source), of a torque in N m that accelerates
         the motor, and of a moment in N m that pushes the output shaft forward.
-    moment : dict of str to float
-        The load's own moment on the output shaft as a combination of rows; M_ext is held over a tick. Empty
-        where it does not reach the plant.
+    torque, moment : dict of str to float
+        The motor's own torque, and the load's own moment on the output shaft, as combinations of states and
+        rows; both are held over a tick. Empty where there is none, or it does not reach the plant.
     rows : dict of str to dict of str to float
         Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle
         behind the coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees).
@@ -55,6 +56,7 @@ class Plant:
     B_u: np.ndarray
     B_T: np.ndarray
     B_M: np.ndarray
+    torque: Entries
     moment: Entries
     rows: dict[str, Entries]
 
@@ -108,7 +110,9 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
         A, B = _electrical(motor)
         names = ("i",)
         none = np.zeros(1)
-        return Plant(names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, {}, {})
+        return Plant(
+            names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, {}, {}, {}
+        )
     return _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
 
 
@@ -142,9 +146,16 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
         B_u=vector(names, B_u),
         B_T=vector(names, {"w": 1 / J}),
         B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}),
+        torque=_own_torque(design, at),
         moment=_own_moment(design, at) if reaches else {},
         rows={"output_angle": {"th": 1 / N}, "load_speed": {"w": 1.0}},
     )
+
+
+def _own_torque(design: Design, at: Operating) -> Entries:
+    """The motor's own torque over its angle, made linear, where there is one."""
+    slope = torque_slope(design, at)
+    return {"th": slope} if np.any(slope != 0) else {}
 
 
 def _own_moment(design: Design, at: Operating) -> Entries:
@@ -183,6 +194,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
         B_u=vector(names, B_u),
         B_T=vector(names, {"w": 1 / J_m}),
         B_M=vector(names, {"W": 1 / (N_r * J_l)}),
+        torque=_own_torque(design, at),
         moment=_own_moment(design, at),
         rows={
             "output_angle": {name: value / N_r for name, value in phi.items()},

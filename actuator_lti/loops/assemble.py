@@ -33,6 +33,7 @@ def assemble_loops(
     inner_loops: InnerLoops = "closed",
     speed_rad_s: float = 0.0,
     angle_rad: float = 0.0,
+    twist_rad: float = 0.0,
 ) -> Loops:
     """All loops of a design as named python-control systems (model.md section 3).
 
@@ -58,9 +59,9 @@ def assemble_loops(
         Open: `Loops.velocity` and `Loops.position` with the feedback of the loops inside them taken away, the
         inner controllers still in the path. Break points, limiters and the response to the command are those
         of the closed drive in any case.
-    speed_rad_s, angle_rad : float
-        Motor speed at which the slope of a friction map is taken, output angle at which gravity is made
-        linear.
+    speed_rad_s, angle_rad, twist_rad : float
+        Motor speed at which the slope of a friction map is taken, output angle (and twist of the coupling) at
+        which torques that bend with the angle are made linear.
 
     Returns
     -------
@@ -82,9 +83,6 @@ def assemble_loops(
     integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them.
     A load torque proportional to the angle acts through a back-drivable path as a stiffness.
     """
-    design = as_design(design)
-    if form not in get_args(Form):
-        raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
     at = Operating(
         point=operating_point,
         load_Nm=load_Nm,
@@ -93,11 +91,21 @@ def assemble_loops(
         rotor=rotor,
         speed_rad_s=speed_rad_s,
         angle_rad=angle_rad,
+        twist_rad=twist_rad,
     )
+    return loops_at(as_design(design), at, form, inner_loops)
+
+
+def loops_at(
+    design: Design, at: Operating, form: Form = "sampled", inner_loops: InnerLoops = "closed"
+) -> Loops:
+    """The same at an `Operating`, see `assemble_loops`."""
+    if form not in get_args(Form):
+        raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
     wired = wire(design, at)
     if inner_loops not in get_args(InnerLoops):
         raise InputError(f"inner_loops = {inner_loops!r}: one of {', '.join(get_args(InnerLoops))}")
-    if not wired.stages and rotor == "locked":
+    if not wired.stages and at.rotor == "locked":
         raise InputError("rotor = 'locked': the design has no current loop")
     opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
     delays = ALL if form == "continuous" else frozenset[str]()

@@ -137,9 +137,9 @@ class FlowWalk(Walk):
         """What acts on the plant."""
         plant = self.drive.plant
         self.signals.setdefault("u", u)
-        moment = self.moment()
+        torque, moment = self.acting()
         for r, name in enumerate(plant.states):
-            acting = ((plant.B_u, u), (plant.B_T, Row.of("torque")), (plant.B_M, moment))
+            acting = ((plant.B_u, u), (plant.B_T, torque), (plant.B_M, moment))
             self.rate[name] += total(float(B[r]) * row for B, row in acting)
 
     def finish(self) -> Flow:

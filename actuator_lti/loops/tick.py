@@ -141,7 +141,7 @@ class TickWalk(Walk):
         plant, hold = self.drive.plant, self.drive.hold
         self.signals.setdefault("u", u)
         held = [u, *(self.state(f"u{j}") for j in range(1, hold.memory + 1))]
-        outer = (Row.of("torque"), self.moment())
+        outer = self.acting()
         angle = self.sensed_angle()
         x = [self.state(name) for name in plant.states]
         change: dict[str, Row] = {}

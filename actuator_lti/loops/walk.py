@@ -136,10 +136,14 @@ class Walk(ABC):
         for name, terms in plant.rows.items():
             self.signals[name] = total(value * self.state(state) for state, value in terms.items())
 
-    def moment(self) -> Row:
-        """The moment on the output shaft: from outside, and the load's own."""
-        own = self.drive.plant.moment.items()
-        return Row.of("moment") + total(gain * self.signals[row] for row, gain in own)
+    def acting(self) -> tuple[Row, Row]:
+        """Torque at the motor and moment on the output shaft: from outside, and the drive's own."""
+        plant = self.drive.plant
+        torque, moment = (
+            Row.of(name) + total(gain * self.signals[row] for row, gain in own.items())
+            for name, own in (("torque", plant.torque), ("moment", plant.moment))
+        )
+        return torque, moment
 
     def at_cut(self, name: str, value: Row) -> Row:
         """Leave a signal behind; what goes on is the cut's input where it is cut here."""

@@ -191,13 +191,13 @@ def slow_protection(design: Design, loops: Loops) -> list[str]:
 
 
 def _straight(design: Design) -> Design:
-    """The drive without play, gravity, and friction that has no single slope: what is left are its limits."""
+    """The drive without play, bent loads and friction without a single slope: what is left are its limits."""
     friction, place, coupling = design.friction, design.controller.position_loop, design.coupling
     friction = replace(friction, points=(), viscous_reverse_Nms_rad=None, load_coefficient=0.0)
     return replace(
         design,
         friction=friction,
-        load=replace(design.load, gravity=None),
+        load=design.load.straight(),
         coupling=None if coupling is None else replace(coupling, play_rad=0.0),
         controller=replace(design.controller, position=replace(place, friction_feedforward=0.0)),
         limits=replace(design.limits, peak_time_s=None),

@@ -64,13 +64,11 @@ class Bench:
 
     def loops(self, name: str) -> Loops:
         """The linear loops on the motion of a place."""
-        from actuator_lti.loops import assemble_loops
+        from actuator_lti.loops.assemble import loops_at
 
         at = self.setup(name).bias.operating(self.drive)
         if at not in self._assembled:
-            self._assembled[at] = assemble_loops(
-                self.linear, operating_point=at.point, speed_rad_s=at.speed_rad_s
-            )
+            self._assembled[at] = loops_at(self.linear, at)
         return self._assembled[at]
 
     @cached_property

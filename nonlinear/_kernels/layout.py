@@ -72,12 +72,14 @@ from actuator_lti.drive import signals
     LOAD,  # constant part of M_ext
     LOAD_SLOPE,  # N m per rad of output angle
     LOAD_DAMPING,  # N m against the motion per rad/s of the output
-    GRAVITY,  # m g l, N m
-    GRAVITY_ANGLE,  # offset
+    MOMENT_PEAK,  # of moments that bend with the output angle: peak sin(order y + phase)
+    MOMENT_PEAK_2,
     LOAD_TABLE,  # offset into the tables
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
     TORQUE_TABLE_LENGTH,
+    TORQUE_SLOPE,  # of the motor's own torque over its angle
+    TORQUE_PEAK,  # of one that bends with it: peak sin(order th + phase)
     SUPPLY_TABLE,  # bus voltage
     SUPPLY_TABLE_LENGTH,
     MAX_EVENTS,  # per tick
@@ -145,8 +147,14 @@ from actuator_lti.drive import signals
     LOAD_SPEED_START,  # W
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
+    MOMENT_ORDER,
+    MOMENT_PHASE,
+    MOMENT_ORDER_2,
+    MOMENT_PHASE_2,
+    TORQUE_ORDER,
+    TORQUE_PHASE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(128)
+) = range(136)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -178,6 +186,9 @@ TORQUE_CHAIN = SPEED_CHAIN + MAX_SECTIONS * SECTION
 # --- friction map, used where ELASTIC_DRIVE is 1 ----------------------------------------------------
 MAX_POINTS = 16  # per side
 MAP = TORQUE_CHAIN + MAX_SECTIONS * SECTION  # points (|w|, T) for w > 0, then for w < 0
+
+# --- torques that bend with an angle: as many as have a place above -----------------------------------
+MOMENT_WAVES, TORQUE_WAVES = LOAD_TABLE - MOMENT_PEAK, SUPPLY_TABLE - TORQUE_PEAK
 
 # --- limiters: place of the limit, bit in the flags; those without a name above have their places here -----
 LIMITERS = tuple(signals.LIMITERS)
@@ -365,7 +376,7 @@ SUPPLY_LIMITS, SUPPLY_SCALES = 2.0, 3.0
 # --- inputs and outputs of one tick -------------------------------------------------------------------
 (
     IN_COMMAND,  # of the outermost stage; output shaft
-    IN_LOAD,  # hinge moment beside constant, slope and gravity
+    IN_LOAD,  # hinge moment beside the load's own
     IN_TORQUE,  # extra torque at the motor shaft
     IN_CURRENT,  # measured: what the controller sees
     IN_SPEED,

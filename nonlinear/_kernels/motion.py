@@ -15,9 +15,15 @@ from nonlinear._kernels.smooth import tanh_segment
 FINITE = 1e15
 
 
+@inlined
+def wave_angle(p, at, angle):  # type: ignore[no-untyped-def]
+    """Order times angle plus phase, of the wave whose order and phase stand at ``p[at]``."""
+    return p[at] * angle + p[at + 1]
+
+
 @scalar
 def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
-    """M_ext of this tick: constant, series, slope, damping and gravity."""
+    """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
     M = p[layout.LOAD] + p[layout.LOAD_SLOPE] * y + io[layout.IN_LOAD]
     if p[layout.LOAD_DAMPING] != 0.0:
@@ -25,9 +31,22 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
         M -= p[layout.LOAD_DAMPING] * (
             s[layout.S_OUTPUT_SPEED] if elastic else s[layout.S_SPEED] / p[layout.RATIO]
         )
-    if p[layout.GRAVITY] != 0.0:
-        M += p[layout.GRAVITY] * math.sin(y + p[layout.GRAVITY_ANGLE])
+    for j in range(layout.MOMENT_WAVES):
+        if p[layout.MOMENT_PEAK + j] != 0.0:
+            M += p[layout.MOMENT_PEAK + j] * math.sin(wave_angle(p, layout.MOMENT_ORDER + 2 * j, y))
     return M
+
+
+@scalar
+def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
+    """Extra torque at the motor shaft: from outside, and the motor's own over its angle."""
+    th, T = s[layout.S_ANGLE], io[layout.IN_TORQUE]
+    if p[layout.TORQUE_SLOPE] != 0.0:
+        T += p[layout.TORQUE_SLOPE] * th
+    for j in range(layout.TORQUE_WAVES):
+        if p[layout.TORQUE_PEAK + j] != 0.0:
+            T += p[layout.TORQUE_PEAK + j] * math.sin(wave_angle(p, layout.TORQUE_ORDER + 2 * j, th))
+    return T
 
 
 @scalar
@@ -123,7 +142,7 @@ def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
     s[last] = applied_voltage(p, s, io)
     if p[layout.RARE_LOAD] > 0.0:
         io[layout.IO_MOMENT] = hinge_moment(p, s, io)
-        put_load(p, s, io[layout.IO_MOMENT], io[layout.IN_TORQUE])
+        put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:

@@ -17,7 +17,8 @@ from nonlinear.export.entries import emitted, init
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.OFFSET, layout.LOAD,
-    layout.GRAVITY, layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
+    *range(layout.MOMENT_PEAK, layout.LOAD_TABLE), *range(layout.TORQUE_PEAK, layout.SUPPLY_TABLE),
+    layout.FRICTION_FEEDFORWARD, layout.COUNTS_PER_RAD, layout.POSITION_COUNTS,
     layout.PROFILED, layout.PROFILE_SAMPLES, layout.SUPPLY, layout.OVERLOAD, layout.CURRENT_RESOLUTION,
     layout.CURRENT_NOISE, layout.ANGLE_NOISE, layout.OUTPUT_NOISE, layout.JITTER, layout.SEED,
     layout.CURRENT_START, layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START,
@@ -47,15 +48,25 @@ def map_slope(p):
 
 
 @emitted
+def slope_at_zero(p, slope, waves, peak, order):
+    """Slope of a torque over its angle at zero; what rounding leaves of it, as at a quarter turn, is none."""
+    size = abs(slope)
+    for j in range(waves):
+        steepest, phase = p[peak + j] * p[order + 2 * j], p[order + 2 * j + 1]
+        slope += steepest * math.cos(phase)
+        size += abs(steepest) * (abs(math.cos(phase)) + abs(phase))
+    return 0.0 if abs(slope) <= ROUNDED * size else slope
+
+
+@emitted
 def linear_row(p, q):
-    """Copy the parameters of a run, without anything that is not linear; gravity becomes its slope."""
+    """Copy the parameters of a run, without anything that is not linear; what bends becomes its slope."""
     for k in range(layout.SIZE):
         q[k] = p[k]
-    turned = p[layout.GRAVITY] * math.cos(p[layout.GRAVITY_ANGLE])
-    size = abs(q[layout.LOAD_SLOPE]) + abs(turned) + p[layout.GRAVITY] * abs(p[layout.GRAVITY_ANGLE])
-    q[layout.LOAD_SLOPE] += turned
-    if abs(q[layout.LOAD_SLOPE]) <= ROUNDED * size:  # a quarter turn has none
-        q[layout.LOAD_SLOPE] = 0.0
+    peak, order = layout.MOMENT_PEAK, layout.MOMENT_ORDER
+    q[layout.LOAD_SLOPE] = slope_at_zero(p, p[layout.LOAD_SLOPE], layout.MOMENT_WAVES, peak, order)
+    peak, order = layout.TORQUE_PEAK, layout.TORQUE_ORDER
+    q[layout.TORQUE_SLOPE] = slope_at_zero(p, p[layout.TORQUE_SLOPE], layout.TORQUE_WAVES, peak, order)
     q[layout.VISCOUS] = map_slope(p)
     for k in range(CLEARED.shape[0]):
         q[CLEARED[k]] = 0.0

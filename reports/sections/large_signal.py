@@ -158,6 +158,7 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
+    shown = result.map
     if shown.coarser:
         points_shown = f"{shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
         caption += f" The drive settles slowly: a coarser grid, {points_shown}."

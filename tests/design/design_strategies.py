@@ -98,7 +98,8 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     constant = draw(_factors)
     electrical: dict[str, Any] = {"source_gain": None, "torque_constant": f"{constant} {torque}/A",
                                   "back_emf_constant": f"{constant * 1.05:.6g} V*s/{angle}",
-                                  "resistance": "1 ohm", "inductance": "1 mH", "constants": "dc"}  # fmt: skip
+                                  "resistance": "1 ohm", "inductance": "1 mH", "constants": "dc",
+                                  "cogging": None}  # fmt: skip
     ideal = {**dict.fromkeys(electrical), "source_gain": draw(written_value(f"{torque}/V", constant))}
     control = draw(_section("control", structure, {"period": "1 ms", "computing_delay": "1.5 ms"}))
     n_v = draw(st.integers(1, 3))
@@ -125,7 +126,7 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     }
     tracking = draw(st.sampled_from([{"speed": "ideal"}, {"speed": "tracking", "bandwidth": "10 Hz"}]))
     given = {
-        "load": {"moment_damping": f"1e-12 {torque}*s/{angle}"}, "friction": {},
+        "load": {"moment_damping": f"1e-12 {torque}*s/{angle}", "gear_error": None}, "friction": {},
         "encoder": {"bandwidth": None, **tracking}, "validation": {},
         "coupling": {"after": None}, "output_encoder": {}, "instruments": {"jitter": "20 us"},
     }  # fmt: skip

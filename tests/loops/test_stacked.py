@@ -15,7 +15,8 @@ from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, Load, PositionLoop
-from actuator_lti.drive.operating import Operating, moment_slope
+from actuator_lti.drive.angle import moment_slope
+from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks

@@ -20,6 +20,8 @@ def rich() -> Design:
         "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
         "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
         "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
+        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
+        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
         "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
         "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
         "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Requirement
-from analyses.held_loops import constant_load, held_loop
+from actuator_lti.drive.angle import level
+from analyses.held_loops import held_loop
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
@@ -79,7 +80,7 @@ def test_a_p_velocity_loop_is_judged_under_a_constant_load() -> None:
     free = replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0))
     alone = stability_margins(assemble_loops(free).velocity.open_loop)
     assert figures["velocity"].judged.margins == alone
-    assert constant_load(design) == free
+    assert level(design) == free
 
 
 def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:

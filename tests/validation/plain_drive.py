@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass
-from math import ceil, sqrt, tanh
+from math import ceil, sin, sqrt, tanh
 from pathlib import Path
 from types import ModuleType
 
@@ -89,8 +89,8 @@ class PlainPlant:
 
     def moment(self, angle: float) -> float:
         """On the output, N m."""
-        load = self.design.load
-        pull = load.gravity.moment_Nm(angle) if load.gravity is not None else 0.0
+        load, gravity = self.design.load, self.design.load.gravity
+        pull = gravity.peak_Nm * sin(angle + gravity.offset_rad) if gravity is not None else 0.0
         return load.moment_slope_Nm_rad * angle + pull
 
     def spring(self, x: State) -> float:

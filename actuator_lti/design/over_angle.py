@@ -1,0 +1,77 @@
+"""A torque that depends on an angle: a straight line, and waves about it, which bend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+ROUNDED = 1e-15  # a slope of so small a part of its terms, and of the angle's own rounding, is none
+
+
+@dataclass(frozen=True)
+class Wave:
+    """``peak sin(order angle + phase)``; numbers, or arrays of shape (K,) of stacked designs.
+
+    Attributes
+    ----------
+    peak_Nm, order, phase_rad : float or ndarray
+    averages : bool
+        Whether a drive in motion passes its periods so fast that it feels their mean, which is none.
+    """
+
+    peak_Nm: Any
+    order: Any
+    phase_rad: Any
+    averages: bool = False
+
+
+@dataclass(frozen=True)
+class OverAngle:
+    """``slope angle`` plus `Wave` terms, in N m; the one answer to what a torque is over its angle.
+
+    Examples
+    --------
+    >>> pendulum = OverAngle(waves=(Wave(2.0, 1.0, 0.0),))
+    >>> pendulum.bends, float(pendulum.at(0.0)), float(pendulum.slope_at(0.0))
+    (True, 0.0, 2.0)
+    """
+
+    slope_Nm_rad: Any = 0.0
+    waves: tuple[Wave, ...] = ()
+
+    @property
+    def follows(self) -> bool:
+        """Whether it changes with the angle."""
+        return self.bends or bool(np.any(self.slope_Nm_rad))
+
+    @property
+    def bends(self) -> bool:
+        """Whether it is no straight line over the angle, so that its slope is another at another angle."""
+        return any(bool(np.any(wave.peak_Nm)) for wave in self.waves)
+
+    @property
+    def ripple_Nm(self) -> Any:
+        """The most that the waves have that average: what starting costs at the worst angle."""
+        return sum(wave.peak_Nm for wave in self.waves if wave.averages)
+
+    def at(self, angle_rad: Any) -> Any:
+        """The torque at an angle; floats or arrays."""
+        torque = self.slope_Nm_rad * angle_rad
+        for wave in self.waves:
+            torque = torque + wave.peak_Nm * np.sin(wave.order * angle_rad + wave.phase_rad)
+        return torque
+
+    def slope_at(self, angle_rad: Any, *, moving: bool = False) -> Any:
+        """Its slope at an angle; 0 where that is no more than rounding leaves of it, as at a quarter turn.
+
+        ``moving``: of a drive in motion, to which waves that average have none.
+        """
+        acting = [w for w in self.waves if np.any(w.peak_Nm) and not (moving and w.averages)]
+        slope, size = self.slope_Nm_rad, abs(self.slope_Nm_rad)
+        for wave in acting:
+            steepest, phase = wave.peak_Nm * wave.order, wave.order * angle_rad + wave.phase_rad
+            slope = slope + steepest * np.cos(phase)
+            size = size + abs(steepest) * (abs(np.cos(phase)) + abs(phase))
+        return slope * (abs(slope) > ROUNDED * size) if acting else slope

@@ -1,0 +1,292 @@
+"""Torques that bend with the angle: closed forms of both writings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import acos, asin, cos, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+from actuator_lti import InputError, load_design
+from actuator_lti.design import read_design_text
+from actuator_lti.design.model import (
+    Command,
+    Controller,
+    Design,
+    Friction,
+    Gear,
+    Limits,
+    Load,
+    Motor,
+    Validation,
+)
+from actuator_lti.design.writing import write_design
+from actuator_lti.drive.angle import bends_with_angle, follows_angle, holding_torque_Nm, level, straight
+from actuator_lti.drive.facts import breakaway_torque_Nm, capability
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.tick import TickProgram
+from nonlinear import State, commands, simulate
+from nonlinear._kernels import layout
+from nonlinear.operating_motion import operating_motion
+
+J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
+
+
+@dataclass(frozen=True)
+class Case:
+    """An effect of peak A at the motor; ``order`` periods in a turn of the motor."""
+
+    name: str
+    order: float
+
+    def torque(self, angle: float) -> float:
+        return A * sin(self.order * angle + PHASE)
+
+    @property
+    def stable(self) -> float:
+        """The angle of the motor nearest to zero at which it holds the rotor."""
+        return (pi - PHASE) / self.order
+
+    def put(self, design: Design) -> Design:
+        """Add it to a drive."""
+        if self.name == "cogging":
+            motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
+            return replace(design, motor=motor)
+        load = replace(
+            design.load,
+            gear_error_Nm=A * N,
+            gear_error_periods=self.order * N,
+            gear_error_phase_rad=PHASE,
+        )
+        return replace(design, load=load)
+
+
+CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
+each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+
+
+def rotor(viscous: float = 0.0) -> Design:
+    """A torque source without a controller on a drive train that the load turns."""
+    return Design(
+        name="rotor",
+        motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
+        gears=(Gear(name="one", ratio=N),),
+        controller=Controller(period_s=Ts, computing_delay_s=0.0),
+        limits=Limits(voltage_V=10.0),
+        validation=Validation(full_deflection_rad=1.0),
+        load=Load(path="back-drivable"),
+        friction=Friction(viscous_Nms_rad=viscous),
+    )
+
+
+def held_recursion(case: Case, angle: float, speed: float, ticks: int) -> np.ndarray:
+    """Angles of a frictionless rotor under a torque that is held over each tick."""
+    angles = []
+    for _ in range(ticks):
+        angles.append(angle)
+        rate = case.torque(angle) / J
+        angle, speed = angle + speed * Ts + 0.5 * rate * Ts**2, speed + rate * Ts
+    return np.array(angles)
+
+
+@each
+def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
+    start = case.stable + 0.9 / case.order
+    run = simulate(case.put(rotor()), commands.hold(), 0.1, initial=State(motor_angle_rad=start))
+    assert run.motor_angle_rad == pytest.approx(held_recursion(case, start, 0.0, 1000), rel=1e-11)
+
+
+@each
+def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> None:
+    """omega = sqrt(A Z/J); held over the tick, x = (A Z/J) Ts^2/2: poles of trace 2 - x and product 1 + x."""
+    design, x = case.put(rotor()), A * case.order / J * Ts**2 / 2.0
+    growth, turn = sqrt(1.0 + x), acos((1.0 - 0.5 * x) / sqrt(1.0 + x))
+    assert turn / Ts == pytest.approx(sqrt(A * case.order / J), rel=1e-3)
+    at = Operating(angle_rad=case.stable / N)
+    poles = np.linalg.eigvals(TickProgram(wire(design, at), "voltage").tick(0).A)
+    assert np.max(np.abs(poles)) == pytest.approx(growth, rel=1e-12)
+    assert np.max(np.angle(poles)) == pytest.approx(turn, rel=1e-9)
+    off = 1e-7 / case.order
+    run = simulate(design, commands.hold(), 0.3, initial=State(motor_angle_rad=case.stable + off))
+    swing, k = run.motor_angle_rad - case.stable, np.arange(run.time_s.size)
+    lead = ((1.0 - x) / growth - cos(turn)) / sin(turn)  # after one tick 1 - x is left
+    expected = growth**k * (np.cos(turn * k) + lead * np.sin(turn * k))
+    assert np.max(np.abs(swing / off - expected)) < 1e-5 * growth ** k[-1]
+
+
+@each
+def test_a_constant_torque_turns_the_rotor_to_where_it_is_held(case: Case) -> None:
+    """A sin(Z th + phase) + T = 0, on the stable side."""
+    T = 0.6 * A
+    run = simulate(
+        case.put(rotor(viscous=4e-4)), commands.hold(), 2.5, disturbance_Nm=T,
+        initial=State(motor_angle_rad=case.stable),
+    )  # fmt: skip
+    assert run.motor_angle_rad[-1] == pytest.approx(case.stable + asin(0.6) / case.order, rel=1e-9)
+    assert run.motor_speed_rad_s[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@each
+def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
+    design, speed = case.put(rotor()), 40.0
+    at = Operating(speed_rad_s=speed, angle_rad=0.3)
+    plain = TickProgram(wire(rotor(), at), "voltage").tick(0)
+    assert np.array_equal(TickProgram(wire(design, at), "voltage").tick(0).A, plain.A)
+    run = simulate(design, commands.hold(), 2.0, initial=State(motor_speed_rad_s=speed))
+    turned = run.motor_angle_rad[-1] - run.motor_angle_rad[0]
+    # J w^2/2 + A/Z cos(Z th + phase) is kept but for the hold: a torque A would have added 400 rad/s
+    energy = 0.5 * J * speed**2 + A / case.order * cos(PHASE)
+    w = np.sqrt(2.0 / J * (energy - A / case.order * np.cos(case.order * run.motor_angle_rad + PHASE)))
+    assert run.motor_speed_rad_s == pytest.approx(w, abs=0.1)
+    assert turned == pytest.approx(2.0 * np.mean(w), rel=1e-3)
+
+
+@each
+def test_slope_at_the_operating_angle(case: Case) -> None:
+    """One tick's derivative of speed over angle is A Z cos(Z th + phase) Ts/J."""
+    design = case.put(rotor())
+    for angle in (0.0, 0.1, -0.7):
+        tick = TickProgram(wire(design, Operating(angle_rad=angle / N)), "voltage").tick(0)
+        expected = A * case.order * cos(case.order * angle + PHASE) * Ts / J
+        assert np.max(np.abs(np.abs(tick.A) - abs(expected)) < 1e-12)
+
+
+@each
+def test_it_is_asked_without_its_name(case: Case) -> None:
+    plain = rotor()
+    design = case.put(plain)
+    assert follows_angle(design)
+    assert bends_with_angle(design)
+    for other in (plain, level(design), straight(design)):
+        assert not follows_angle(other)
+        assert not bends_with_angle(other)
+    held = TickProgram(wire(design, Operating(torques_held=True)), "voltage").tick(0)
+    assert np.array_equal(held.A, TickProgram(wire(plain), "voltage").tick(0).A)
+
+
+@each
+def test_the_drive_must_get_over_its_peak(case: Case) -> None:
+    dry = replace(rotor(), friction=Friction(dry_torque_Nm=3e-3))
+    design = case.put(dry)
+    assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(3e-3 + A, rel=1e-12)
+    assert capability(design).torque_margin == pytest.approx(10.0 / (3e-3 + A), rel=1e-12)
+    assert capability(design).output_rate_rad_s == capability(dry).output_rate_rad_s
+
+
+@each
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-tanh", "joint", "ilr33-amber-compliant"])
+def test_energy_balances(case: Case, name: str) -> None:
+    design = case.put(load_design(name))
+    run = simulate(design, commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3, energy=True)
+    without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
+    assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
+    assert run.energy is not None
+    assert run.energy.relative_error < 1e-9
+
+
+def test_every_wave_has_its_place_in_the_row() -> None:
+    design = load_design("joint")
+    assert design.load.gravity is not None
+    assert len(design.load.over_angle.waves) == layout.MOMENT_WAVES
+    assert len(design.motor.over_angle.waves) == layout.TORQUE_WAVES
+    assert layout.MOMENT_ORDER + 2 * layout.MOMENT_WAVES == layout.TORQUE_ORDER
+    assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
+
+
+def test_keys_of_the_gear_error() -> None:
+    fin = load_design("fin")
+    values = {"load.gear_error": "0.1 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "90 deg"}
+    design = fin.with_values(values)
+    assert design.load.moment_Nm(0.2) - fin.load.moment_Nm(0.2) == pytest.approx(0.1 * cos(0.6), rel=1e-12)
+    assert "load.gear_error" in design.load.acting()
+    assert not design.load.bare().acting()
+    assert read_design_text(write_design(design)).load == design.load
+    with pytest.raises(
+        InputError, match=r"load\.gear_error_periods = .*: held over a tick, .*; allowed: at most"
+    ):
+        fin.with_values({**values, "load.gear_error_periods": 1e6})
+    with pytest.raises(InputError, match=r"load\.gear_error_periods = .* limits\.speed; allowed"):
+        load_design("emps").with_values({"load.gear_error": "1 N", "load.gear_error_periods": "600 rad/m"})
+
+
+def test_keys_of_the_cogging() -> None:
+    fin = load_design("fin")
+    values = {"motor.cogging": "5 mN*m", "motor.cogging_periods": 4, "motor.cogging_phase": "90 deg"}
+    design = fin.with_values(values)
+    assert design.motor.over_angle.at(0.01) == pytest.approx(5e-3 * cos(0.04), rel=1e-12)
+    assert read_design_text(write_design(design)).motor == design.motor
+    with pytest.raises(
+        InputError, match=r"motor\.cogging_periods = .*: held over a tick, .*; allowed: at most"
+    ):
+        fin.with_values({**values, "motor.cogging_periods": 1e6})
+    screw = load_design("ballscrew").with_values(
+        {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
+    )
+    assert screw.screw is not None
+    travel = screw.screw.travel_m_rad
+    assert screw.motor.over_angle.at(0.3 * travel) == pytest.approx(5e-3 / travel * sin(5 * 0.3), rel=1e-9)
+
+
+def test_a_self_locking_drive_feels_its_cogging() -> None:
+    """It holds the rotor against a torque below its peak, whatever the load path."""
+    amber = load_design("ilr33-amber")
+    plain = replace(amber, friction=Friction(viscous_Nms_rad=2e-4))
+    design = CASES[1].put(plain)
+    assert design.load.path == "self-locking"
+    assert follows_angle(design)
+    assert not follows_angle(CASES[0].put(plain))
+    start = State(motor_angle_rad=CASES[1].stable)
+    open_loop = replace(
+        design, controller=replace(design.controller, position=None, velocity=None, current=None)
+    )
+    volts = 0.5 * A * plain.motor.resistance_ohm / plain.motor.torque_constant_Nm_A
+    run = simulate(open_loop, commands.step(volts), 1.0, initial=start)
+    assert run.motor_angle_rad[-1] == pytest.approx(CASES[1].stable + asin(0.5) / 12.0, rel=1e-6)
+
+
+def test_behind_a_coupling_the_motor_stands_where_its_twist_puts_it() -> None:
+    """The slope is that at N angle + N_c twist, and the holding torque is that of the same angle."""
+    design = CASES[1].put(load_design("ilr33-amber-compliant"))
+    at = Operating(angle_rad=0.01, twist_rad=2e-3)
+    angle = design.total_ratio * 0.01 + design.ratio_to_coupling * 2e-3
+    assert wire(design, at).plant.torque["th"] == pytest.approx(
+        12.0 * A * cos(12.0 * angle + PHASE), rel=1e-12
+    )
+    assert holding_torque_Nm(design, 0.01, 2e-3) == pytest.approx(-CASES[1].torque(angle), rel=1e-12)
+
+
+@each
+@pytest.mark.parametrize("name", ["joint", "ilr33-amber-compliant", "fin"])
+def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: Case, name: str) -> None:
+    """Nothing moves; the loops are those of the operating angle, and a small push grows as they say."""
+    shipped = load_design(name)
+    back = replace(shipped.load, path="back-drivable", friction=None)
+    design = case.put(replace(shipped, load=back, friction=Friction(viscous_Nms_rad=1e-5)))
+    motion = operating_motion(design)
+    assert motion.speed_rad_s == 0.0
+    start = State(motor_angle_rad=0.0, output_angle_rad=motion.output_rad(design))
+    control = replace(design.controller, position=None, velocity=None, current=None)
+    free = replace(design, controller=control, command=Command())
+    turned = [
+        simulate(
+            free,
+            commands.step(volts),
+            0.01,
+            motion.load_Nm,
+            disturbance_Nm=motion.extra_Nm,
+            initial=start,
+            friction_on=False,
+            limits_on=False,
+        ).motor_angle_rad
+        for volts in (0.0, 1e-4, -1e-4)
+    ]
+    assert np.max(np.abs(turned[0] - start.motor_angle_rad)) < 1e-9
+    tick = TickProgram(wire(free, motion.operating(free)), "voltage").tick(0)
+    x, expected = np.zeros(len(tick.A)), []
+    for _ in turned[0]:
+        expected.append(tick.signals["th"][: x.size] @ x)
+        x = tick.A @ x + tick.B[:, 0] * 1e-4
+    seen = 0.5 * (turned[1] - turned[2])
+    assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))

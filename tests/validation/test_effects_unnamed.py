@@ -1,0 +1,45 @@
+"""An effect over the angle is judged by the validation without being named there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Design
+from actuator_lti.verdict import Verdict
+from analyses.validation.places import Bench
+from analyses.validation.small_signal import small_signal
+
+
+def cogging(design: Design, share: float = 1.0) -> Design:
+    motor = replace(design.motor, cogging_Nm=4e-3 * share, cogging_periods=12.0, cogging_phase_rad=2.5)
+    return replace(design, motor=motor)
+
+
+def gear_error(design: Design, share: float = 1.0) -> Design:
+    load = replace(design.load, gear_error_Nm=0.3 * share, gear_error_periods=3.0, gear_error_phase_rad=2.5)
+    return replace(design, load=load)
+
+
+def verdicts(design: Design, model: Design, place: str) -> list[Verdict]:
+    return [row.verdict for row in small_signal(Bench(design, model).place(place))]
+
+
+@pytest.mark.parametrize(
+    ("name", "effect"),
+    [("ilr33-amber", cogging), ("fin", cogging), ("fin", gear_error)],
+    ids=lambda value: getattr(value, "__name__", value),
+)
+def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
+    name: str, effect: Callable[..., Design]
+) -> None:
+    plain = load_design(name)
+    design = effect(plain)
+    for place in ("velocity", "u"):
+        assert set(verdicts(design, design, place)) == {Verdict.MET}
+        assert Verdict.NOT_MET in verdicts(design, effect(plain, 1.01), place)
+        assert Verdict.NOT_MET in verdicts(effect(plain, 1.01), design, place)
+        assert Verdict.NOT_MET in verdicts(design, plain, place)
