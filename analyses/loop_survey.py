@@ -85,8 +85,6 @@ class LoopSurvey:
         Sampled, sliding, no load.
     forms : mapping of str to mapping of str to LoopFigures
         By form, then by loop; step figures of the sampled form only.
-    locked : LoopFigures or None
-        The current loop with the rotor locked.
     break_points : mapping of str to BreakPoint
     operating_points : tuple of OperatingPointFigures
     budgets : mapping of str to DelayBudget
@@ -100,7 +98,6 @@ class LoopSurvey:
     design: Design
     loops: Loops
     forms: Mapping[str, Mapping[str, LoopFigures]]
-    locked: LoopFigures | None
     break_points: Mapping[str, BreakPoint]
     operating_points: tuple[OperatingPointFigures, ...]
     budgets: Mapping[str, DelayBudget]
@@ -185,12 +182,13 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
 
     loops = assemble_loops(design)
     refused: list[str] = []
-    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops, certify=True)}
+    forms: dict[str, Mapping[str, LoopFigures]] = {
+        "sampled": all_loop_figures(loops, certify=True, locked=True)
+    }
     for form in FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
     step(1)
-    locked = attempt("current loop with the rotor locked", lambda: _locked(design, loops), None)
     step(2)
     break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
@@ -201,7 +199,7 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     border = attempt("border of linear validity", lambda: _onset(loops, forms["sampled"]), None)
     step(6)
     return LoopSurvey(
-        design, loops, forms, locked, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
+        design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
 
 
@@ -210,14 +208,6 @@ def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, 
     from actuator_lti.loops import assemble_loops
 
     return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
-
-def _locked(design: Design, loops: Loops) -> LoopFigures | None:
-    """Measure the current loop with the rotor locked, where there is one."""
-    from actuator_lti.loops import assemble_loops
-
-    fixed = assemble_loops(design, rotor="locked").current if loops.current is not None else None
-    return None if fixed is None else loop_figures(fixed, certify=True)
 
 
 def _break_points(loops: Loops) -> dict[str, BreakPoint]:

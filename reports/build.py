@@ -188,11 +188,10 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
-        "Margins": lambda: margins.section(figures, survey.locked),
+        "Margins": lambda: margins.section(figures),
     }
     for name, result in figures.items():
-        locked = survey.locked if name == "current" else None
-        makers[f"Loop {name}"] = partial(loop.section, name, design, result, locked)
+        makers[f"Loop {name}"] = partial(loop.section, name, design, result)
     makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
     makers["Break points"] = lambda: break_points.section(survey.break_points, figures)
     makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)

@@ -71,7 +71,7 @@ def margins(
         load_Nm=load,
     )
     outer = _outer_figures(loops, around, step=form != "continuous")
-    figures = all_loop_figures(loops, step=form != "continuous", certify=True)
+    figures = all_loop_figures(loops, step=form != "continuous", certify=True, locked=True)
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
     where: Tree = {
@@ -153,6 +153,7 @@ def _print_tables(
         margin_table,
         response_table,
         with_held,
+        with_own_margins,
     )
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
@@ -168,8 +169,9 @@ def _print_tables(
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     said = by_itself_notes(named)
-    named = with_held(named)
-    blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
+    every = with_held(named)
+    named = with_own_margins(every)
+    blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(every)])]
     counts = [
         len(result.margins.gain_margins) + len(result.margins.phase_margins) for result in named.values()
     ]

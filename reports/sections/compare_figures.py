@@ -46,7 +46,7 @@ def overlays(comparison: Comparison) -> Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
-    from analyses.responses import curve, frequency_grid
+    from analyses.responses import answer_curve, curve, frequency_grid
 
     series: list[overlay_figure.Bode] = []
     for one in drawn:
@@ -54,7 +54,7 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         if result is None or (closed and not result.stable):
             continue
         grid = frequency_grid(result, 140)
-        made = curve(result.plain_response if closed else result.loop.plain_open, grid)
+        made = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
         series.append({
             "label": one.variant.name[:60], "frequency_hz": abscissa(made.frequency_hz),
             "magnitude_db": rounded(made.magnitude_db - (_dc_db(result) if closed else 0.0)),

@@ -63,18 +63,17 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> Section:
+def section(figures: Mapping[str, LoopFigures]) -> Section:
     """Make the section from the figures of the sampled, sliding loops."""
     named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
     notes = by_itself_notes(named)
     named = with_held(named)
-    if locked is not None and "Current loop, rotor held" not in named:
-        named["Current loop, rotor held"] = locked
+    own = with_own_margins(named)
     blocks = [
         *(doc.text(note) for note in notes),
-        margin_table(named),
+        margin_table(own),
         response_table(named),
-        doc.details("Every crossing of every loop", [crossing_table(named)]),
+        doc.details("Every crossing of every loop", [crossing_table(own)]),
         *(doc.text(note) for note in evidence_notes(named)),
     ]
     intro = (
@@ -153,8 +152,9 @@ def response_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
-        "−90°. Current and velocity: the feedback loop. Position: the response from the command to the "
-        "output shaft, feed-forward and filters of the command included."
+        "−90°. Current and velocity: the feedback loop. Position: the response from the user's command to "
+        "the output shaft, feed-forward, mean of the profile and filter of the command included; to the "
+        "reference: behind profile and filter."
     )
     rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
@@ -235,13 +235,28 @@ def _state(figures: LoopFigures) -> State:
 
 
 def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
-    """Put the held loop behind each that is unstable only by itself, under a name that says so."""
+    """Put the other row of a loop behind it, under names that say which is which.
+
+    Of a current loop that with the rotor locked; of an inner loop that is unstable only by itself, the held
+    one; of a position loop behind a mean or filter of the command, its response to the reference.
+    """
     every: dict[str, LoopFigures] = {}
     for label, figures in named.items():
-        every[label] = figures
-        if figures.held is not None:
+        free = figures.loop.name == "current" and (figures.locked or figures.held)
+        every[f"{label}, rotor free" if free else label] = figures
+        if free:
+            every[f"{label}, rotor locked"] = free
+        elif figures.held is not None:
             every[f"{label}, {HELD[figures.loop.name]}"] = figures.held
+        if figures.reference is not None:
+            every[f"{label}, to the reference"] = figures.reference
     return every
+
+
+def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
+    """Without the rows that are another response of the same loop."""
+    others = [id(figures.reference) for figures in named.values() if figures.reference is not None]
+    return {label: figures for label, figures in named.items() if id(figures) not in others}
 
 
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
