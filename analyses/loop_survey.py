@@ -61,6 +61,8 @@ class OperatingPointFigures:
 
     Attributes
     ----------
+    kind : str
+        As `actuator_lti.assemble_loops` names it.
     label : str
     load_Nm : float or None
         ``None`` where it makes no difference.
@@ -69,10 +71,19 @@ class OperatingPointFigures:
     figures : mapping of str to LoopFigures
     """
 
+    kind: OperatingPoint
     label: str
     load_Nm: float | None
     slope_Nms_rad: float
     figures: Mapping[str, LoopFigures]
+    load_unit: str = "N m"
+
+    @property
+    def place(self) -> str:
+        """Label and load in words; empty where the dry part slides, as the loops are judged."""
+        if self.kind == "sliding":
+            return ""
+        return self.label if self.load_Nm is None else f"{self.label}, load {self.load_Nm:g} {self.load_unit}"
 
 
 @dataclass(frozen=True)
@@ -192,7 +203,7 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     step(2)
     break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
-    points = attempt("loops at the operating points", lambda: _operating_points(design, refused), ())
+    points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
     budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
     step(5)
@@ -231,8 +242,20 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
         return BreakPoint(None, exact, str(error))
 
 
-def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPointFigures, ...]:
-    """Measure the loops sliding, at rest, and described at small speeds, at each load."""
+def operating_points(
+    design: Design, refused: list[str], *, described: bool = True, certify: bool = True
+) -> tuple[OperatingPointFigures, ...]:
+    """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
+
+    Parameters
+    ----------
+    refused : list of str
+        Gets the loops whose margins are not found, and why.
+    described : bool
+        Whether friction described at small speeds is wanted as well.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic.
+    """
     from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops
 
@@ -242,8 +265,9 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         moment = load or 0.0
         slope = friction_slope(design, kind, moment, speed, 1)
         loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
-        figures = all_loop_figures(loops, step=False, refused=refused, certify=True)
-        return OperatingPointFigures(label, load, slope, figures)
+        figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
+        unit = "N" if design.axis == "linear" else "N m"
+        return OperatingPointFigures(kind, label, load, slope, figures, unit)
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
@@ -255,7 +279,7 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         points.append(point("in the gap of the play", None, "gap"))
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
-        for speed in _described_speeds(design):
+        for speed in _described_speeds(design) if described else ():
             unit = "rad/s" if design.axis == "rotary" else "m/s"
             label = f"speed amplitude {speed:.3g} {unit}"
             points.append(point(label, load, "describing-function", speed))

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypedDict, cast
 
 from actuator_lti.quantities import Quantity
 from actuator_lti.verdict import Verdict
 from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
+from analyses.loop_survey import OperatingPointFigures
+from analyses.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
-from reports.numbers import to_minus
+from reports.numbers import short, to_minus
 from reports.sections.names import LOOPS, figure_column, hertz
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
@@ -63,15 +65,16 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures]) -> Section:
-    """Make the section from the figures of the sampled, sliding loops."""
-    named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
+def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
+    """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
+    loops = named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
     notes = by_itself_notes(named)
     named = with_held(named)
     own = with_own_margins(named)
     blocks = [
         *(doc.text(note) for note in notes),
         margin_table(own),
+        *([spread_table(points, loops)] if points else ()),
         response_table(named),
         doc.details("Every crossing of every loop", [crossing_table(own)]),
         *(doc.text(note) for note in evidence_notes(named)),
@@ -158,6 +161,36 @@ def response_table(named: Mapping[str, LoopFigures]) -> Block:
     )
     rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
+
+
+SPREAD_COLUMNS = [
+    doc.column("loop", "Loop"),
+    doc.column("gain", "Gain margin, operating points", "dB"),
+    doc.column("phase", "Phase margin, operating points", "deg"),
+]
+
+
+def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> Block:
+    """Make the table of the least and largest margins over the operating points that the drive has."""
+    seen = [point for point in points if point.kind != "describing-function"]
+    places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
+    labels = [next(iter(with_held({label: figures}))) for label, figures in named.items()]
+    rows: list[Row] = []
+    for label, figures in zip(labels, named.values(), strict=True):
+        name, own = figures.loop.name, spread(seen).get(figures.loop.name, {})
+        row: Row = {"loop": label}
+        row |= {key: range_words(own[f"{key}_margin"]) for key in ("gain", "phase") if f"{key}_margin" in own}
+        doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
+        row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
+        rows += [row] if len(row) > 1 else []
+    note = f"Operating points: {places}."
+    return doc.table("Margins over the operating points", SPREAD_COLUMNS, rows, note)
+
+
+def range_words(range_: Spread) -> str:
+    """Say between which values a figure lies over the operating points; empty where they agree."""
+    least, most = short(range_.least, 3), "∞" if math.isinf(range_.most) else short(range_.most, 3)
+    return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
 def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
