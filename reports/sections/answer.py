@@ -25,7 +25,7 @@ from reports.findings import Finding, gathered, plain
 from reports.numbers import short
 from reports.sections import loop as loop_section
 from reports.sections.margins import margin_row, range_words, shown, worst_status
-from reports.sections.names import LOOPS, POINTS
+from reports.sections.names import LOOPS, POINTS, loop_words
 
 SHOWN = 5
 
@@ -79,14 +79,18 @@ def _loop(
     stable = margin_row(figures.judged)["stable"]
     if figures.held is not None:
         stable = {**stable, "text": f"{stable['text']}, {HELD[name]}"}
-    label = f"{LOOPS[name]}, rotor {figures.rotor}" if figures.rotor else LOOPS[name]
-    return {"loop": label, "anchor": f"loop-{name}", "stable": stable, "figures": cells}
+    return {
+        "loop": loop_words(name, figures.rotor),
+        "anchor": f"loop-{name}",
+        "stable": stable,
+        "figures": cells,
+    }
 
 
 def weakest(point: WeakPoint) -> Weakest:
     """Say which margin of which view has least left to its limit, or lies furthest beyond it."""
     view = point.view
-    loop = LOOPS.get(view.loop, "") + (f", rotor {view.rotor}" if view.rotor else "")
+    loop = loop_words(view.loop, view.rotor) if view.loop else ""
     cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
     label = ", ".join(filter(None, (loop, view.place, cut)))
     label = label[0].upper() + label[1:]

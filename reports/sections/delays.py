@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from actuator_lti.delay_budget import DelayBudget
 from reports import document as doc
 from reports.document_schema import Row, Section
-from reports.sections.names import LOOPS, hertz
+from reports.sections.names import hertz, loop_words
 
 if TYPE_CHECKING:
     from reports.figures import delay_budget as delay_budget_figure
@@ -83,7 +83,7 @@ def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
 
 def _row(name: str, budget: DelayBudget) -> Row:
     return {
-        "loop": LOOPS[name],
+        "loop": loop_words(name),
         "crossover_hz": hertz(budget.frequency_rad_s),
         **budget.items,
         "total": budget.total_deg,

@@ -12,7 +12,7 @@ from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
 from reports.sections.loop import bode_data, nyquist_hz
 from reports.sections.margins import cells, evidence_notes, margin_row, response_row
-from reports.sections.names import FORMS, LOOPS, figure_column
+from reports.sections.names import FORMS, figure_column, loop_words
 
 if TYPE_CHECKING:
     from reports.figures import forms as forms_figure
@@ -74,7 +74,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {**cells(margins, response), "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
+    row = {**cells(margins, response), "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
@@ -88,6 +88,6 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
             for form, result in forms.items()
             if name in result
         ]
-        panels.append({"title": LOOPS[name], **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
+        panels.append({"title": loop_words(name), **bode_data(series), "nyquist_hz": nyquist_hz(sampled)})
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."
     return doc.figure("forms", {"panels": panels}, caption=caption, alt=f"Bode diagrams. {caption}")

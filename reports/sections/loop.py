@@ -92,7 +92,9 @@ def result(figures: LoopFigures) -> str:
     ]
     if bandwidth is not None:
         words.append(f"bandwidth {hertz_words(bandwidth)}")
-    verdict = f"{figures.margins.verdict.capitalize()} ({figures.margins.evidence})"
+    rotor = "Rotor free, " if figures.loop.name == "current" else ""
+    verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
+    verdict = verdict[0].upper() + verdict[1:]
     return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
 

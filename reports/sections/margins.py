@@ -15,7 +15,7 @@ from analyses.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
 from reports.numbers import short, to_minus
-from reports.sections.names import LOOPS, figure_column, hertz
+from reports.sections.names import LOOPS, figure_column, hertz, loop_words
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -97,7 +97,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
     ]
     if unstable:
         return f"Not known to be stable: {', '.join(unstable)}."
-    rows = {LOOPS[name].lower(): margin_row(loop_figures.judged) for name, loop_figures in figures.items()}
+    rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
     for margins, what, unit in (
         ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
@@ -350,7 +350,7 @@ def _crossings(name: str, figures: LoopFigures) -> list[Row]:
 
 def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> Row:
     row = {
-        "_loop": next((key for key, words in LOOPS.items() if words == name), ""),
+        "_loop": next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), ""),
         "_hz": finite(hertz(omega_rad_s)) or None,
         "loop": name,
         "kind": kind,
