@@ -18,6 +18,7 @@ from actuator_lti.on_first_use import on_first_use
 if TYPE_CHECKING:
     from nonlinear import commands, loads
     from nonlinear.batch import Reducers, Run, simulate_many
+    from nonlinear.derivative import Tangent, tangent
     from nonlinear.drive import Drive
     from nonlinear.probe import Probe
     from nonlinear.rows import LIMITERS, Rows
@@ -32,11 +33,13 @@ __all__ = [
     "Rows",
     "Run",
     "State",
+    "Tangent",
     "Trajectory",
     "commands",
     "loads",
     "simulate",
     "simulate_many",
+    "tangent",
 ]
 
 _WHERE = {
@@ -47,9 +50,11 @@ _WHERE = {
     "Rows": "nonlinear.rows",
     "Run": "nonlinear.batch",
     "State": "nonlinear.trajectory",
+    "Tangent": "nonlinear.derivative",
     "Trajectory": "nonlinear.trajectory",
     "simulate": "nonlinear.simulation",
     "simulate_many": "nonlinear.batch",
+    "tangent": "nonlinear.derivative",
 }
 
 

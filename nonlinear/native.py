@@ -12,7 +12,7 @@ import ctypes
 import hashlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -137,6 +137,21 @@ def call_library(
     rows = _Bytes(flags.ctypes.data, flags.size)
     ours = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))
     return int(opened.drive_run(*ours, 1.0))
+
+
+def resumed(
+    p: Floats, s: Floats, io: Floats, block: Floats, tables: Floats, history: Floats, flags: Any, out: Floats,
+    shared: Floats,
+) -> Callable[[], int]:  # fmt: skip
+    """A call that runs the state ``s`` on to tick ``p[TICKS]``; the caller keeps all the rows."""
+    opened = _running()
+    if opened is None:
+        from nonlinear._kernels.run import run as numba_run
+
+        return lambda: int(numba_run(p, s, io, block, tables, history, flags, out, shared, 1.0))
+    rows = _Bytes(flags.ctypes.data, flags.size)
+    places = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))
+    return lambda: int(opened.drive_run(*places, 1.0))
 
 
 def _prepared(opened: Any, row: Floats) -> tuple[Floats, Floats]:

@@ -15,9 +15,9 @@ from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from analyses.validation.bench import on_the_bench
 from analyses.validation.from_rest import nonlinear_parts
 from nonlinear import LIMITERS
+from nonlinear.on_the_bench import on_the_bench
 
 FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)

@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from analyses.validation.budget import OutOfTime
 from analyses.validation.coherent import Coherent, coherent
-from analyses.validation.rig import Rig
 from nonlinear import LIMITERS, Rows
+from nonlinear.loop_setup import LoopSetup
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -68,7 +68,7 @@ class Search:
 
     Attributes
     ----------
-    setup : Rig
+    setup : LoopSetup
         The loop, on its bias motion. For the border of the linear loop limits are off: at many times the
         gain a signal that dies out may still reach a limit on its way (where they are on, that counts as
         growth).
@@ -97,7 +97,7 @@ class Search:
         nominal drive on that find any other border.
     """
 
-    setup: Rig
+    setup: LoopSetup
     kind: Kind
     frequency_hz: float
     settle_ticks: int
@@ -409,8 +409,8 @@ def find_borders(
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> from analyses.validation.rig import rig
-    >>> loop = rig(load_design("ilr33-amber"), "current")
+    >>> from nonlinear.loop_setup import loop_setup
+    >>> loop = loop_setup(load_design("ilr33-amber"), "current")
     >>> border, = find_borders([Search(loop, "gain up", 1900.0, 400)])
     >>> round(border.value, 2)
     2.95

@@ -13,8 +13,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
-from analyses.validation.rig import GAINS
 from nonlinear import Rows
+from nonlinear.loop_setup import GAINS
 
 TICKS = 2000  # of a ramp
 WIDE, NEAR = (0.0, 4.0), (0.99, 1.01)  # of the design's own torque, then of what was found

@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from analyses.validation.bias_motion import BiasMotion, bias_motion, may_stand, standing
 from analyses.validation.coherent import coherent
 from analyses.validation.response import Sweep
-from analyses.validation.rig import every, stages_of
 from analyses.validation.transient import fourier_sum, long_enough
 from nonlinear import Rows, Trajectory
+from nonlinear.loop_setup import every, stages_of
+from nonlinear.operating_motion import OperatingMotion, may_stand, operating_motion, standing
 
 Floats = npt.NDArray[np.float64]
 FAINT = 1e-3  # of full deflection, speed, current or voltage
@@ -52,7 +52,7 @@ def command_sweep(design: Design, frequency_hz: Floats, settle_ticks: int) -> Sw
     """
     base = every(design, stages_of(design)[-1]) if stages_of(design) else 1
     window = coherent(frequency_hz, design.controller.period_s, base)
-    motion = standing(design) if may_stand(design) else bias_motion(design)
+    motion = standing(design) if may_stand(design) else operating_motion(design)
     points = [
         _point(design, motion, int(ticks), float(hertz), base, settle_ticks)
         for ticks, hertz in zip(window.ticks, window.frequency_hz, strict=True)
@@ -87,7 +87,7 @@ def command_step(design: Design, frequency_hz: Floats, slowest_ticks: float) -> 
     ticks = long_enough(slowest_ticks, base)
     if ticks is None:
         return None
-    motion = standing(design) if may_stand(design) else bias_motion(design)
+    motion = standing(design) if may_stand(design) else operating_motion(design)
     size = FAINT * _full(design)
     values = []
     for part in (0.0, 0.5, 1.0):
@@ -137,7 +137,7 @@ class _Point:
 
 
 def _point(
-    design: Design, motion: BiasMotion, ticks: int, hertz: float, base: int, settle_ticks: int
+    design: Design, motion: OperatingMotion, ticks: int, hertz: float, base: int, settle_ticks: int
 ) -> _Point:
     """Run one frequency, again with less amplitude or more time where it asks for it."""
     amplitude, waited = FAINT * _full(design), False
@@ -169,7 +169,7 @@ def _full(design: Design) -> float:
 
 
 def _run(
-    design: Design, motion: BiasMotion, amplitude: float, hertz: float, ticks: int, base: int
+    design: Design, motion: OperatingMotion, amplitude: float, hertz: float, ticks: int, base: int
 ) -> Trajectory:
     """The run, recorded at the instants of the outermost stage; a step instead of a sine of 0 Hz."""
     row = Rows.of(design, friction_on=motion.friction_on, limits_on=False)
@@ -199,7 +199,7 @@ def _run(
 
 
 def _read(
-    design: Design, motion: BiasMotion, run: Trajectory, amplitude: float, hertz: float, samples: int
+    design: Design, motion: OperatingMotion, run: Trajectory, amplitude: float, hertz: float, samples: int
 ) -> _Point:
     """Response over the last window of whole periods, and its change from the one before."""
     values = getattr(run, _signal(design))
@@ -218,7 +218,7 @@ def _read(
     return _Point(amplitude, last / commanded, change, reason)
 
 
-def _why_not(design: Design, motion: BiasMotion, run: Trajectory, since: int) -> str:
+def _why_not(design: Design, motion: OperatingMotion, run: Trajectory, since: int) -> str:
     """What is not linear in a run from a record on; empty where nothing is."""
     acting = [name for name in run.limits if run.limit_active(name)[since:].any()]
     if run.status != "ok":

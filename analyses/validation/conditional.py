@@ -23,12 +23,12 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
-from analyses.validation.bias_motion import lasting_torque_Nm
 from analyses.validation.budget import OutOfTime
 from analyses.validation.confirm import oscillation_hz
 from analyses.validation.release import full_range
-from analyses.validation.rig import points_of
 from nonlinear import LIMITERS, Rows
+from nonlinear.loop_setup import points_of
+from nonlinear.operating_motion import lasting_torque_Nm
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from analyses.validation.borders import CYCLES, SLOW, Border, Kind, Search, find_borders
 from analyses.validation.coherent import LEAST_SAMPLES
-from analyses.validation.rig import Rig
 from analyses.validation.sweep import EVER_TICKS, SETTLE_TIME_CONSTANTS, settling_ticks_of
 from analyses.validation.tolerance import allowed
 from nonlinear import Rows
+from nonlinear.loop_setup import LoopSetup
 from nonlinear.probe import fractional_delay
 
 if TYPE_CHECKING:
@@ -178,7 +178,9 @@ def _doubted(
     return result
 
 
-def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_ticks: int) -> list[Question]:
+def stage_questions(
+    setup: LoopSetup, loop: Any, margins: StabilityMargins, settle_ticks: int
+) -> list[Question]:
     """Gain up, gain down and delay of one loop (inner loops closed, outer ones open)."""
     ups = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio > 1.0]
     downs = [(m.ratio, m.frequency_rad_s) for m in margins.gain_margins if m.ratio < 1.0]
@@ -202,7 +204,7 @@ def stage_questions(setup: Rig, loop: Any, margins: StabilityMargins, settle_tic
 
 
 def point_questions(
-    setups: Mapping[str, Rig],
+    setups: Mapping[str, LoopSetup],
     loops: Loops,
     settle_ticks: int,
     margins: Mapping[str, ExactMargins] | None = None,
@@ -307,7 +309,7 @@ def _nearest_hz(loop: PeriodicLoop, gain: float, delay_s: float) -> float:
 
 
 def _gain(
-    setup: Rig, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int, loop: PeriodicLoop
+    setup: LoopSetup, kind: Kind, predicted: tuple[float, float] | None, settle_ticks: int, loop: PeriodicLoop
 ) -> Question:
     """A gain margin; where none is predicted within the search range the search looks all the same."""
     if predicted is None or max(predicted[0], 1.0 / predicted[0]) > FAR:
@@ -339,7 +341,7 @@ def _on_the_way(loop: PeriodicLoop, ratio: float, hold_ticks: int) -> int:
     return min(ceil(periods * len(loop.systems)) * hold_ticks, LONGEST_DRIFT_TICKS)
 
 
-def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
+def _blind(setup: LoopSetup, kind: Kind, settle_ticks: int) -> Search:
     """Look for a border nobody expects: upwards near Nyquist, downwards over several time constants."""
     wait = min(settle_ticks, LONGEST_BLIND_TICKS)
     if kind == "gain up":
@@ -349,7 +351,7 @@ def _blind(setup: Rig, kind: Kind, settle_ticks: int) -> Search:
     return Search(setup, kind, hertz, 2 * wait, search_range=10.0, cycles=6, smooth=False)
 
 
-def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Search:
+def _real_pole(setup: LoopSetup, kind: Kind, settle_ticks: int, at_hz: float) -> Search:
     """Look for the gain at which a real pole reaches 1 (0 Hz, windows as long as the wait) or -1."""
     window = LEAST_SAMPLES * setup.base_ticks
     wait = max(min(settle_ticks, LONGEST_BLIND_TICKS if at_hz else LONGEST_DRIFT_TICKS), window)
@@ -358,7 +360,7 @@ def _real_pole(setup: Rig, kind: Kind, settle_ticks: int, at_hz: float) -> Searc
 
 
 def _expecting(
-    setup: Rig, kind: Kind, hertz: float, settle_ticks: int, expected: float, how: type[Search] = Search
+    setup: LoopSetup, kind: Kind, hertz: float, settle_ticks: int, expected: float, how: type[Search] = Search
 ) -> Search:
     """Look for an oscillation, about where it is expected first.
 

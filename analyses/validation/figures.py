@@ -29,10 +29,10 @@ from analyses.validation.reading import (
     value_at,
 )
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig
 from analyses.validation.step import StepMeasured, step_response
 from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, stepped_sine
 from analyses.validation.transient import Transient
+from nonlinear.loop_setup import LoopSetup
 
 Floats = npt.NDArray[np.float64]
 INSIDE = 5  # points measured again inside a bracket
@@ -89,7 +89,7 @@ class Measured:
 
 
 def measure_figures(
-    setup: Rig,
+    setup: LoopSetup,
     sweep: Sweep,
     settle_ticks: int,
     step_ticks: int,
@@ -100,7 +100,7 @@ def measure_figures(
 
     Parameters
     ----------
-    setup : Rig
+    setup : LoopSetup
     sweep : Sweep
         Wide enough to hold what is looked for.
     settle_ticks, step_ticks : int
@@ -192,7 +192,7 @@ def _fall(f: Floats, values: Floats, level: float) -> float:
 BESIDE = 2  # points on either side
 
 
-def point_errors(setup: Rig, sweep: Sweep, slowest_ticks: float) -> Floats:
+def point_errors(setup: LoopSetup, sweep: Sweep, slowest_ticks: float) -> Floats:
     """Relative error of each point: the change between its windows, carried on, and rounding."""
     from scipy.ndimage import maximum_filter1d
 
@@ -261,7 +261,7 @@ def _peaks_db(sweep: Sweep) -> Floats:
 
 
 def refined(
-    setup: Rig,
+    setup: LoopSetup,
     sweep: Sweep,
     brackets: list[tuple[float, float]],
     settle_ticks: int,

@@ -12,12 +12,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from analyses.loop_figures import LoopFigures
 from analyses.validation.at_rest import RestSweep
-from analyses.validation.bias_motion import has_to_stand
 from analyses.validation.conditional import step_rows
 from analyses.validation.ledger import Entry, entry, not_judged, to_the_command
 from analyses.validation.own_error import carried_on
 from analyses.validation.reading import Reading, first_fall
 from analyses.validation.step import SETTLED, UNSETTLED
+from nonlinear.operating_motion import has_to_stand
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from analyses.validation.rig import Rig, producer
+from nonlinear.loop_setup import LoopSetup, producer
 
 Floats = npt.NDArray[np.float64]
 ROUNDING = 1e-11  # relative, of a fundamental that is a small part of the signal it is taken from
@@ -20,7 +20,7 @@ def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
     return change / -np.expm1(-np.asarray(window) / slowest)
 
 
-def speed_bit(setup: Rig, ticks: npt.ArrayLike) -> Floats:
+def speed_bit(setup: LoopSetup, ticks: npt.ArrayLike) -> Floats:
     """The last bit of the speed after so many ticks on the bias motion, as it is seen at the point.
 
     That of the speed w itself, ``ulp(w)``.  A speed made from angles divides also the last bit of the angle
@@ -50,7 +50,7 @@ def speed_bit(setup: Rig, ticks: npt.ArrayLike) -> Floats:
     return np.asarray(bits * gain)
 
 
-def angle_rounding(setup: Rig, window: npt.NDArray[np.int64], ticks: Floats, seen: Floats) -> Floats:
+def angle_rounding(setup: LoopSetup, window: npt.NDArray[np.int64], ticks: Floats, seen: Floats) -> Floats:
     """What rounding of the growing angle leaves in a fundamental in front of the instrument.
 
     Over the samples of a window it is noise, of which the fundamental keeps ``sqrt(2/N)``.  A motion of few

@@ -1,8 +1,8 @@
 """Margins at small, medium and large amplitude, with dry friction and without: the drive let go from there.
 
-There is no bias motion: the drive is released from an initial deviation (angle, speed or current, a part of
-its full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which the
-oscillation that follows does not die out.  Saturation takes gain away, friction takes energy away: the
+There is no operating motion: the drive is released from an initial deviation (angle, speed or current, a
+part of its full range), limits act, dry friction sticks.  What is looked for is the gain or delay at which
+the oscillation that follows does not die out.  Saturation takes gain away, friction takes energy away: the
 border found need not be the linear one, and is reported, not judged.
 """
 
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from analyses.validation.bias_motion import BiasMotion, full_torque_Nm
 from analyses.validation.borders import Border, Search, find_borders
 from analyses.validation.confirm import Confirmation
-from analyses.validation.rig import Rig
 from nonlinear import LIMITERS, Rows
+from nonlinear.loop_setup import LoopSetup
+from nonlinear.operating_motion import OperatingMotion, full_torque_Nm
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -123,7 +123,7 @@ def full_range(design: Design) -> dict[str, float]:
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
 
 
-def _scale(setup: Rig) -> float:
+def _scale(setup: LoopSetup) -> float:
     """What the signal in front of the instrument can reach."""
     sizes = full_range(setup.design)
     values = {"u": setup.design.limits.voltage_V, "i_ref": sizes["current"], "w_ref": sizes["velocity"]}
@@ -131,7 +131,7 @@ def _scale(setup: Rig) -> float:
 
 
 def release_margins(
-    setups: Mapping[str, Rig],
+    setups: Mapping[str, LoopSetup],
     confirmed: Sequence[Confirmation],
     settle_ticks: Mapping[str, int],
     *,
@@ -207,7 +207,9 @@ def _travel_s(design: Design, stage: str, part: float) -> float:
     return part * sizes["position"] * design.total_ratio / sizes["velocity"] + 2.0 * speeding
 
 
-def _release(setup: Rig, item: Confirmation, part: float, friction_on: bool, settle_ticks: int) -> Release:
+def _release(
+    setup: LoopSetup, item: Confirmation, part: float, friction_on: bool, settle_ticks: int
+) -> Release:
     """Set one search up: wait for the travel, then for the oscillation."""
     design, hertz = setup.design, float(item.predicted_hz or 0.0)
     tick_s = design.controller.period_s
@@ -215,7 +217,7 @@ def _release(setup: Rig, item: Confirmation, part: float, friction_on: bool, set
         ceil(CYCLES / (hertz * tick_s)), min(settle_ticks, 2000)
     )
     return Release(
-        Rig(design, setup.loop, BiasMotion(0.0, 0.0, 0.0, friction_on)),
+        LoopSetup(design, setup.loop, OperatingMotion(0.0, 0.0, 0.0, friction_on)),
         "delay" if item.kind == "delay" else "gain up",
         hertz,
         wait,

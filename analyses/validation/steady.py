@@ -13,12 +13,12 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
-from analyses.validation.bias_motion import bias_motion, bias_motion_at, has_to_stand
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
 from analyses.validation.release import full_range
-from analyses.validation.rig import Rig, stages_of
 from analyses.validation.sweep import settling_ticks_of
+from nonlinear.loop_setup import LoopSetup, stages_of
+from nonlinear.operating_motion import has_to_stand, operating_motion, operating_motion_at
 
 ROUNDING = 1e-9  # of the largest current: a drive without friction takes none
 WINDOW = 400  # samples of the slowest loop
@@ -50,7 +50,7 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     quantity, unit = ("steady_voltage", "V") if source else ("steady_current", "A")
     name = design.controller.outermost
     try:
-        motion = bias_motion(design)
+        motion = operating_motion(design)
     except InputError as error:
         if condition == CONDITION:
             raise
@@ -58,7 +58,7 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     if not motion.speed_rad_s:
         why = "the drive has no steady motion within its limits"
         return not_judged(name, quantity, unit, None, None, why, condition)
-    rigs = [Rig(design, stage, motion) for stage in reversed(stages_of(design))]
+    rigs = [LoopSetup(design, stage, motion) for stage in reversed(stages_of(design))]
     setup = next((one for one in rigs if one.steady_start), None)
     if setup is None:
         why = "the position controller remembers: no run begins in its steady state"
@@ -82,7 +82,7 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     signal = "voltage_V" if source else "current_A"
     last, before = (float(result.mean(signal, k)[0]) for k in (0, 1))
     speed = float(result.mean("motor_speed_rad_s")[0])
-    wanted = bias_motion_at(model, speed, motion.load_Nm)
+    wanted = operating_motion_at(model, speed, motion.load_Nm)
     predicted = wanted.voltage_V if source else wanted.current_A
     full = design.limits.voltage_V if source else full_range(design)["current"]
     seen = Reading(last, 3.0 * abs(last - before))
@@ -90,7 +90,7 @@ def steady_entry(design: Design, model: Design, settle_ticks: int) -> Entry:
     return entry(name, quantity, unit, predicted, seen, condition, least)
 
 
-def _settling_ticks(setup: Rig) -> int:
+def _settling_ticks(setup: LoopSetup) -> int:
     """Ticks after which the slowest pole of the loops of a bench is forgotten."""
     from actuator_lti.loops import assemble_loops
 

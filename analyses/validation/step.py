@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from analyses.validation.own_error import ROUNDING, carried_on, speed_bit
-from analyses.validation.rig import Rig, small_rig
 from nonlinear import Trajectory
+from nonlinear.loop_setup import LoopSetup, standing_setup
 
 Floats = npt.NDArray[np.float64]
 SMALL_ANGLE_RAD = 1e-6  # of a step with gravity: its moment is proportional to the angle to half of that
@@ -46,7 +46,7 @@ Course = tuple[Floats, Floats]  # in front of the instrument, and of the output
 
 
 def step_response(
-    setup: Rig,
+    setup: LoopSetup,
     settle_ticks: int,
     slowest_ticks: float,
     size: float | None = None,
@@ -56,7 +56,7 @@ def step_response(
 
     Parameters
     ----------
-    setup : Rig
+    setup : LoopSetup
     settle_ticks : int
         Length of the run.
     slowest_ticks : float
@@ -76,14 +76,14 @@ def step_response(
         size *= SMALL_ANGLE_RAD / turned if bent else 0.2
     figures = _figures(setup, size, slowest_ticks, time_s, response, reason)
     if reason:  # the smallest step still met a limit, or friction: the linear loop shows itself without them
-        small = small_rig(setup.design, setup.loop, held=setup.held)
+        small = standing_setup(setup.design, setup.loop, held=setup.held)
         time_s, response, reason, _ = _step(small, size, settle_ticks, without_step(small, settle_ticks))
         figures = _figures(small, size, slowest_ticks, time_s, response, reason)
     return replace(figures, size=size)
 
 
 def _figures(
-    setup: Rig, size: float, slowest_ticks: float, time_s: Floats, response: Floats, reason: str
+    setup: LoopSetup, size: float, slowest_ticks: float, time_s: Floats, response: Floats, reason: str
 ) -> StepMeasured:
     """The figures, to what rounding of the speed leaves of them.
 
@@ -99,20 +99,20 @@ def _figures(
     return step_figures_of(time_s, response, slowest_s, reason, rounding)
 
 
-def first_size(setup: Rig) -> float:
+def first_size(setup: LoopSetup) -> float:
     """A small part of the way to the nearest limit, in the unit of the point."""
     signal = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}[setup.point]
     room = setup.room[signal]
     return STEP_PART * (room if np.isfinite(room) else max(abs(setup.bias.speed_rad_s), 1.0))
 
 
-def without_step(setup: Rig, settle_ticks: int) -> Course:
+def without_step(setup: LoopSetup, settle_ticks: int) -> Course:
     """The drive as it starts: what that leaves to settle is no part of an answer."""
     run = _run(setup, 0.0, settle_ticks)
     return run.probes[setup.point].before, run.output_angle_rad
 
 
-def _run(setup: Rig, size: float, settle_ticks: int) -> Trajectory:
+def _run(setup: LoopSetup, size: float, settle_ticks: int) -> Trajectory:
     """The drive with a step, recorded at the updates of the point."""
     row, n = setup.row(), setup.hold_ticks
     row["ticks"], row["record_every"] = settle_ticks + 4 * n, n
@@ -120,7 +120,9 @@ def _run(setup: Rig, size: float, settle_ticks: int) -> Trajectory:
     return row.trajectory()
 
 
-def _step(setup: Rig, size: float, settle_ticks: int, steady: Course) -> tuple[Floats, Floats, str, float]:
+def _step(
+    setup: LoopSetup, size: float, settle_ticks: int, steady: Course
+) -> tuple[Floats, Floats, str, float]:
     """Times, and the difference that a step makes, at the updates of the point.
 
     Then what limited it, and the largest difference of the output angle.

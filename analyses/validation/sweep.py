@@ -21,8 +21,8 @@ from actuator_lti.errors import InputError
 from analyses.validation.budget import OutOfTime
 from analyses.validation.coherent import Coherent, coherent, hold_factor
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig, rig
 from nonlinear import LIMITERS
+from nonlinear.loop_setup import LoopSetup, loop_setup
 from nonlinear.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
@@ -75,7 +75,7 @@ def frequency_response(
     >>> sweep.reason
     ('', '')
     """
-    setup = rig(design, loop)
+    setup = loop_setup(design, loop)
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     nyquist = 0.5 / setup.period_s
     if not asked.size or not (np.isfinite(asked) & (asked > 0.0) & (asked < nyquist)).all():
@@ -85,7 +85,7 @@ def frequency_response(
 
 
 def stepped_sine(
-    setup: Rig,
+    setup: LoopSetup,
     frequency_hz: Floats,
     settle_ticks: int,
     threads: int | None = None,
@@ -122,7 +122,7 @@ def stepped_sine(
     return _sweep(setup, window, amplitude, result)
 
 
-def settling_ticks(setup: Rig) -> int:
+def settling_ticks(setup: LoopSetup) -> int:
     """Ticks until the slowest mode of the closed loop has died out, by its pole.
 
     Raises
@@ -151,7 +151,9 @@ def settling_ticks_of(
     return int(min(ceil(samples + 20.0) * hold_ticks, longest))
 
 
-def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: int | None = None) -> Floats:
+def fitting_amplitude(
+    setup: LoopSetup, window: Coherent, settle_ticks: int, threads: int | None = None
+) -> Floats:
     """Injected amplitudes that keep clear of limits and of standstill, from a faint run first."""
     rooms = {name: room for name, room in setup.room.items() if room < inf}
     smallest = {"u": "voltage_V", "i_ref": "current_command_A", "w_ref": "speed_command_rad_s"}
@@ -175,7 +177,7 @@ def fitting_amplitude(setup: Rig, window: Coherent, settle_ticks: int, threads: 
     return np.where(np.isfinite(most), USED_ROOM * most, faint)
 
 
-def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
+def _acceleration_room(setup: LoopSetup, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
     """Amplitude at which the speed command would change by the acceleration limit in one update."""
     limit, controller = setup.design.limits.acceleration_rad_s2, setup.design.controller
     if setup.outer != "position" or controller.velocity is None or not np.isfinite(limit):
@@ -187,7 +189,7 @@ def _acceleration_room(setup: Rig, window: Coherent, result: BatchResult, faint:
     return limit * T * faint / np.maximum(change, 1e-300)
 
 
-def _contact_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
+def _contact_room(setup: LoopSetup, window: Coherent, result: BatchResult, faint: Floats) -> Floats:
     """Amplitude at which the coupling's torque would change its sign, by what moves the load."""
     design = setup.design
     if setup.bias.coupling_Nm == 0.0:
@@ -199,7 +201,7 @@ def _contact_room(setup: Rig, window: Coherent, result: BatchResult, faint: Floa
     return abs(setup.bias.coupling_Nm) * faint / np.maximum(swing, 1e-300)
 
 
-def _gravity_room(setup: Rig, result: BatchResult, faint: Floats) -> Floats:
+def _gravity_room(setup: LoopSetup, result: BatchResult, faint: Floats) -> Floats:
     """Amplitude at which gravity is no longer proportional to the angle."""
     if setup.design.load.gravity is None:
         return np.full(faint.size, inf)
@@ -207,7 +209,7 @@ def _gravity_room(setup: Rig, result: BatchResult, faint: Floats) -> Floats:
 
 
 def _run(
-    setup: Rig, window: Coherent, amplitude: Floats, settle_ticks: int, threads: int | None
+    setup: LoopSetup, window: Coherent, amplitude: Floats, settle_ticks: int, threads: int | None
 ) -> BatchResult:
     """Run one row a frequency."""
     rows = setup.row().repeat(window.ticks.size)
@@ -217,7 +219,7 @@ def _run(
     return rows.run(threads=threads)
 
 
-def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Floats) -> list[str]:
+def _reasons(setup: LoopSetup, result: BatchResult, window: Coherent, amplitude: Floats) -> list[str]:
     """Why a point cannot be reported, or nothing."""
     tick_s = setup.design.controller.period_s
     injected = amplitude * hold_factor(window.frequency_hz, tick_s, setup.hold_ticks)
@@ -240,7 +242,7 @@ def _reasons(setup: Rig, result: BatchResult, window: Coherent, amplitude: Float
     return reasons
 
 
-def unsteadiness(setup: Rig, result: BatchResult) -> Floats:
+def unsteadiness(setup: LoopSetup, result: BatchResult) -> Floats:
     """Change between the last two windows, the larger of both sides of the instrument."""
     change = np.zeros(result.status.size)
     for signal in (setup.before, setup.after):
@@ -249,7 +251,7 @@ def unsteadiness(setup: Rig, result: BatchResult) -> Floats:
     return change
 
 
-def phasor(setup: Rig, result: BatchResult, signal: str, last: int = 0) -> Complexes:
+def phasor(setup: LoopSetup, result: BatchResult, signal: str, last: int = 0) -> Complexes:
     """Fundamental of a signal, freed from the ramp of the bias motion where it is an angle."""
     phasors = result.phasor(signal, 1, last)
     if "output" not in signal and "reference" not in signal:
@@ -262,7 +264,7 @@ def phasor(setup: Rig, result: BatchResult, signal: str, last: int = 0) -> Compl
     return phasors - ramp_phasor(slope, window, ticks - (last + 1) * length)
 
 
-def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult) -> Sweep:
+def _sweep(setup: LoopSetup, window: Coherent, amplitude: Floats, result: BatchResult) -> Sweep:
     """Make the responses from the fundamentals."""
     tick, f = setup.design.controller.period_s, window.frequency_hz
     held = hold_factor(f, tick, setup.hold_ticks)
@@ -292,7 +294,7 @@ def _sweep(setup: Rig, window: Coherent, amplitude: Floats, result: BatchResult)
     )
 
 
-def _distortion(setup: Rig, result: BatchResult, held: Complexes) -> Floats:
+def _distortion(setup: LoopSetup, result: BatchResult, held: Complexes) -> Floats:
     """What is neither mean nor fundamental in front of the instrument (at the output: in the speed)."""
     angle = setup.point == "output"
     signal, factor = ("motor_speed_rad_s", 1.0) if angle else (setup.before, np.abs(held))

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.rig import STAGES, Rig, rig
 from analyses.validation.sweep import settling_ticks, stepped_sine
+from nonlinear.loop_setup import STAGES, LoopSetup, loop_setup
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -67,7 +67,7 @@ def multisine_response(design: Design, loop: str, frequency_hz: npt.ArrayLike, *
     """
     if loop not in STAGES:
         raise InputError(f"loop = {loop!r}: one of {', '.join(STAGES)}")
-    setup = rig(design, loop)
+    setup = loop_setup(design, loop)
     asked = np.sort(np.atleast_1d(np.asarray(frequency_hz, dtype=float)))
     if not asked.size or asked[0] <= 0.0 or asked[-1] >= 0.5 / setup.period_s:
         raise InputError(f"frequency_hz: positive and below {0.5 / setup.period_s:g} Hz (Nyquist)")
@@ -77,7 +77,7 @@ def multisine_response(design: Design, loop: str, frequency_hz: npt.ArrayLike, *
 
 
 def tone_sweep(
-    setup: Rig, frequency_hz: Floats, amplitude: Floats, settle_ticks: int, seed: int = 0
+    setup: LoopSetup, frequency_hz: Floats, amplitude: Floats, settle_ticks: int, seed: int = 0
 ) -> ToneSweep:
     """Measure at a rig, sharing the amplitudes that a sine of each (sorted) frequency may have."""
     samples = max(round(1.0 / (frequency_hz[0] * setup.period_s)), 2)
@@ -88,7 +88,7 @@ def tone_sweep(
 
 
 def _measure(
-    setup: Rig, lines: np.ndarray, samples: int, amplitude: Floats, settle_ticks: int, seed: int
+    setup: LoopSetup, lines: np.ndarray, samples: int, amplitude: Floats, settle_ticks: int, seed: int
 ) -> ToneSweep:
     """One run: settle, then whole periods; tones by the discrete Fourier transform of each period."""
     n = setup.hold_ticks

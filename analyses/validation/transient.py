@@ -20,9 +20,9 @@ import numpy.typing as npt
 from analyses.validation.coherent import coherent
 from analyses.validation.own_error import speed_bit
 from analyses.validation.response import Sweep
-from analyses.validation.rig import Rig
 from analyses.validation.step import StepMeasured, first_size, step_response, without_step
 from analyses.validation.sweep import LONGEST_SETTLE_TICKS
+from nonlinear.loop_setup import LoopSetup
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -41,12 +41,12 @@ class Transient:
 
     Attributes
     ----------
-    setup : Rig
+    setup : LoopSetup
     step, half : StepMeasured
         Of the whole and of half the step, both per unit.
     """
 
-    setup: Rig
+    setup: LoopSetup
     step: StepMeasured
     half: StepMeasured
 
@@ -106,7 +106,7 @@ def long_enough(slowest_ticks: float, hold_ticks: int) -> int | None:
     return min(ticks, longest) if least <= longest else None
 
 
-def coarse(setup: Rig, slowest_ticks: float) -> bool:
+def coarse(setup: LoopSetup, slowest_ticks: float) -> bool:
     """Whether rounding of a speed made of a long way is more than `FINE` of the step that is measured."""
     ticks = long_enough(slowest_ticks, setup.hold_ticks)
     if ticks is None:
@@ -114,7 +114,7 @@ def coarse(setup: Rig, slowest_ticks: float) -> bool:
     return float(speed_bit(setup, ticks)) > FINE * first_size(setup)
 
 
-def transient_of(setup: Rig, slowest_ticks: float) -> Transient | None:
+def transient_of(setup: LoopSetup, slowest_ticks: float) -> Transient | None:
     """Run both steps, ``slowest_ticks`` being the slowest time constant; ``None``: they would be too long."""
     ticks = long_enough(slowest_ticks, setup.hold_ticks)
     if ticks is None:

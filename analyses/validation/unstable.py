@@ -10,9 +10,9 @@ import numpy as np
 from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Design
 from analyses.loop_figures import LoopFigures
-from analyses.validation.bench import on_the_bench
 from analyses.validation.ledger import Entry, not_judged
 from nonlinear import State, commands, simulate
+from nonlinear.on_the_bench import on_the_bench
 
 SEED = 1e-6  # rad/s or A: the deviation that a run begins with
 WATCHED = 16.0  # time constants of the growth: a factor of nine million

@@ -19,8 +19,6 @@ from actuator_lti.errors import InputError, TooManyTicks
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
-from analyses.validation.bench import on_the_bench
-from analyses.validation.bias_motion import bias_motion, may_stand, on_its_stand
 from analyses.validation.breakaway import breakaway_entry
 from analyses.validation.budget import Budget, OutOfTime
 from analyses.validation.coherent import LEAST_SAMPLES
@@ -46,7 +44,6 @@ from analyses.validation.ledger import (
 from analyses.validation.release import AmplitudeMargin, release_margins
 from analyses.validation.response import Sweep, errors_beside, linear_response, sweep_errors
 from analyses.validation.result import LoopValidation, PointValidation, Validation
-from analyses.validation.rig import Rig, every, points_of, rig, small_rig, stages_of
 from analyses.validation.settings import Settings
 from analyses.validation.steady import steady_entry
 from analyses.validation.sweep import (
@@ -59,6 +56,9 @@ from analyses.validation.tones import tone_sweep
 from analyses.validation.transient import coarse, is_slow, transient_of
 from analyses.validation.unstable import unstable_entry
 from nonlinear import Rows
+from nonlinear.loop_setup import LoopSetup, every, loop_setup, points_of, stages_of, standing_setup
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import may_stand, on_its_stand, operating_motion
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loop, Loops
@@ -140,7 +140,7 @@ class _Work:
     figures: dict[str, LoopFigures] = field(default_factory=dict)
     settle: dict[str, int] = field(default_factory=dict)
     held: Loop | None = None
-    rigs: dict[str, Rig] = field(default_factory=dict)
+    rigs: dict[str, LoopSetup] = field(default_factory=dict)
     held_by_friction: tuple[str, ...] = ()
     answer_loops: Any = None
     at: dict[str, Any] = field(default_factory=dict)
@@ -279,7 +279,7 @@ class _Work:
         """The linear loops, their figures, and the rigs to test them on."""
         from actuator_lti.loops import assemble_loops
 
-        point = bias_motion(self.linear).operating(
+        point = operating_motion(self.linear).operating(
             self.linear
         )  # a drive without steady motion cannot be tested
         at = {"operating_point": point.point, "speed_rad_s": point.speed_rad_s}
@@ -293,7 +293,7 @@ class _Work:
         for name, loop in self._stage_loops().items():
             self.figures[name] = loop_figures(loop)
             if self.figures[name].stable:
-                held = rig(self.linear, name).hold_ticks
+                held = loop_setup(self.linear, name).hold_ticks
                 self.settle[name] = settling_ticks_of(loop.plain_closed, held, self.design.name)
         position = self.design.controller.position
         if position is not None and position.feedforward != 0.0:
@@ -318,13 +318,13 @@ class _Work:
     def _measured(self, name: str, loop: Loop) -> LoopValidation:
         """Sweep one stable loop and read its figures."""
         figures = self.figures[name]
-        setup, settle = rig(self.linear, name, held=name == "current"), self.settle[name]
+        setup, settle = loop_setup(self.linear, name, held=name == "current"), self.settle[name]
         whole = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, LONGEST_STEP_TICKS)
         ever = settling_ticks_of(loop.plain_closed, setup.hold_ticks, self.design.name, EVER_TICKS)
         slowest, asked = ever / SETTLE_TIME_CONSTANTS, self._frequencies(name, loop)
         slow = is_slow(asked, self.design.controller.period_s, setup.base_ticks, ever)
         if slow and coarse(setup, slowest):
-            setup = small_rig(self.linear, name, held=name == "current")
+            setup = standing_setup(self.linear, name, held=name == "current")
         self.rigs[name] = setup
         transient = transient_of(setup, slowest) if slow else None
         if transient is not None and transient.settled:
@@ -398,10 +398,10 @@ class _Work:
         for name, settle in self.settle.items():
             loop, margins = self._stage_loops()[name], self.figures[name].margins
             questions += stage_questions(
-                small_rig(self.linear, name, held=name == "current"), loop, margins, settle
+                standing_setup(self.linear, name, held=name == "current"), loop, margins, settle
             )
         if self.settle and len(self.settle) == len(self.figures):
-            setups = {point: small_rig(self.linear, point) for point in self._inner_points()}
+            setups = {point: standing_setup(self.linear, point) for point in self._inner_points()}
             questions += point_questions(setups, self.loops, max(self.settle.values()), self._exact)
         return confirm_margins(questions)
 
@@ -417,7 +417,7 @@ class _Work:
     def _inner_points(self) -> list[str]:
         """Break points whose loop differs from that of a stage: all but the outermost, and the output."""
         outermost = stages_of(self.design)[-1]
-        own = rig(self.linear, outermost).point
+        own = loop_setup(self.linear, outermost).point
         return [point for point in points_of(self.design) if point not in ("output", own)] or [own]
 
     def _points(self, confirmed: tuple[Confirmation, ...]) -> dict[str, PointValidation]:
@@ -433,13 +433,13 @@ class _Work:
                 top = THIRD_OF_NYQUIST / (loop.period_s or 1.0)
                 outermost = stages_of(self.design)[-1]
                 asked = np.geomspace(self._lowest(outermost), top, self.settings.point_frequencies)
-                sweep = stepped_sine(rig(self.linear, point), asked, self.settle[outermost])
+                sweep = stepped_sine(loop_setup(self.linear, point), asked, self.settle[outermost])
                 errors = errors_beside(sweep, periodic_loop(self.loops, point))
             result[point] = PointValidation(point, sweep, errors, own)
         return result
 
     def _release(self, confirmed: tuple[Confirmation, ...]) -> tuple[AmplitudeMargin, ...]:
-        setups: dict[str, Rig] = {name: rig(self.linear, name) for name in self.settle}
+        setups: dict[str, LoopSetup] = {name: loop_setup(self.linear, name) for name in self.settle}
         return release_margins(setups, confirmed, self.settle)
 
     @cached_property
@@ -460,7 +460,7 @@ class _Work:
         design, response = self._steered, self.loops.plain_response
         if response is None:
             return None
-        # where it stands here, it has the slope of friction at rest, not that of its bias motion
+        # where it stands here, it has the slope of friction at rest, not that of its operating motion
         at = {} if may_stand(design) else self.at
         self.answer_loops = assemble_loops(self._model_steered, **at)
         system = self.answer_loops.plain_response
@@ -486,7 +486,7 @@ class _Work:
         loops = self._stage_loops()
         own = [settling_ticks_of(system, base, self.design.name, EVER_TICKS)]
         for name in self.settle:
-            held = rig(self.linear, name).hold_ticks
+            held = loop_setup(self.linear, name).hold_ticks
             own.append(settling_ticks_of(loops[name].plain_closed, held, self.design.name, EVER_TICKS))
         return max(own)
 
@@ -530,14 +530,14 @@ class _Work:
             sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)
         loop = self.loops.present["position"]
         ever = settling_ticks_of(
-            loop.plain_closed, rig(self.linear, "position").hold_ticks, design.name, EVER_TICKS
+            loop.plain_closed, loop_setup(self.linear, "position").hold_ticks, design.name, EVER_TICKS
         )
         return sweep, steps_from_rest(design, settle, ever / SETTLE_TIME_CONSTANTS)
 
     def _conditional(self) -> Conditional:
         slow = settling_ticks_of(
             self.loops.present["position"].plain_closed,
-            rig(self.linear, "position").hold_ticks,
+            loop_setup(self.linear, "position").hold_ticks,
             self.design.name,
             LONGEST_STEP_TICKS,
         )

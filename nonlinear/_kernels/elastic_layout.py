@@ -58,27 +58,28 @@ STEP_SIZE = 35
 EL_LEAST = EL_MODES + MODE_CHORD  # length of the row that is needed to work out its length
 
 # --- state; current, speed, angle and direction of slip of the motor are those of every drive -----------
-ES_LOAD_SPEED = layout.ELASTIC_STATE  # W
-ES_TWIST = layout.ELASTIC_STATE + 1  # delta = th/N_c - phi
-ES_LOAD_ANGLE = layout.ELASTIC_STATE + 2  # phi
-ES_SEGMENT = layout.ELASTIC_STATE + 3  # of the friction map
-ES_LOAD = layout.ELASTIC_STATE + 4  # direction of slip of the load: 1, -1, 0
-ES_CONTACT = layout.ELASTIC_STATE + 5  # GAP, 1 or -1 in contact, 2 or -2 parted while |delta| > b
-ES_HAPPENED = layout.ELASTIC_STATE + 6  # events of the last held segment
+ES_LOAD_SPEED: layout.Continuous = layout.ELASTIC_STATE  # W
+ES_TWIST: layout.Continuous = layout.ELASTIC_STATE + 1  # delta = th/N_c - phi
+ES_LOAD_ANGLE: layout.Continuous = layout.ELASTIC_STATE + 2  # phi
+ES_SEGMENT: layout.Flag = layout.ELASTIC_STATE + 3  # of the friction map
+ES_LOAD: layout.Flag = layout.ELASTIC_STATE + 4  # direction of slip of the load: 1, -1, 0
+ES_CONTACT: layout.Flag = layout.ELASTIC_STATE + 5  # GAP, 1 or -1 in contact, 2 or -2 parted, |delta| > b
+ES_HAPPENED: layout.Flag = layout.ELASTIC_STATE + 6  # events of the last held segment
 # what follows from the mode, kept until it changes
-ES_MODE = layout.ELASTIC_STATE + 7  # place of the mode in p
-ES_MOTOR_TORQUE = layout.ELASTIC_STATE + 8  # constant torque on the motor
-ES_MOTOR_DRY = layout.ELASTIC_STATE + 9  # torque on the motor per |M_ext|
-ES_LOAD_TORQUE = layout.ELASTIC_STATE + 10  # constant torque on the load
-ES_GUARDS = layout.ELASTIC_STATE + 11  # number of guards
-ES_GUARD = layout.ELASTIC_STATE + 12
+ES_MODE: layout.Flag = layout.ELASTIC_STATE + 7  # place of the mode in p
+ES_MOTOR_TORQUE: layout.Flag = layout.ELASTIC_STATE + 8  # constant torque on the motor
+ES_MOTOR_DRY: layout.Flag = layout.ELASTIC_STATE + 9  # torque on the motor per |M_ext|
+ES_LOAD_TORQUE: layout.Flag = layout.ELASTIC_STATE + 10  # constant torque on the load
+ES_GUARDS: layout.Flag = layout.ELASTIC_STATE + 11  # number of guards
+ES_GUARD: layout.Flag = layout.ELASTIC_STATE + 12
 # one guard: an affine function of state and inputs that stays positive in this mode
 (G_I, G_W, G_V, G_D, G_ONE, G_U, G_M, G_ABS_M, G_EXTRA, G_CURVE, G_EVENT, GUARD_SIZE) = range(12)
 # work space: the held inputs, then the Taylor coefficients of (i, w, W, delta) and of one guard
-ES_INPUT = ES_GUARD + MAX_GUARDS * GUARD_SIZE  # u, motor torque, load torque, M_ext, |M_ext|, extra torque
+ES_INPUT: layout.Note = ES_GUARD + MAX_GUARDS * GUARD_SIZE
+# u, motor torque, load torque, M_ext, |M_ext|, extra torque
 IN_U, IN_MOTOR, IN_LOAD, IN_M, IN_ABS_M, IN_EXTRA, IN_SIZE = range(7)
-ES_SERIES = ES_INPUT + IN_SIZE
-ES_POLYNOMIAL = ES_SERIES + 4 * (MAX_TERMS + 1)
+ES_SERIES: layout.Work = ES_INPUT + IN_SIZE
+ES_POLYNOMIAL: layout.Work = ES_SERIES + 4 * (MAX_TERMS + 1)
 ES_END = ES_POLYNOMIAL + MAX_TERMS + 1
 
 GAP = 0.0

@@ -11,6 +11,9 @@ units are SI, motor side.
 
 from __future__ import annotations
 
+from itertools import count
+from typing import Annotated
+
 from actuator_lti.drive import signals
 
 # --- parameters of one run -------------------------------------------------------------------------
@@ -259,63 +262,69 @@ TANH_FORMS = TANH + TANH_SIZE
 TANH_FORMS_SIZE = 2 * LEVELS * TANH_FORM
 
 # --- the state of the drive -------------------------------------------------------------------------
-(
-    S_TICK,
-    S_STATUS,
-    S_CURRENT,
-    S_SPEED,
-    S_ANGLE,
-    S_DIRECTION,  # 1, -1 slipping, 0 at rest
-    S_OUTPUT,  # output angle where the drive train is elastic
-    S_OUTPUT_SPEED,
-    S_HELD,  # voltage that acted last
-    S_LOAD,  # hinge moment of this tick
-    S_DRY,  # dry friction of this tick, forward
-    S_DRY_REVERSE,
-    S_TORQUE,  # torque beside motor and dry friction
-    S_EXTRA,  # its part that is an extra torque at the motor shaft
-    S_UNTIL_OUTER,  # ticks until the outermost stage is updated
-    S_UNTIL_VELOCITY,
-    S_CURRENT_INTEGRATOR,
-    S_VELOCITY_INTEGRATOR,
-    S_POSITION_INTEGRATOR,
-    S_SPEED_COMMAND,  # after both limits
-    S_SPEED_REFERENCE,  # w_ref: the same, behind its probe
-    S_CURRENT_BEFORE,
-    S_CURRENT_REFERENCE,
-    S_VOLTAGE_BEFORE,
-    S_VOLTAGE,
-    S_OUTPUT_BEFORE,
-    S_OUTPUT_AFTER,
-    S_MEASURED_SPEED,
-    S_FILTERED_SPEED,  # before the speed filters
-    S_TRACKED_ANGLE,
-    S_TRACKED_SPEED,
-    S_FLAGS_OUTER,  # limiters that acted at the last update of each stage
-    S_FLAGS_PROFILE,
-    S_FLAGS_VELOCITY,
-    S_FLAGS_CURRENT,
-    S_REFERENCE,  # shaped command of the last update, motor side, and the one before
-    S_REFERENCE_BEFORE,
-    S_ERROR,
-    S_ERROR_RATE,
-    S_TORQUE_FEEDFORWARD,  # i_ff, held
-    S_PROFILE,  # position of the profile, its speed, and the command of the last update
-    S_PROFILE_SPEED,
-    S_PROFILE_COMMAND,
-    S_AVERAGE_PLACE,
-    S_AVERAGE_SUM,
-    S_CURRENT_LIMIT,  # of this tick
-    S_VOLTAGE_LIMIT,
-    S_OVERLOAD,
-    S_OVERLOADED,
-    S_EVENTS,  # in all
-    S_MAX_EVENTS,  # most in one tick
-) = range(51)
+# what each number of it is; the kind of a name holds up to the next that has one (`state_kinds`)
+Continuous = Annotated[int, "continuous"]  # a quantity that the next tick goes on from
+Counter = Annotated[int, "counter"]  # ticks, events, and places in a ring
+Flag = Annotated[int, "flag"]  # which piece of the drive acts, and what follows from that alone
+Note = Annotated[int, "note"]  # held for reading (by jitter, too), and the random streams
+Work = Annotated[int, "work"]  # work space: written before it is read
+
+_places = count()
+S_TICK: Counter = next(_places)
+S_STATUS: Flag = next(_places)
+S_CURRENT: Continuous = next(_places)
+S_SPEED: Continuous = next(_places)
+S_ANGLE: Continuous = next(_places)
+S_DIRECTION: Flag = next(_places)  # 1, -1 slipping, 0 at rest
+S_OUTPUT: Continuous = next(_places)  # output angle where the drive train is elastic
+S_OUTPUT_SPEED: Continuous = next(_places)
+S_HELD: Note = next(_places)  # voltage that acted last
+S_LOAD: Continuous = next(_places)  # hinge moment of this tick
+S_DRY: Continuous = next(_places)  # dry friction of this tick, forward
+S_DRY_REVERSE: Continuous = next(_places)
+S_TORQUE: Continuous = next(_places)  # torque beside motor and dry friction
+S_EXTRA: Continuous = next(_places)  # its part that is an extra torque at the motor shaft
+S_UNTIL_OUTER: Counter = next(_places)  # ticks until the outermost stage is updated
+S_UNTIL_VELOCITY: Counter = next(_places)
+S_CURRENT_INTEGRATOR: Continuous = next(_places)
+S_VELOCITY_INTEGRATOR: Continuous = next(_places)
+S_POSITION_INTEGRATOR: Continuous = next(_places)
+S_SPEED_COMMAND: Continuous = next(_places)  # after both limits
+S_SPEED_REFERENCE: Continuous = next(_places)  # w_ref: the same, behind its probe
+S_CURRENT_BEFORE: Continuous = next(_places)
+S_CURRENT_REFERENCE: Continuous = next(_places)
+S_VOLTAGE_BEFORE: Note = next(_places)
+S_VOLTAGE: Continuous = next(_places)
+S_OUTPUT_BEFORE: Note = next(_places)
+S_OUTPUT_AFTER: Note = next(_places)
+S_MEASURED_SPEED: Continuous = next(_places)
+S_FILTERED_SPEED: Continuous = next(_places)  # before the speed filters
+S_TRACKED_ANGLE: Continuous = next(_places)
+S_TRACKED_SPEED: Continuous = next(_places)
+S_FLAGS_OUTER: Flag = next(_places)  # limiters that acted at the last update of each stage
+S_FLAGS_PROFILE: Flag = next(_places)
+S_FLAGS_VELOCITY: Flag = next(_places)
+S_FLAGS_CURRENT: Flag = next(_places)
+S_REFERENCE: Continuous = next(_places)  # shaped command of the last update, motor side, and the one before
+S_REFERENCE_BEFORE: Continuous = next(_places)
+S_ERROR: Continuous = next(_places)
+S_ERROR_RATE: Continuous = next(_places)
+S_TORQUE_FEEDFORWARD: Continuous = next(_places)  # i_ff, held
+S_PROFILE: Continuous = next(_places)  # position of the profile, its speed, the command of the last update
+S_PROFILE_SPEED: Continuous = next(_places)
+S_PROFILE_COMMAND: Continuous = next(_places)
+S_AVERAGE_PLACE: Counter = next(_places)
+S_AVERAGE_SUM: Continuous = next(_places)
+S_CURRENT_LIMIT: Flag = next(_places)  # of this tick
+S_VOLTAGE_LIMIT: Continuous = next(_places)
+S_OVERLOAD: Continuous = next(_places)
+S_OVERLOADED: Flag = next(_places)
+S_EVENTS: Counter = next(_places)  # in all
+S_MAX_EVENTS: Counter = next(_places)  # most in one tick
 STATE_NAMES = frozenset(name for name in dir() if name.startswith("S_"))
-S_NOISE = S_MAX_EVENTS + 1  # four random streams of two numbers: current, angle, output angle, jitter
+S_NOISE: Note = next(_places)  # four random streams of two numbers: current, angle, output angle, jitter
 NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)
-S_ENERGY = S_NOISE + 8
+S_ENERGY: Note = S_NOISE + 8
 (
     ENERGY_INPUT,  # integral of u i
     ENERGY_COPPER,  # integral of R i^2
@@ -335,13 +344,15 @@ S_ENERGY = S_NOISE + 8
     ENERGY_LOAD_OFFSET,
 ) = range(16)
 ENERGY_SIZE = 16
-S_COMMAND_CHAIN = S_ENERGY + ENERGY_SIZE
-S_SPEED_CHAIN = S_COMMAND_CHAIN + 2
-S_TORQUE_CHAIN = S_SPEED_CHAIN + 2 * MAX_SECTIONS
-S_PROBE_PLACES = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
+S_COMMAND_CHAIN: Continuous = S_ENERGY + ENERGY_SIZE
+S_SPEED_CHAIN: Continuous = S_COMMAND_CHAIN + 2
+S_TORQUE_CHAIN: Continuous = S_SPEED_CHAIN + 2 * MAX_SECTIONS
+S_PROBE_PLACES: Counter = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
 ELASTIC_STATE = S_PROBE_PLACES + 4
 ELASTIC_STATE_SIZE = 179
-S_QUEUE = ELASTIC_STATE + ELASTIC_STATE_SIZE  # the delay line, oldest first; then angles, average, rings
+S_QUEUE: Continuous = (
+    ELASTIC_STATE + ELASTIC_STATE_SIZE
+)  # delay line, oldest first; then angles, average, rings
 WORK_SIZE = 4 * 49 + 24  # four matrices of 7 by 7, and what is made of them
 WORK_MORE = 4 * 49
 

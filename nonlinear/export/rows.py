@@ -12,7 +12,7 @@ from functools import cache
 from actuator_lti.drive.signals import LIMITERS
 from nonlinear._kernels import layout as at
 
-_LINE = re.compile(r"^\s*(?P<names>[A-Z][A-Z_0-9]*)(?P<end>,| =[^#]*)\s*(?:#\s*(?P<words>.*))?$")
+_LINE = re.compile(r"^\s*(?P<names>[A-Z][A-Z_0-9]*)(?P<end>,|(?:: \w+)? =[^#]*)\s*(?:#\s*(?P<words>.*))?$")
 
 # SI, motor side (linear axis: read N for N m, m for rad, kg for kg m2); what is not here has no unit
 UNITS = {

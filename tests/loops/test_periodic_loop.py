@@ -9,8 +9,8 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.resolvent import responses
-from analyses.validation.bench import on_the_bench
-from analyses.validation.bias_motion import on_its_stand
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import on_its_stand
 from tests.validation.random_drives import full_drive
 
 SYSTEMS = [  # of one state, by turns

@@ -21,9 +21,9 @@ from analyses.validation.confirm import (
     stage_questions,
 )
 from analyses.validation.release import release_margins
-from analyses.validation.rig import rig, small_rig
 from analyses.validation.sweep import settling_ticks_of
 from analyses.validation.validate import _Work
+from nonlinear.loop_setup import loop_setup, standing_setup
 from tests.validation.random_drives import full_drive
 
 SMALL = Settings(
@@ -43,10 +43,10 @@ def confirmed(name: str) -> tuple[Confirmation, ...]:
     loops = assemble_loops(design)
     questions, settle = [], {}
     for stage, loop in loops.present.items():
-        setup = rig(design, stage)
+        setup = loop_setup(design, stage)
         settle[stage] = settling_ticks_of(loop.closed_loop, setup.hold_ticks, name)
         questions += stage_questions(setup, loop, stability_margins(loop.open_loop), settle[stage])
-    points = {point: rig(design, point) for point in loops.break_points if point != "output"}
+    points = {point: loop_setup(design, point) for point in loops.break_points if point != "output"}
     questions += point_questions(points, loops, settle["position"])
     return confirm_margins(questions)
 
@@ -98,7 +98,7 @@ def test_a_wrong_prediction_fails() -> None:
 
 def test_a_wrong_idea_of_the_frequency_does_not_move_the_border() -> None:
     """Windows fitted to a frequency that is off by 4 % cost accuracy, not the answer."""
-    setup = rig(load_design("ilr33-amber"), "velocity")
+    setup = loop_setup(load_design("ilr33-amber"), "velocity")
     right, wrong = find_borders([Search(setup, "gain up", f, 1500) for f in (997.3, 1040.0)])
     assert right.value is not None
     assert wrong.value == pytest.approx(right.value, rel=5e-3)
@@ -123,7 +123,7 @@ def test_amplitude_and_friction_move_the_border() -> None:
     current limit, which bounds the acceleration, takes from that of the position loop (ilr33-amber)."""
     design = load_design("ilr33-amber")
     loops = assemble_loops(design)
-    setups = {name: rig(design, name) for name in loops.present}
+    setups = {name: loop_setup(design, name) for name in loops.present}
     settle = {
         name: settling_ticks_of(loop.closed_loop, setups[name].hold_ticks, "")
         for name, loop in loops.present.items()
@@ -214,7 +214,7 @@ def test_an_oscillation_that_is_slow_against_its_tick_is_followed(seed: int, kin
     design = full_drive(seed)
     work = _Work(design, SMALL, None, design)
     work.loops = work._assemble()
-    asked = point_questions({"u": small_rig(work.linear, "u")}, work.loops, 1000)
+    asked = point_questions({"u": standing_setup(work.linear, "u")}, work.loops, 1000)
     (item,) = confirm_margins([one for one in asked if one.kind == kind])
     assert item.predicted_hz == pytest.approx(hertz, rel=1e-2)
     assert item.border.value == pytest.approx(item.predicted, rel=1e-4)
@@ -222,7 +222,7 @@ def test_an_oscillation_that_is_slow_against_its_tick_is_followed(seed: int, kin
 
 
 def test_an_oscillation_too_slow_to_be_followed_is_said() -> None:
-    setup = rig(load_design("ilr33-amber"), "velocity")
+    setup = loop_setup(load_design("ilr33-amber"), "velocity")
     (border,) = find_borders([Search(setup, "gain up", 1e-3, 1000)])
     assert border.value is None
     assert "too many ticks" in border.unknown
@@ -233,7 +233,7 @@ def test_a_slow_filter_of_the_command_makes_no_border() -> None:
     design = full_drive(70093)
     work = _Work(design, SMALL, None, design)
     work.loops = work._assemble()
-    asked = point_questions({"u": small_rig(work.linear, "u")}, work.loops, 1000)
+    asked = point_questions({"u": standing_setup(work.linear, "u")}, work.loops, 1000)
     up = next(item for item in confirm_margins(asked) if item.kind == "gain up")
     assert up.border.value == pytest.approx(2.9846, rel=1e-3)  # what runs in time show
     assert up.predicted == pytest.approx(up.border.value, rel=3e-4)

@@ -11,11 +11,11 @@ from small_settings import SMALL
 from actuator_lti import load_design
 from actuator_lti.design.model import Coupling, Design, Gravity, Load
 from analyses.validation import validate
-from analyses.validation.bench import on_the_bench
-from analyses.validation.bias_motion import bias_motion_at, on_its_stand
 from analyses.validation.reading import crossing, maximum
-from analyses.validation.rig import rig, small_rig
 from analyses.validation.tolerance import allowed
+from nonlinear.loop_setup import loop_setup, standing_setup
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import on_its_stand, operating_motion_at
 from reports.sections.validation import section
 
 AMBER = load_design("ilr33-amber")
@@ -76,7 +76,7 @@ def test_a_ride_begins_in_its_steady_state(loop: str) -> None:
         load=replace(AMBER.load, path="back-drivable"),
         coupling=Coupling(stiffness_Nm_rad=4e3, damping_Nms_rad=1.0, play_rad=2e-4),
     )
-    setup = rig(on_the_bench(design), loop)
+    setup = loop_setup(on_the_bench(design), loop)
     row = setup.row()
     row["ticks"] = 2000
     run = row.trajectory()
@@ -91,7 +91,7 @@ def test_gravity_is_held_while_the_drive_stands() -> None:
     gravity = Gravity(mass_kg=1.0, arm_m=0.1, offset_rad=0.5)
     load = Load(inertia_kgm2=1e-3, path="back-drivable", gravity=gravity)
     design = on_its_stand(on_the_bench(replace(AMBER, load=load)))
-    row = small_rig(design, "position").row()
+    row = standing_setup(design, "position").row()
     row["ticks"] = 2000
     run = row.trajectory()
     assert np.abs(run.output_angle_rad).max() < 1e-15
@@ -102,7 +102,7 @@ def test_gravity_is_held_while_the_drive_stands() -> None:
 def test_the_current_of_a_ride_is_that_of_the_friction() -> None:
     """Equations (2) and (9) by hand, with an AC motor: kM is its torque per rms ampere over sqrt(3/2)."""
     ac = replace(AMBER, motor=replace(AMBER.motor, constants="rms-line"))
-    result, friction = bias_motion_at(ac, 50.0), AMBER.friction
+    result, friction = operating_motion_at(ac, 50.0), AMBER.friction
     kM = (AMBER.motor.torque_constant_Nm_A or 0.0) / np.sqrt(1.5)
     torque = friction.dry_torque_Nm + 50.0 * friction.viscous_Nms_rad + friction.offset_torque_Nm
     assert result.current_A == pytest.approx(torque / kM, rel=1e-12)

@@ -11,10 +11,10 @@ import pytest
 from actuator_lti import InputError, load_design
 from actuator_lti.errors import TooManyTicks
 from analyses.validation import QUICK, Settings, Validation, validate
-from analyses.validation.bias_motion import bias_motion, bias_motion_at
 from analyses.validation.ledger import Entry, entry, not_judged
 from analyses.validation.reading import Reading
 from analyses.validation.validate import _Work
+from nonlinear.operating_motion import operating_motion, operating_motion_at
 from reports.cli.main import main
 from reports.sections.validation import section
 
@@ -128,11 +128,11 @@ def test_an_unstable_loop_is_reported_not_raised() -> None:
 
 def test_ride_leaves_room_everywhere() -> None:
     design = load_design("ilr33-amber")
-    limits, result = design.limits, bias_motion(design)
+    limits, result = design.limits, operating_motion(design)
     assert 0.2 * limits.speed_rad_s < result.speed_rad_s <= 0.4 * limits.speed_rad_s
     assert result.voltage_V <= 0.4 * limits.voltage_V
     assert result.current_A <= 0.4 * limits.peak_current_A
-    at_speed = bias_motion_at(design, 100.0)
+    at_speed = operating_motion_at(design, 100.0)
     friction = design.friction
     assert at_speed.current_A * 5.9e-3 == pytest.approx(
         friction.dry_Nm(0.0) + 100.0 * friction.viscous(), rel=1e-12

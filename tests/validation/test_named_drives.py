@@ -13,8 +13,8 @@ from analyses.isolation import isolated
 from analyses.validation import validate
 from analyses.validation.response import linear_response
 from analyses.validation.result import Validation
-from analyses.validation.rig import rig
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
+from nonlinear.loop_setup import loop_setup
 
 FEW = replace(SMALL, frequencies=8, rest_frequencies=4)
 
@@ -56,7 +56,7 @@ def test_ticks_of_a_microsecond() -> None:
     loop = loops.present["velocity"]
     settle = settling_ticks_of(loop.closed_loop, 1, design.name)
     assert settle > 10_000
-    sweep = stepped_sine(rig(design, "velocity"), [100.0, 1000.0, 10_000.0], settle)
+    sweep = stepped_sine(loop_setup(design, "velocity"), [100.0, 1000.0, 10_000.0], settle)
     assert sweep.reason == ("", "", "")
     off = abs(sweep.open_loop / linear_response(loop.open_loop, sweep.frequency_hz) - 1.0)
     assert off.max() < 1e-4

@@ -25,13 +25,13 @@ from actuator_lti.design.model import (
 )
 from analyses.large_signal.border import check_border
 from analyses.loop_figures import loop_figures
-from analyses.validation.bench import on_the_bench
 from analyses.validation.confirm import confirm_margins, stage_questions
 from analyses.validation.figures import point_errors
 from analyses.validation.response import linear_response
-from analyses.validation.rig import rig, small_rig
 from analyses.validation.sweep import settling_ticks_of, stepped_sine
 from analyses.validation.tolerance import allowed
+from nonlinear.loop_setup import loop_setup, standing_setup
+from nonlinear.on_the_bench import on_the_bench
 from reports.sections.margins import margin_row
 from tests.validation.random_drives import full_drive
 
@@ -40,7 +40,7 @@ def test_a_slow_transient_is_waited_for() -> None:
     """Modes of 2400 and 6300 ticks against each other: after 20 000 ticks two windows hide them."""
     design = on_the_bench(full_drive(412))
     loop = assemble_loops(design).present["velocity"]
-    setup = rig(design, "velocity")
+    setup = loop_setup(design, "velocity")
     settle = settling_ticks_of(loop.closed_loop, setup.hold_ticks, design.name)
     assert settle > 80_000
     sweep = stepped_sine(setup, np.array([20.0, 83.0, 300.0]), settle)
@@ -129,7 +129,7 @@ def arm() -> Design:
 def test_an_arm_that_swings_slowly_on_its_way_to_the_border() -> None:
     """It drifts away below g = c Tn/(N^2 Kp kM), c = m g l, and swings slower than any loop above that."""
     design = arm()
-    setup = small_rig(design, "velocity")
+    setup = standing_setup(design, "velocity")
     loop = assemble_loops(design).present["velocity"]
     settle = settling_ticks_of(loop.closed_loop, setup.hold_ticks, design.name)
     questions = stage_questions(setup, loop, stability_margins(loop.open_loop), settle)

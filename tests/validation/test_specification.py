@@ -17,8 +17,8 @@ from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
 from analyses.specification.manoeuvres import thermal_duty
 from analyses.specification.plane import torque_speed_plane
-from analyses.validation.bench import on_the_bench
 from nonlinear import commands, simulate
+from nonlinear.on_the_bench import on_the_bench
 from reports import document as doc
 from reports.figures.registry import draw_svg
 from reports.sections import friction_effects as friction_section

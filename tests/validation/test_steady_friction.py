@@ -8,9 +8,9 @@ import pytest
 
 from actuator_lti import load_design
 from analyses.validation import validate
-from analyses.validation.bench import on_the_bench
-from analyses.validation.bias_motion import bias_motion
 from analyses.validation.steady import level, steady_entry
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import operating_motion
 from tests.validation.random_drives import full_drive
 from tests.validation.small_settings import SMALL
 
@@ -21,7 +21,7 @@ def test_the_fin_s_friction_by_hand() -> None:
     """kM i = Tc + b w + k_L |T_s| + T_s/N with T_s = Tc_l + b_l w/N - M, without the slope of M."""
     design = on_the_bench(load_design("fin"))
     row = steady_entry(design, design, SETTLE)
-    motion = bias_motion(level(design))
+    motion = operating_motion(level(design))
     w, M = motion.speed_rad_s, motion.load_Nm
     spring = 0.05 + 0.02 * w / 60.0 - M
     wanted = (8e-3 + 1e-5 * w + 1.7e-3 * abs(spring) + spring / 60.0) / 0.03
@@ -55,7 +55,7 @@ def test_damping_of_the_load_is_part_of_a_constant_speed() -> None:
     D, CM, N = 0.05, amber.friction.load_coefficient, amber.total_ratio
     design = replace(amber, load=replace(amber.load, path="back-drivable", moment_damping_Nms_rad=D))
     row = steady_entry(design, design, SETTLE)
-    w = bias_motion(design).speed_rad_s
+    w = operating_motion(design).speed_rad_s
     friction, motor = design.friction, design.motor
     torque = friction.dry_torque_Nm + friction.viscous_Nms_rad * w + D * w / N**2 + CM * D * w / N
     assert CM > 0.0

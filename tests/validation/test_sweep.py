@@ -10,12 +10,12 @@ import pytest
 from actuator_lti import InputError, assemble_loops, load_design
 from analyses.validation import sweep as module
 from analyses.validation.at_rest import free_amplitude, sweep_from_rest
-from analyses.validation.bias_motion import bias_motion_at
 from analyses.validation.coherent import coherent, hold_factor
 from analyses.validation.response import sweep_errors
-from analyses.validation.rig import Rig, rig
 from analyses.validation.sweep import frequency_response, stepped_sine
 from analyses.validation.tones import multisine_response
+from nonlinear.loop_setup import LoopSetup, loop_setup
+from nonlinear.operating_motion import operating_motion_at
 
 DESIGNS = ("ilr33-amber", "ilr33-amber-multirate")
 LOOPS = ("current", "velocity", "position", "u", "i_ref", "w_ref", "output")
@@ -29,7 +29,7 @@ def test_every_loop_and_break_point_up_to_a_third_of_nyquist(name: str, loop: st
     linear = loops.present.get(loop) or loops.break_points[loop]
     sweep = frequency_response(design, loop, np.geomspace(3.0, 0.5 / 3.0 / linear.period_s, 25))
     assert sweep.valid.all()
-    assert sweep.speed_rad_s > 100.0  # on its bias motion
+    assert sweep.speed_rad_s > 100.0  # on its operating motion
     for response in ("open_loop", "closed_loop", "sensitivity"):
         errors = sweep_errors(sweep, linear, response)
         # the simulator is exact: a hundredth of what is asked for, limited by what has not died out
@@ -72,14 +72,14 @@ def test_amplitudes_keep_clear_of_limits_and_reversal() -> None:
     design = load_design("ilr33-amber")
     sweep = frequency_response(design, "position", np.geomspace(5.0, 300.0, 8))
     assert sweep.valid.all()
-    # large enough to be measured on a bench: the speed moves by several percent of the bias motion
+    # large enough to be measured on a bench: the speed moves by several percent of the operating motion
     moved = np.abs(sweep.plant * sweep.sensitivity) * sweep.amplitude
     assert moved.max() > 0.05 * sweep.speed_rad_s
 
 
 def test_a_point_that_has_not_settled_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rule H3: two windows that differ are not called steady; extended, the same point is."""
-    setup = rig(load_design("ilr33-amber"), "velocity")
+    setup = loop_setup(load_design("ilr33-amber"), "velocity")
     monkeypatch.setattr(module, "EXTENSIONS", 0)
     hasty = stepped_sine(setup, np.array([150.0]), 1)
     assert hasty.reason == ("not steady",)
@@ -91,7 +91,7 @@ def test_a_point_that_has_not_settled_is_not_reported(monkeypatch: pytest.Monkey
 
 
 def test_a_limit_that_acts_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    setup = rig(load_design("ilr33-amber"), "velocity")
+    setup = loop_setup(load_design("ilr33-amber"), "velocity")
     monkeypatch.setattr(module, "EXTENSIONS", 0)
     loud = stepped_sine(setup, np.array([150.0]), 2000, amplitude=np.array([30.0]))
     assert loud.reason == ("current limit",)
@@ -102,17 +102,17 @@ def test_a_limit_that_acts_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_reversal_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bias motion so slow that a sine which no limit notices turns the rotor back."""
+    """A operating motion so slow that a sine which no limit notices turns the rotor back."""
     design = load_design("ilr33-amber")
-    setup = Rig(design, "position", bias_motion_at(design, 20.0))
+    setup = LoopSetup(design, "position", operating_motion_at(design, 20.0))
     monkeypatch.setattr(module, "EXTENSIONS", 0)
     loud = stepped_sine(setup, np.array([60.0]), 2000, amplitude=np.array([60.0]))
     assert loud.reason == ("speed reversal",)
 
 
 def test_distortion_is_that_of_the_signal() -> None:
-    """Linear on the bias motion: nothing but the fundamental; with a limit acting: harmonics."""
-    setup = rig(load_design("ilr33-amber"), "velocity")
+    """Linear on the operating motion: nothing but the fundamental; with a limit acting: harmonics."""
+    setup = loop_setup(load_design("ilr33-amber"), "velocity")
     clean = stepped_sine(setup, np.array([50.0]), 2000)
     assert clean.distortion[0] < 1e-5
     loud = stepped_sine(setup, np.array([50.0]), 2000, amplitude=np.array([60.0]))

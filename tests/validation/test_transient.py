@@ -24,11 +24,11 @@ from analyses.validation.commanded import command_step, command_sweep
 from analyses.validation.figures import measure_figures
 from analyses.validation.from_rest import rest_entries, steps_from_rest
 from analyses.validation.response import linear_response
-from analyses.validation.rig import rig
 from analyses.validation.sweep import SETTLE_TIME_CONSTANTS, settling_ticks_of, stepped_sine
 from analyses.validation.tolerance import allowed
 from analyses.validation.transient import fourier_sum, is_slow, long_enough, transient_of
 from analyses.validation.validate import _Work
+from nonlinear.loop_setup import loop_setup
 from tests.validation.random_drives import TRIAL, full_drive
 
 TICK_S, GAIN, SOURCE, INERTIA = 1e-4, 0.02, 0.5, 0.05
@@ -90,7 +90,7 @@ def test_the_fourier_sum_of_a_decaying_step_is_its_closed_form() -> None:
 
 def test_a_slow_loop_is_its_closed_form() -> None:
     """w' = w + a (r - w) in every tick: T = a/(z - 1 + a), crossover and -3 dB at about a/T."""
-    setup = rig(turntable(), "velocity")
+    setup = loop_setup(turntable(), "velocity")
     tau = 1.0 / SLOW
     assert is_slow(np.array([1.0]), TICK_S, 1, int(14.0 * tau))
     transient = transient_of(setup, tau)
@@ -115,7 +115,7 @@ def test_a_slow_loop_is_its_closed_form() -> None:
 
 def test_a_wrong_slow_loop_is_seen() -> None:
     """A pole off by a thousandth lies far outside the error that the measurement states."""
-    transient = transient_of(rig(turntable(), "velocity"), 1.0 / SLOW)
+    transient = transient_of(loop_setup(turntable(), "velocity"), 1.0 / SLOW)
     assert transient is not None
     sweep = transient.sweep(np.geomspace(0.01, 1000.0, 20))
     z = np.exp(2j * np.pi * sweep.frequency_hz * TICK_S)
@@ -188,7 +188,7 @@ def test_a_step_from_rest_is_measured_by_its_final_value(stiffness: float) -> No
 
 def test_the_transient_is_that_of_the_running_drive() -> None:
     """Sines at the same rig give the same points, within the error that both state."""
-    setup = rig(turntable(), "velocity")
+    setup = loop_setup(turntable(), "velocity")
     transient = transient_of(setup, 1.0 / SLOW)
     sines = stepped_sine(setup, np.array([0.3, 3.0]), int(14.0 / SLOW))
     assert transient is not None

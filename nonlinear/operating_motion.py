@@ -2,7 +2,7 @@
 
 Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
 at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive whose load
-changes with the angle has no bias motion: it stands, without dry friction, and a constant moment holds
+changes with the angle has no operating motion: it stands, without dry friction, and a constant moment holds
 gravity.
 """
 
@@ -17,11 +17,11 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
-from nonlinear import Rows
 from nonlinear.filters import section
+from nonlinear.rows import Rows
 
 Value = float | npt.NDArray[np.float64]
-SHARE = 0.4  # of each limit that the bias motion may take
+SHARE = 0.4  # of each limit that the operating motion may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
 SLOWEST = 1e-9  # of that
@@ -32,7 +32,7 @@ FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 
 @dataclass(frozen=True)
-class BiasMotion:
+class OperatingMotion:
     """A drive at constant speed: every signal of the cascade, motor side.
 
     Attributes
@@ -64,7 +64,7 @@ class BiasMotion:
     extra_Nm: float = 0.0
 
     def load(self, rows: Rows) -> None:
-        """Write the constant moment and torque of the bias motion into rows."""
+        """Write the constant moment and torque of the operating motion into rows."""
         rows["load"] = self.load_Nm
         if self.extra_Nm:
             rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
@@ -81,7 +81,7 @@ class BiasMotion:
         return Operating(speed_rad_s=self.speed_rad_s)
 
 
-def bias_motion(design: Design, load_Nm: float = 0.0) -> BiasMotion:
+def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
     """Choose a constant speed that leaves room to every limit and stays far from reversal.
 
     The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
@@ -95,7 +95,7 @@ def bias_motion(design: Design, load_Nm: float = 0.0) -> BiasMotion:
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> result = bias_motion(load_design("ilr33-amber"))
+    >>> result = operating_motion(load_design("ilr33-amber"))
     >>> result.speed_rad_s > 100.0, result.voltage_V < 0.5 * 12.0
     (True, True)
     """
@@ -110,7 +110,7 @@ def bias_motion(design: Design, load_Nm: float = 0.0) -> BiasMotion:
             motion = _fastest(design, moment, share)
             if motion is not None:
                 return motion
-    least, limits = bias_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
+    least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
     if stuck or bent_about_rest(design):
         message = f"friction takes more than {1.0 if stuck else MOST:.0%} of the current or voltage limit"
@@ -158,7 +158,7 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
     return design if friction == design.friction else replace(design, friction=friction)
 
 
-def standing(design: Design) -> BiasMotion:
+def standing(design: Design) -> OperatingMotion:
     """At rest at zero without dry friction; a constant moment holds gravity and presses a coupling with play.
 
     The drive is one that `may_stand`, `on_its_stand`.
@@ -166,13 +166,13 @@ def standing(design: Design) -> BiasMotion:
     load, coupling = design.load, design.coupling
     moment = 0.0 if load.gravity is None else -load.gravity.moment_Nm(0.0)
     if coupling is None or coupling.play_rad == 0.0:
-        return BiasMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
+        return OperatingMotion(0.0, 0.0, 0.0, False, load_Nm=moment)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
     twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
     passed = 1.0 if load.path == "back-drivable" else 0.0
     held = passed * coupling_Nm / design.ratio_to_coupling
-    return BiasMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
+    return OperatingMotion(0.0, 0.0, 0.0, False, moment - press, twist, coupling_Nm, extra_Nm=held)
 
 
 def full_torque_Nm(design: Design) -> float:
@@ -201,13 +201,13 @@ def _felt(design: Design) -> float:
     return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
 
 
-def _fastest(design: Design, load_Nm: float, share: float) -> BiasMotion | None:
+def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
     """The fastest motion within the limits; None where there is none."""
     limits = design.limits
     speed = SHARE * limits.speed_rad_s if isfinite(limits.speed_rad_s) else FASTEST_RAD_S
     current = share * min(limits.peak_current_A, limits.continuous_current_A)
     while speed > SLOWEST * FASTEST_RAD_S:
-        motion = bias_motion_at(design, speed, load_Nm)
+        motion = operating_motion_at(design, speed, load_Nm)
         fits = motion.voltage_V <= share * limits.voltage_V and abs(motion.current_A) <= current
         if fits and _commands_fit(design, motion) and motion.room_rad_s > 0.0:
             return motion
@@ -215,7 +215,7 @@ def _fastest(design: Design, load_Nm: float, share: float) -> BiasMotion | None:
     return None
 
 
-def _commands_fit(design: Design, motion: BiasMotion) -> bool:
+def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
     """Whether commands leave room to the limits: a controller without an integral needs an error."""
     control, limits = design.controller, design.limits
     wanted = motion.voltage_V
@@ -249,17 +249,19 @@ class Steady:
 
 
 def current_state(
-    bias: BiasMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
+    bias: OperatingMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
 ) -> Steady:
-    """The current controller on a bias motion; the last two are shares of feed-forward in V s/rad and ohm."""
+    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
     i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
     if integral:
         return Steady(i, left - resistance * i, bias.voltage_V)
     return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
 
 
-def velocity_state(design: Design, bias: BiasMotion, wanted: Value, gain: Value, integral: bool) -> Steady:
-    """The velocity controller on a bias motion whose output behind the filters is ``wanted``."""
+def velocity_state(
+    design: Design, bias: OperatingMotion, wanted: Value, gain: Value, integral: bool
+) -> Steady:
+    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
     before = wanted / steady_gain(design, "torque")
     seen = bias.speed_rad_s * steady_gain(design, "speed")
     return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
@@ -277,7 +279,7 @@ def steady_gain(design: Design, place: FilterPlace) -> float:
     return result
 
 
-def bias_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> BiasMotion:
+def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:
     """The steady state at a motor speed (rad/s, positive) under a moment at the output."""
     friction, moment = design.friction, load_Nm
     moment -= design.load.moment_damping_Nms_rad * speed_rad_s / design.total_ratio
@@ -295,7 +297,7 @@ def bias_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> 
     torque += _own(friction, speed_rad_s) + friction.offset_torque_Nm
     room = _room(friction, speed_rad_s)
     current, voltage = _driven(design, torque, speed_rad_s)
-    return BiasMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
+    return OperatingMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
 
 
 def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:

@@ -11,23 +11,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import inf, lcm
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.validation.bias_motion import (
-    BiasMotion,
-    bias_motion,
+from nonlinear.operating_motion import (
+    OperatingMotion,
     current_state,
+    full_torque_Nm,
     may_stand,
+    operating_motion,
     standing,
     velocity_state,
 )
-from nonlinear import Rows
 from nonlinear.probe import Probe, write_probe
+from nonlinear.rows import Rows
 
 Floats = npt.NDArray[np.float64]
 Value = float | npt.NDArray[np.float64]
@@ -36,7 +37,7 @@ HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
 
 @dataclass(frozen=True)
-class Rig:
+class LoopSetup:
     """A drive set up to test one loop.
 
     Attributes
@@ -45,18 +46,21 @@ class Rig:
     loop : str
         ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
         ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
-    bias : BiasMotion
+    bias : OperatingMotion
         The motion underneath.
     limits_on : bool
     held : bool
         Whether the rotor is held at its speed.
+    gain : float
+        Factor on the loop gain at the place.
     """
 
     design: Design
     loop: str
-    bias: BiasMotion
+    bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
+    gain: float = 1.0
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -66,11 +70,13 @@ class Rig:
     @cached_property
     def outer(self) -> str:
         """Outermost stage that runs."""
-        return self.loop if self.loop in STAGES else self.stages[-1]
+        return self.loop if self.loop in STAGES or not self.stages else self.stages[-1]
 
     @cached_property
     def point(self) -> str:
         """Where the instrument sits."""
+        if self.loop in PATHS:
+            return target(self.design, self.outer) if self.stages else "u"
         return target(self.design, self.loop) if self.loop in STAGES else self.loop
 
     @property
@@ -91,7 +97,10 @@ class Rig:
     @cached_property
     def base_ticks(self) -> int:
         """Ticks after which everything repeats."""
-        return max(every(self.design, stage) for stage in self._running)
+        current = self.design.controller.current
+        fed = current is not None and current.back_emf_feedforward != 0.0 and not self.held
+        stages = self._running + (("velocity",) if fed and "velocity" in self.stages else ())
+        return lcm(*(every(self.design, stage) for stage in stages))
 
     @property
     def period_s(self) -> float:
@@ -100,7 +109,7 @@ class Rig:
 
     @property
     def _running(self) -> tuple[str, ...]:
-        return self.stages[: self.stages.index(self.outer) + 1]
+        return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
 
     @property
     def condition(self) -> str:
@@ -112,12 +121,12 @@ class Rig:
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 
-    def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
-        """Parameters of a run that starts in the steady state of the bias motion; see `rows`."""
-        return self.rows(np.array([gain]), np.array([delay_samples]))
+    def row(self) -> Rows:
+        """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
+        return self.rows(self.gain)
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
-        """Parameters of runs that start in the steady state of the bias motion, one a value.
+        """Parameters of runs that start in the steady state of the operating motion, one a value.
 
         Parameters
         ----------
@@ -139,7 +148,8 @@ class Rig:
     def _base(self) -> Rows:
         """The row without instrument and state."""
         row = Rows.of(self.design, friction_on=self.bias.friction_on, limits_on=self.limits_on)
-        for name in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
+        dropped = ("friction_feedforward",) if self.loop in PATHS else FEED_FORWARD
+        for name in dropped:
             row[name] = 0.0
         if self.outer != "position":
             for name in GAINS["position"]:
@@ -221,6 +231,22 @@ class Rig:
         row.step(point, value, -1.0)
 
     @cached_property
+    def range(self) -> float:
+        """What would be a large signal at the place, in its unit."""
+        design, limits = self.design, self.design.limits
+        full = design.validation.full_deflection_rad
+        speed = min(limits.speed_rad_s, self.bias.speed_rad_s or inf)
+        ranges = {"u": limits.voltage_V, "i_ref": limits.peak_current_A, "w_ref": speed, "output": full}
+        if self.loop == "load":
+            return full_torque_Nm(design) * design.total_ratio
+        if self.loop == "command":
+            outermost = design.controller.outermost
+            ranges |= {"position": full, "velocity": speed / design.total_ratio}
+            ranges |= {"current": limits.peak_current_A, "voltage": limits.voltage_V}
+            return ranges[outermost]
+        return ranges[self.point]
+
+    @cached_property
     def room(self) -> dict[str, float]:
         """How far each signal may move from its steady value: to its limit, and the speed to zero."""
         row, limits = self.row(), self.design.limits
@@ -234,6 +260,8 @@ class Rig:
         return room
 
 
+FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
+PATHS = ("command", "load")  # of the whole drive, to its output
 GAINS = {
     "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),
     "velocity": ("velocity_gain", "velocity_integral"),
@@ -241,8 +269,8 @@ GAINS = {
 }
 
 
-def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> Rig:
-    """Set a drive up for one loop, on a bias motion that the code chooses.
+def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> LoopSetup:
+    """Set a drive up for one loop, on an operating motion that the code chooses.
 
     A position controller with an integral or a derivative part cannot be started in the steady state of a
     ramp: then the drive stands, where it has no slope of its own about rest.
@@ -250,28 +278,28 @@ def rig(design: Design, loop: str, *, limits_on: bool = True, held: bool = False
     Raises
     ------
     InputError
-        If the design has no such loop or break point, or has no bias motion.
+        If the design has no such loop or break point, or has no operating motion.
     """
-    known = (*stages_of(design), *points_of(design))
+    known = (*stages_of(design), *points_of(design), *PATHS)
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
-    result = Rig(design, loop, bias_motion(design), limits_on, held)
+    result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
     if result.outer == "position" and remembers(design) and may_stand(design):
-        return Rig(design, loop, standing(design), limits_on, held)
+        return LoopSetup(design, loop, standing(design), limits_on, held)
     return result
 
 
-def small_rig(design: Design, loop: str, *, held: bool = False) -> Rig:
+def standing_setup(design: Design, loop: str, *, held: bool = False) -> LoopSetup:
     """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
 
     At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
     growth.  With play, or friction that differs by direction, the drive has to move on: these have a slope of
     their own about rest.
     """
-    setup = rig(design, loop, limits_on=False, held=held)
+    setup = loop_setup(design, loop, limits_on=False, held=held)
     if not may_stand(design):
         return setup
-    return Rig(design, loop, standing(design), limits_on=False, held=held)
+    return LoopSetup(design, loop, standing(design), limits_on=False, held=held)
 
 
 def remembers(design: Design) -> bool:

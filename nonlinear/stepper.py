@@ -1,0 +1,66 @@
+"""The compiled tick driven by hand: any state in, some ticks, the state behind them.
+
+A run keeps to itself what it does; this hands its state row over between two ticks, so that it may begin in
+any state and be cut anywhere.  It is the same compiled code (`nonlinear.native`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.errors import InputError
+from nonlinear import native
+from nonlinear._kernels import layout as at
+from nonlinear.rows import Rows
+
+Floats = npt.NDArray[np.float64]
+
+
+class Stepper:
+    """One row of `Rows`, run by hand.
+
+    Attributes
+    ----------
+    p : ndarray
+        All parameters, with what is derived of them.
+    s : ndarray
+        The state; write into it, or replace its content, between two calls.
+    start : ndarray
+        The state that the row begins in.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> rows = Rows.of(load_design("ilr33-amber"))
+    >>> rows.step("command", 0.01)
+    >>> drive = Stepper(rows)
+    >>> drive.run(100)
+    >>> drive.value("TICK")
+    100.0
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self.p, self.start = native.parameters(rows.values[0].copy())
+        self.s = self.start.copy()
+        self._buffers = (
+            np.zeros(at.IO_SIZE), np.zeros(at.BLOCK_SIZE), rows.tables.joined(), np.zeros(0),
+            np.zeros(0, np.uint16), np.zeros(at.OUT_SIZE), np.zeros(2),
+        )  # fmt: skip
+        self._tick = native.resumed(self.p, self.s, *self._buffers)
+
+    def put(self, state: Floats) -> None:
+        """Go on from a state."""
+        self.s[:] = state
+
+    def run(self, ticks: int) -> None:
+        """Run so many ticks on; a drive that has failed stands still."""
+        self.p[at.TICKS] = self.s[at.S_TICK] + ticks
+        self._tick()
+
+    def value(self, name: str) -> float:
+        """A number of the state by its name in the layout, without ``S_``."""
+        place = vars(at).get(f"S_{name}")
+        if place is None:
+            raise InputError(f"state {name!r}: not in the layout")
+        return float(self.s[place])

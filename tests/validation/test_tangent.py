@@ -1,0 +1,123 @@
+"""The simulator's derivative against the linear writing, which shares no code with it, and closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_drives import full_drive, is_stable
+
+from actuator_lti import assemble_loops, load_design
+from actuator_lti.design import shipped_designs
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.loops import Loops, periodic_loop
+from nonlinear import tangent
+from nonlinear.derivative import GRID, Tangent, relative
+from nonlinear.loop_setup import points_of, stages_of
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import on_its_stand, operating_motion
+
+Z = np.exp(1j * GRID)
+
+
+def stood(design: Design) -> tuple[Design, Loops]:
+    """A drive on the bench, and its linear loops on the same motion."""
+    bench = on_its_stand(on_the_bench(design))
+    at = operating_motion(bench).operating(bench)
+    return bench, assemble_loops(bench, operating_point=at.point, speed_rad_s=at.speed_rad_s)
+
+
+def predicted(bench: Design, loops: Loops, place: str) -> np.ndarray:
+    if place == "current":
+        return np.asarray(assemble_loops(bench, rotor="locked").current.plain_closed(Z))
+    if place in stages_of(bench):
+        return np.asarray(loops.present[place].plain_closed(Z))
+    return periodic_loop(loops, place).closed(Z)
+
+
+def agrees(found: Tangent, wanted: np.ndarray) -> bool:
+    return bool(np.max(relative(found.closed(Z), wanted)) <= max(1e-6, 10.0 * found.stated_error))
+
+
+@pytest.mark.parametrize("name", shipped_designs())
+def test_shipped_drives(name: str) -> None:
+    """Every loop and break point of every shipped drive, with a stated error of 1e-7 or less."""
+    bench, loops = stood(load_design(name))
+    for place in (*stages_of(bench), *points_of(bench)):
+        found = tangent(bench, place)
+        assert found.stated_error <= 1e-7, place
+        assert agrees(found, predicted(bench, loops, place)), place
+
+
+@pytest.mark.parametrize("seed", range(300_000, 300_030))
+def test_random_drives(seed: int) -> None:
+    """Play, gravity, maps, filters, every sensor, several rates; unstable loops as well."""
+    try:
+        bench, loops = stood(full_drive(seed))
+    except InputError:
+        pytest.skip("no steady motion within the limits")
+    for place in (*stages_of(bench), *points_of(bench)):
+        assert agrees(tangent(bench, place), predicted(bench, loops, place)), place
+
+
+def test_an_integrator_in_closed_form() -> None:
+    """A P loop on an ideal source without friction: the torque is held, the angle a double integrator.
+
+    ``J w' = g u``, ``u = -K th``: over a tick th gains T w + g u T^2/(2 J), w gains g u T/J.
+    """
+    design = load_design("emps")
+    motor, control = design.effective_motor, design.controller
+    design = replace(
+        design,
+        friction=replace(design.friction, viscous_Nms_rad=0.0, viscous_reverse_Nms_rad=None),
+        controller=replace(control, velocity=None, computing_delay_s=0.0),
+    )
+    found = tangent(design, "u")
+    T, push = control.period_s, motor.source_gain_Nm_V / design.inertia_kgm2
+    push *= control.position_loop.gain
+    wanted = np.roots([1.0, 0.5 * push * T**2 - 2.0, 1.0 + 0.5 * push * T**2])
+    poles = np.linalg.eigvals(found.A)
+    for pole in wanted:
+        assert np.min(np.abs(poles - pole)) < 1e-9
+
+
+def test_a_gain_at_the_place_is_a_gain_of_the_controller() -> None:
+    """`Tangent.at_gain` against the tangent of the drive with that gain."""
+    design = load_design("ilr33-amber-multirate")
+    control = design.controller
+    current = replace(control.current, gain_V_A=1.7 * control.current.gain_V_A)
+    changed = tangent(replace(design, controller=replace(control, current=current)), "u")
+    radii = [np.max(np.abs(np.linalg.eigvals(A))) for A in (tangent(design, "u").at_gain(1.7), changed.A)]
+    assert radii[0] == pytest.approx(radii[1], rel=1e-9)
+
+
+def test_spectral_radius_crosses_one_at_the_gain_margin() -> None:
+    bench, loops = stood(load_design("ilr33-amber"))
+    from actuator_lti import stability_margins
+
+    ratio = min(m.ratio for m in stability_margins(loops.position.open_loop).gain_margins if m.ratio > 1.0)
+    found = tangent(bench, "position")
+    radii = [np.max(np.abs(np.linalg.eigvals(found.at_gain(ratio * x)))) for x in (1.0 - 1e-6, 1.0 + 1e-6)]
+    assert radii[0] < 1.0 < radii[1]
+
+
+def test_python_control_draws_it() -> None:
+    found = tangent("ilr33-amber", "velocity")
+    assert found.system.nstates == len(found.states)
+    assert found.system.dt == found.period_s
+    w = 300.0
+    assert found.system(np.exp(1j * w * found.period_s)) == pytest.approx(
+        found.closed(np.exp(1j * w * found.hold_s))
+    )
+
+
+def test_a_place_that_there_is_not() -> None:
+    with pytest.raises(InputError, match="one of"):
+        tangent("emps", "current")
+
+
+def test_random_drives_are_mostly_stable_ones_too() -> None:
+    """The random drives above are not all unstable, where less could go wrong."""
+    assert sum(is_stable(full_drive(seed)) for seed in range(300_000, 300_030)) >= 5
