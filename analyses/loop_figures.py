@@ -11,7 +11,6 @@ from actuator_lti.as_control import as_control
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.quantities import MOST_RESONANCE_DB
-from analyses.held_loops import held_loop, other_loops
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -213,6 +212,8 @@ def all_loop_figures(
     InputError, NumericalError
         If the margins of a loop cannot be found, and ``refused`` is not given.
     """
+    from analyses.held_loops import other_loops
+
     result = {}
     both = any(r.rotor == "locked" for r in loops.design.requirements) if locked is None else locked
     for name, loop in loops.present.items():
@@ -237,6 +238,8 @@ def all_loop_figures(
 
 def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:
     """The position loop, its response to the command, and to the reference where that is another."""
+    from analyses.held_loops import other_loops
+
     design, mean = loops.design, command_mean(loops.design)
     figures = loop_figures(loop, loops.plain_response, step=step, certify=certify, mean=mean)
     filtered = design.command.filter_time_s > 0.0
@@ -253,6 +256,8 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
 
 def _with_held(figures: LoopFigures, loops: Loops, name: str, step: bool, certify: bool) -> LoopFigures:
     """The same, with the figures of the loop held where it is unstable only by itself."""
+    from analyses.held_loops import held_loop
+
     if figures.margins.stable is not False or (loop := held_loop(loops, name)) is None:
         return figures
     held = figures.locked or _if_there_is(lambda: loop_figures(loop, step=step, certify=certify), [])

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.model import Design, Requirement, Waiver
-from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOPS, QUANTITIES, judged_loops
@@ -160,22 +159,6 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command") -> str:
     if to == "reference":
         return "of the response to the reference, behind profile and filter of the command"
     return "of the response to the command: mean of its profile, filter and feed-forward included"
-
-
-def in_populations(requirement: Requirement, design: Design) -> bool:
-    """Whether the figures of many designs at once have what a requirement is on.
-
-    They know the free rotor, and the response behind the profile's mean, through the filter.
-    """
-    quantity, command = QUANTITIES[requirement.quantity], design.command
-    if quantity.scope == "analysis" or requirement.rotor == "locked":
-        return False
-    stages = design.controller.stages
-    if not quantity.of_response or "position" not in judged_loops(requirement.loop, stages):
-        return True
-    if requirement.to == "reference":
-        return command.filter_time_s == 0.0
-    return command_mean(design) is None
 
 
 def _verdict(

@@ -19,7 +19,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.extras import need
 from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
-from analyses.monte_carlo.judging import judge, label, source_columns
+from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
@@ -27,7 +27,6 @@ from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
 from analyses.sampling import Table, sampler_of
-from analyses.verdicts import in_populations
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

@@ -14,10 +14,9 @@ from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
-from analyses.monte_carlo.judging import judge
+from analyses.monte_carlo.judging import in_populations, judge
 from analyses.sampling import Factor, correlation_of, semidefinite_root
 from analyses.tuning.placing import Variable, change
-from analyses.verdicts import in_populations
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

@@ -17,7 +17,7 @@ from actuator_lti.quantities import (
 )
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
-from analyses.verdicts import in_populations
+from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
 from reports.figures.map import COLOURS, WORDS
