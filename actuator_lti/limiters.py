@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.errors import InputError
 
@@ -118,12 +119,19 @@ class Onset:
 
 
 def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = None) -> Onset:
-    """Border of linear validity of a drive over frequency (see `LimiterPath.onset_amplitude_rad`)."""
+    """Border of linear validity of a drive over frequency (see `LimiterPath.onset_amplitude_rad`).
+
+    Of the command as the user gives it: the mean of a limited jerk comes before all limiters.
+    """
     omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
     used = bias or {}
-    each = {
-        name: path.onset_amplitude_rad(omega, used.get(name, 0.0)) for name, path in loops.limiters.items()
-    }
+    mean = command_mean(loops.design)
+    before = np.ones(omega.shape) if mean is None else np.abs(mean.response(omega))
+    with np.errstate(divide="ignore"):
+        each = {
+            name: path.onset_amplitude_rad(omega, used.get(name, 0.0)) / before
+            for name, path in loops.limiters.items()
+        }
     if not each:
         return Onset(omega, np.full(omega.shape, np.inf), ("",) * len(omega), {})
     names, table = list(each), np.array(list(each.values()))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, radians, sin
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -199,6 +199,8 @@ AT_A_GLANCE = tuple(each for each in LOOP_QUANTITIES.values() if each.at_a_glanc
 """Figures of loops on the first screen of a report."""
 CORNERED = {each.cornered: each for each in ANALYSIS_QUANTITIES.values() if each.cornered}
 """Figures of loops whose worst over all corners is a figure of its own, with that figure."""
+CUSTOMARY = {"gain_margin": 6.0, "phase_margin": 30.0, "modulus_margin": 0.5}
+"""What custom asks of margins where no requirement does: each keeps L about half away from -1."""
 LOOPS = ("current", "velocity", "position")
 """The loops that a requirement may name, innermost first."""
 MOST_RESONANCE_DB = 100.0
@@ -230,3 +232,42 @@ def judged_loops(loop: str | None, present: Iterable[str]) -> tuple[str, ...]:
     (('velocity', 'position'), ('position',))
     """
     return tuple(present) if loop in (None, "every") else (str(loop),)
+
+
+def distance_from_minus_one(quantity: str, value: float) -> float | None:
+    """How far from -1 a margin keeps L: ``1 - 1/g``, ``2 sin(phi/2)``, the modulus; ``None`` for others.
+
+    Examples
+    --------
+    >>> [round(distance_from_minus_one(name, limit), 3) for name, limit in CUSTOMARY.items()]
+    [0.499, 0.518, 0.5]
+    """
+    name = quantity.removeprefix("corner_")
+    if name == "gain_margin":
+        return 1.0 - 10.0 ** (-abs(value) / 20.0)
+    if name == "phase_margin":
+        return 2.0 * sin(0.5 * radians(min(abs(value), 180.0)))
+    if name == "sensitivity_peak":
+        return 10.0 ** (-value / 20.0)
+    return value if name == "modulus_margin" else None
+
+
+def reserve(quantity: str, value: float, limit: float, distance: float) -> float:
+    """What is left to a limit as a share of it, negative beyond; of margins by their distance from -1.
+
+    Parameters
+    ----------
+    distance : float
+        To the limit, positive on the good side.
+
+    Examples
+    --------
+    >>> round(reserve("gain_margin", 12.0, 6.0, 6.0), 2), round(reserve("phase_margin", 60.0, 30.0, 30.0), 2)
+    (0.5, 0.93)
+    >>> reserve("bandwidth", 12.0, 10.0, 2.0), reserve("overshoot", 12.0, 10.0, -2.0)
+    (0.2, -0.2)
+    """
+    found, wanted = (distance_from_minus_one(quantity, each) for each in (value, limit))
+    if found is not None and wanted:
+        return found / wanted - 1.0
+    return distance / (abs(limit) or 1.0)

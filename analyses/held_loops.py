@@ -2,7 +2,7 @@
 
 A load whose moment grows with its own deflection (a pendulum upright, a fin ahead of its centre of pressure)
 moves away by itself. A current loop alone, or a P velocity loop alone, does not stop that; the loops around
-them do. Such a loop is unstable in itself and no fault of the drive: it is judged with the rotor held
+them do. Such a loop is unstable in itself and no fault of the drive: it is judged with the rotor locked
 (current loop), or with the load's moment held (velocity loop).
 """
 
@@ -11,20 +11,23 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from actuator_lti.design.model import Design
 from actuator_lti.drive.angle import pushes_away
+from actuator_lti.drive.operating import RotorState
+from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loop, Loops
 
-HELD = {"current": "rotor held", "velocity": "load moment held"}
+HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
 
 
 def held_loop(loops: Loops, name: str) -> Loop | None:
-    """The inner loop with the rotor held, or with the load's moment held; ``None`` where there is none."""
+    """The inner loop with the rotor locked, or with the load's moment held; ``None`` where there is none."""
     at = loops.operating
     if name not in HELD or name == loops.design.controller.outermost:
         return None
@@ -34,12 +37,29 @@ def held_loop(loops: Loops, name: str) -> Loop | None:
     return loops_at(loops.design, held, loops.form, loops.inner_loops).present[name]
 
 
+def other_loops(loops: Loops, design: Design, *, rotor: RotorState = "free") -> Loops:
+    """The loops of another design, or with another rotor, in the same form at the same operating point."""
+    at = loops.operating
+    return assemble_loops(
+        design,
+        form=loops.form,
+        operating_point=at.point,
+        load_Nm=at.load_Nm,
+        speed_amplitude_rad_s=at.speed_amplitude_rad_s,
+        direction=at.direction,
+        rotor=rotor,
+        inner_loops=loops.inner_loops,
+        speed_rad_s=at.speed_rad_s,
+        angle_rad=at.angle_rad,
+    )
+
+
 def by_itself(name: str) -> str:
     """What is said of such a loop.
 
     Examples
     --------
     >>> by_itself("current")
-    'with the rotor held; by itself, outer loops open and rotor free, the load drives it away'
+    'with the rotor locked; by itself, outer loops open and rotor free, the load drives it away'
     """
     return f"with the {HELD[name]}; by itself, {OPEN[name]}, the load drives it away"

@@ -61,6 +61,8 @@ class OperatingPointFigures:
 
     Attributes
     ----------
+    kind : str
+        As `actuator_lti.assemble_loops` names it.
     label : str
     load_Nm : float or None
         ``None`` where it makes no difference.
@@ -69,10 +71,19 @@ class OperatingPointFigures:
     figures : mapping of str to LoopFigures
     """
 
+    kind: OperatingPoint
     label: str
     load_Nm: float | None
     slope_Nms_rad: float
     figures: Mapping[str, LoopFigures]
+    load_unit: str = "N m"
+
+    @property
+    def place(self) -> str:
+        """Label and load in words; empty where the dry part slides, as the loops are judged."""
+        if self.kind == "sliding":
+            return ""
+        return self.label if self.load_Nm is None else f"{self.label}, load {self.load_Nm:g} {self.load_unit}"
 
 
 @dataclass(frozen=True)
@@ -85,8 +96,6 @@ class LoopSurvey:
         Sampled, sliding, no load.
     forms : mapping of str to mapping of str to LoopFigures
         By form, then by loop; step figures of the sampled form only.
-    locked : LoopFigures or None
-        The current loop with the rotor locked.
     break_points : mapping of str to BreakPoint
     operating_points : tuple of OperatingPointFigures
     budgets : mapping of str to DelayBudget
@@ -100,7 +109,6 @@ class LoopSurvey:
     design: Design
     loops: Loops
     forms: Mapping[str, Mapping[str, LoopFigures]]
-    locked: LoopFigures | None
     break_points: Mapping[str, BreakPoint]
     operating_points: tuple[OperatingPointFigures, ...]
     budgets: Mapping[str, DelayBudget]
@@ -185,23 +193,24 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
 
     loops = assemble_loops(design)
     refused: list[str] = []
-    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": all_loop_figures(loops, certify=True)}
+    forms: dict[str, Mapping[str, LoopFigures]] = {
+        "sampled": all_loop_figures(loops, certify=True, locked=True)
+    }
     for form in FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
     step(1)
-    locked = attempt("current loop with the rotor locked", lambda: _locked(design, loops), None)
     step(2)
     break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
-    points = attempt("loops at the operating points", lambda: _operating_points(design, refused), ())
+    points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
     budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
     step(5)
     border = attempt("border of linear validity", lambda: _onset(loops, forms["sampled"]), None)
     step(6)
     return LoopSurvey(
-        design, loops, forms, locked, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
+        design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
 
 
@@ -210,14 +219,6 @@ def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, 
     from actuator_lti.loops import assemble_loops
 
     return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
-
-def _locked(design: Design, loops: Loops) -> LoopFigures | None:
-    """Measure the current loop with the rotor locked, where there is one."""
-    from actuator_lti.loops import assemble_loops
-
-    fixed = assemble_loops(design, rotor="locked").current if loops.current is not None else None
-    return None if fixed is None else loop_figures(fixed, certify=True)
 
 
 def _break_points(loops: Loops) -> dict[str, BreakPoint]:
@@ -241,8 +242,20 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
         return BreakPoint(None, exact, str(error))
 
 
-def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPointFigures, ...]:
-    """Measure the loops sliding, at rest, and described at small speeds, at each load."""
+def operating_points(
+    design: Design, refused: list[str], *, described: bool = True, certify: bool = True
+) -> tuple[OperatingPointFigures, ...]:
+    """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
+
+    Parameters
+    ----------
+    refused : list of str
+        Gets the loops whose margins are not found, and why.
+    described : bool
+        Whether friction described at small speeds is wanted as well.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic.
+    """
     from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops
 
@@ -252,8 +265,9 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         moment = load or 0.0
         slope = friction_slope(design, kind, moment, speed, 1)
         loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
-        figures = all_loop_figures(loops, step=False, refused=refused, certify=True)
-        return OperatingPointFigures(label, load, slope, figures)
+        figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
+        unit = "N" if design.axis == "linear" else "N m"
+        return OperatingPointFigures(kind, label, load, slope, figures, unit)
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
@@ -265,7 +279,7 @@ def _operating_points(design: Design, refused: list[str]) -> tuple[OperatingPoin
         points.append(point("in the gap of the play", None, "gap"))
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
-        for speed in _described_speeds(design):
+        for speed in _described_speeds(design) if described else ():
             unit = "rad/s" if design.axis == "rotary" else "m/s"
             label = f"speed amplitude {speed:.3g} {unit}"
             points.append(point(label, load, "describing-function", speed))

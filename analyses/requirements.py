@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design
@@ -36,10 +38,20 @@ def evaluate_requirements(
         figures = all_loop_figures(assemble_loops(design))
     asked = _AskedOnce(design)
     return tuple(
-        verdict
+        _with_limits(design, verdict)
         for requirement in design.requirements
         for verdict in judged(design, requirement, figures, asked)
     )
+
+
+def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
+    """Beside a bandwidth to the command what rate and acceleration of the command make of it."""
+    of, limits = verdict.requirement, (design.command.rate_rad_s, design.command.acceleration_rad_s2)
+    if (of.quantity, verdict.loop) != ("bandwidth", "position") or of.to == "reference" or min(limits) == inf:
+        return verdict
+    from analyses.command_limits import said_of
+
+    return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
 
 
 class _AskedOnce:

@@ -72,6 +72,16 @@ def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
     return Curve(omega_rad_s, values, phase - 360.0 * _turns(omega_rad_s, values, phase))
 
 
+def answer_curve(figures: LoopFigures, omega_rad_s: np.ndarray) -> Curve:
+    """Evaluate what bandwidth and step of a loop are taken of, the mean of the command included."""
+    own, mean = curve(figures.plain_response, omega_rad_s), figures.mean
+    if mean is None:
+        return own
+    values = mean.response(omega_rad_s)
+    phase = np.degrees(np.unwrap(np.angle(values)))  # each zero turns it by 180 deg
+    return Curve(omega_rad_s, own.values * values, own.phase_deg + phase)
+
+
 def _turns(omega_rad_s: np.ndarray, values: np.ndarray, phase: np.ndarray) -> float:
     """Whole turns by which the phase at the lowest frequency is off what its slope there leads to.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.quantities import LOOP_QUANTITIES, drive_cases
 from analyses.sampling import Factor
 
@@ -141,12 +142,16 @@ def _ends(design: Design, path: str, nominal: float) -> tuple[float, float]:
 def population_figures(
     population: Population, design: Design, *, time_figures: bool = False
 ) -> dict[str, np.ndarray]:
-    """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads."""
+    """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads.
+
+    Behind the mean of a limited jerk the response to the command is not among them.
+    """
     linear = linear_figures(population, time_figures=time_figures, held=True)
     columns = {}
     for loop in linear.loops:
         for name, quantity in LOOP_QUANTITIES.items():
-            if time_figures or not quantity.timed:  # stairs of samples have no slope
+            unlike = loop == "position" and quantity.of_response and command_mean(design)
+            if (time_figures or not quantity.timed) and not unlike:  # stairs of samples have no slope
                 values = linear.quantity(name, loop)
                 columns[f"{loop}.{name}"] = np.abs(values) if quantity.absolute else values
     for name, load in drive_cases(design.validation.loads_Nm):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
@@ -39,6 +40,8 @@ class RequirementVerdict:
         What has to be known to read it.
     waiver : Waiver or None
         Of what is not proven.
+    rotor : str
+        Of a current loop: whether its rotor is ``"free"`` or ``"locked"``.
     """
 
     id: str
@@ -49,6 +52,7 @@ class RequirementVerdict:
     verdict: Verdict
     reason: str = ""
     waiver: Waiver | None = None
+    rotor: str = ""
 
     @property
     def passes(self) -> bool:
@@ -96,12 +100,15 @@ def _judged(
         reason = "" if value is not None else "the design has no such figure"
         return [_verdict(requirement, requirement.id, None, value, reason)]
     named = requirement.loop not in (None, "every")
-    return [
+    verdicts = [
         _judge_loop(
             design, requirement, requirement.id if named else f"{requirement.id}/{name}", name, figures
         )
         for name in judged_loops(requirement.loop, figures)
     ]
+    current = figures.get("current")
+    rotor = requirement.rotor or (current.rotor if current else "")
+    return [replace(one, rotor=rotor) if one.loop == "current" else one for one in verdicts]
 
 
 def _judge_loop(
@@ -115,7 +122,7 @@ def _judge_loop(
         )
     if name not in figures:
         return _verdict(requirement, id, name, None, f"the design has no {name} loop")
-    result = figures[name].judged
+    result = figures[name].asked(requirement)
     if result.margins.stable is None:
         return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
     if not result.stable:
@@ -125,30 +132,33 @@ def _judge_loop(
             reason=reason,
         )  # fmt: skip
     value = QUANTITIES[requirement.quantity].read(result)
-    reason = which_response(requirement.quantity, name)
+    reason = which_response(requirement.quantity, name, requirement.to or "command")
     if value is None:
         reason = "not found in the band of this loop"
-    if figures[name].held is not None:
+    if figures[name].held is not None and requirement.rotor != "locked":
         reason = ", ".join(filter(None, (reason, by_itself(name))))
     return _verdict(requirement, id, name, value, reason)
 
 
-def which_response(quantity: str, loop: str) -> str:
-    """Which of two responses a figure is taken of, in words; empty for a figure that both share.
+def which_response(quantity: str, loop: str, to: ResponseTo = "command") -> str:
+    """Which of several responses a figure is taken of, in words; empty for a figure that they share.
 
-    Bandwidth, resonance and step of the position loop are those of the response to the command, with its
-    feed-forward and filters; of an inner loop, those of the feedback loop.
+    Bandwidth, resonance and step of the position loop are those of the response to the user's command,
+    with profile, filter and feed-forward, or to the reference behind profile and filter; of an inner loop,
+    those of the feedback loop.
 
     Examples
     --------
     >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
-    ('of the response to the command, feed-forward and filters included', '')
+    ('of the response to the command: mean of its profile, filter and feed-forward included', '')
     """
     if not QUANTITIES[quantity].of_response:
         return ""
-    if loop == "position":
-        return "of the response to the command, feed-forward and filters included"
-    return "of the feedback loop"
+    if loop != "position":
+        return "of the feedback loop"
+    if to == "reference":
+        return "of the response to the reference, behind profile and filter of the command"
+    return "of the response to the command: mean of its profile, filter and feed-forward included"
 
 
 def _verdict(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from analyses.loop_figures import LoopFigures
     from analyses.loop_survey import LoopSurvey
     from analyses.requirements import RequirementVerdict
+    from analyses.weakest import Spread, WeakPoint
 
 Progress = Callable[[int, int], None]
 
@@ -57,7 +58,8 @@ def design_report(
 
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
-        figures, loops = _loops(design, progress)
+        figures, loops, survey = _loops(design, progress)
+        point, ranges = _views(design, survey)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
         *loops[:1],
@@ -73,7 +75,9 @@ def design_report(
             if loops
             else []
         )
-        answered = attempt("first screen", lambda: answer.section(figures, items, sections), None)
+        answered = attempt(
+            "first screen", lambda: answer.section(figures, items, sections, point, ranges), None
+        )
     first_screen = [answered] if answered and figures else []
     sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
     made = doc.document(
@@ -94,7 +98,24 @@ def _held(figures: Mapping[str, LoopFigures]) -> list[str]:
     return [name for name, one in figures.items() if one.held is not None]
 
 
-def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, LoopFigures], list[doc.Section]]:
+def _views(
+    design: Design, survey: LoopSurvey | None
+) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]]]:
+    """The weakest point of all views, and the spread over the operating points."""
+    from analyses.corners import corners
+    from analyses.isolation import attempt
+    from analyses.weakest import spread, weakest
+
+    if survey is None:
+        return None, {}
+    bounds = attempt("corners", lambda: corners(design), None)
+    point = attempt("weakest point", lambda: weakest(survey, bounds), None)
+    return point, spread(survey.operating_points)
+
+
+def _loops(
+    design: Design, progress: Progress | None
+) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
     from analyses.isolation import attempt
     from analyses.loop_survey import survey_loops
@@ -102,9 +123,9 @@ def _loops(design: Design, progress: Progress | None) -> tuple[Mapping[str, Loop
 
     survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
     if survey is None:
-        return {}, []
+        return {}, [], None
     verdicts = attempt("requirements", lambda: evaluate_requirements(design, survey.figures), ())
-    return survey.figures, loop_sections(survey, verdicts)
+    return survey.figures, loop_sections(survey, verdicts), survey
 
 
 def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
@@ -182,11 +203,10 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
-        "Margins": lambda: margins.section(figures, survey.locked),
+        "Margins": lambda: margins.section(figures, survey.operating_points),
     }
     for name, result in figures.items():
-        locked = survey.locked if name == "current" else None
-        makers[f"Loop {name}"] = partial(loop.section, name, design, result, locked)
+        makers[f"Loop {name}"] = partial(loop.section, name, design, result)
     makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
     makers["Break points"] = lambda: break_points.section(survey.break_points, figures)
     makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)

@@ -184,6 +184,7 @@ class GlanceFigure(TypedDict):
     comparison: str
     distance: float | None
     verdict: Judged | None
+    spread: NotRequired[str]
 
 
 @_strict
@@ -207,7 +208,7 @@ class FindingItem(TypedDict):
 
 @_strict
 class Weakest(TypedDict):
-    """The requirement that is nearest to its limit, in words."""
+    """The margin of all views that has least left to its limit, in words."""
 
     label: str
     words: str

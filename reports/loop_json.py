@@ -40,9 +40,14 @@ def loop_json(figures: LoopFigures) -> Tree:
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],
-        **(
-            {}
-            if figures.held is None
-            else {"judged": {"how": HELD[figures.loop.name]} | loop_json(figures.held)}
-        ),
+        **({"rotor": "free"} if figures.locked is not None else {}),
+        **{
+            key: more | loop_json(other)
+            for key, more, other in (
+                ("judged", {"how": HELD.get(figures.loop.name)}, figures.held),
+                ("rotor_locked", {}, figures.locked),
+                ("to_reference", {}, figures.reference),
+            )
+            if other is not None
+        },
     }

@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from actuator_lti.design.field import BIG, Axis, positive, quantities, quantity
 
 # fmt: off
+Rotor = Literal["free", "locked"]
+ResponseTo = Literal["command", "reference"]
 ObjectFamily = Literal["", "faulhaber-mc-v3"]
 
 
@@ -68,7 +70,12 @@ class Validation:
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
+    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive.
+
+    ``rotor`` says which current loop is meant: ``"free"`` (default) or ``"locked"``. ``to`` says which
+    response of the position loop a bandwidth, resonance or step is of: to the user's ``"command"`` (default),
+    profile and filter of the command included, or to the ``"reference"`` behind them.
+    """
 
     id: str
     quantity: str
@@ -76,6 +83,8 @@ class Requirement:
     minimum: float | None = None
     maximum: float | None = None
     loop: str | None = None
+    rotor: Rotor | None = None
+    to: ResponseTo | None = None
     load_Nm: float | None = None
     source: str = ""
     note: str = ""

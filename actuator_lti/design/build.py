@@ -180,6 +180,8 @@ class Builder:
             minimum=self._limit(f"{path}.minimum", raw.minimum, lambda text: parse_limit(text, unit)),
             maximum=self._limit(f"{path}.maximum", raw.maximum, lambda text: parse_limit(text, unit)),
             loop=raw.loop,
+            rotor=raw.rotor,
+            to=raw.to,
             load_Nm=self._limit(f"{path}.load", raw.load, lambda text: parse_quantity(text, torque)),
             source=raw.source,
             note=raw.note,

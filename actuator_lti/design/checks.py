@@ -178,6 +178,13 @@ def _requirements(design: Design, where: str) -> None:
             raise _refuse(
                 where, f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
             )
+        current = "current" in present and item.loop in ("current", "every")
+        if item.rotor is not None and not current:
+            raise _refuse(where, f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only")
+        answers = item.loop in ("position", "every") and QUANTITIES[item.quantity].of_response
+        if item.to is not None and not (answers and "position" in present):
+            allowed = "allowed: of bandwidth, resonance and step of the position loop only"
+            raise _refuse(where, f"{path}.to", shown(item.to), allowed)
 
 
 def _waivers(design: Design, where: str) -> None:

@@ -15,7 +15,7 @@ from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
 
 _KEYS = {
-    "requirement": ("id", "quantity", "loop", "minimum", "maximum", "load", "source", "note"),
+    "requirement": ("id", "quantity", "loop", "rotor", "to", "minimum", "maximum", "load", "source", "note"),
     "waiver": ("requirement", "reason", "date"),
     "correlation": ("first", "second", "coefficient"),
     "fact": ("label", "value", "source", "grade"),

@@ -18,6 +18,7 @@ from pydantic import (
 )
 from pydantic import Field as Slot
 
+from actuator_lti.design.asked import ResponseTo, Rotor
 from actuator_lti.design.fields import Field, fields_in
 from actuator_lti.design.model import ObjectFamily
 from actuator_lti.design.sections import children
@@ -58,6 +59,8 @@ class RawRequirement(BaseModel):
     id: StrictStr
     quantity: StrictStr
     loop: StrictStr | None = None
+    rotor: Rotor | None = None
+    to: ResponseTo | None = None
     minimum: Written | None = None
     maximum: Written | None = None
     load: Written | None = None

@@ -42,6 +42,9 @@ _BARE = Design(
 )
 
 
+_WHICH = ("rotor", "to")  # of a requirement: which of two loops or responses; mostly not said
+
+
 def write_design(design: Design) -> str:
     """The design as TOML that :func:`read_design_text` turns back into an equal design.
 
@@ -138,7 +141,7 @@ def _si(value: float | None, unit: str) -> Any:
 
 def _requirement(item: Requirement, structure: Structure) -> Tree:
     tree: Tree = {"id": item.id, "quantity": item.quantity}
-    tree |= {"loop": item.loop} if item.loop is not None else {}
+    tree |= {key: value for key in ("loop", *_WHICH) if (value := getattr(item, key)) is not None}
     for key in ("minimum", "maximum"):
         value = getattr(item, key)
         if value is not None:
@@ -249,6 +252,7 @@ def _canonical(value: Any) -> Any:
     if is_dataclass(value):
         skipped = ("source", "note", "text", "name")
         names = [item.name for item in dataclass_fields(value) if item.name not in skipped]
+        names = [name for name in names if name not in _WHICH or getattr(value, name) is not None]
         return {name: _canonical(getattr(value, name)) for name in names}
     if isinstance(value, tuple):
         return [_canonical(item) for item in value]

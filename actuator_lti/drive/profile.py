@@ -66,12 +66,12 @@ def command_mean(design: Design) -> CommandMean | None:
 
 
 def profile_note(design: Design) -> str:
-    """What figures of the response to the command leave out; empty where they leave nothing out."""
+    """What the mean of the command does to the response to it; empty where there is none."""
     mean = command_mean(design)
     if mean is None:
         return ""
     return (
-        f"command.jerk: the drive takes the mean of its command over {mean.samples} samples. It comes before "
-        f"the response to the command and is not in its figures: {1e3 * mean.delay_s:.4g} ms later, "
-        f"-3 dB by itself at {mean.minus3db_rad_s / (2 * pi):.4g} Hz"
+        f"command.jerk: the drive takes the mean of its command over {mean.samples} samples. The response to "
+        f"the command has it, that to the reference has not: {1e3 * mean.delay_s:.4g} ms later, -3 dB by "
+        f"itself at {mean.minus3db_rad_s / (2 * pi):.4g} Hz"
     )

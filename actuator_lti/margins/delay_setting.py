@@ -136,7 +136,8 @@ def _order_atdc_value(form: DelayForm, low: float, most: int) -> tuple[float, in
         order = int(shown_at_rest(form))
     for _ in range(14):
         L = border_values(form, np.array([low, 0.1 * low]))
-        slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
+        with np.errstate(divide="ignore", invalid="ignore"):  # zero: a response that is none has no slope
+            slope = float(np.log10(np.abs(L[1]) / np.abs(L[0])))
         if abs(slope - order) < 2e-3 and (not order or abs(L[0]) > 1e3):
             return low, order
         low *= 0.1

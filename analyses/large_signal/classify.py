@@ -8,7 +8,7 @@ from analyses.large_signal.formulas import PARABOLA_THIRD, TRIANGLE_THIRD
 from nonlinear import LIMITERS
 from nonlinear.reduced import BatchResult
 
-CAUSES = ("none", "friction", "stiction", *LIMITERS)
+CAUSES = ("none", "friction", "stiction", "other", *LIMITERS)
 WAVEFORMS = ("sine", "triangle", "parabola", "stick-slip", "no motion", "distorted", "not steady")
 SINE_DISTORTION = 0.02
 STICK_FRACTION = 0.10
@@ -25,8 +25,9 @@ CRITERIA = (
 )
 CAUSE_RULE = (
     "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if the "
-    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more, friction if the fundamental is off the "
-    f"linear one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°, else none: the linear model holds."
+    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more. Where the fundamental is off the linear one "
+    f"by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°: dry friction if it is not so without dry "
+    "friction, else play, gravity or counts. Else none: the linear model holds."
 )
 
 
@@ -55,7 +56,9 @@ def limiter_fractions(result: BatchResult) -> np.ndarray:
     return np.stack([result.window_limit_fraction(name) for name in LIMITERS], axis=1)
 
 
-def causes(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
+def causes(
+    result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray, rubs: np.ndarray | bool = True
+) -> np.ndarray:
     """Name what keeps each run from being linear (`CAUSE_RULE`); index into `CAUSES`.
 
     Parameters
@@ -64,17 +67,23 @@ def causes(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -
         Linear response from command to output at each run's frequency.
     amplitude_rad : ndarray
         Command amplitude of each run.
+    rubs : ndarray of bool
+        Whether it is dry friction that keeps a run from being linear.
     """
     fractions = limiter_fractions(result)
-    ratio = result.phasor("output_angle_rad") / (linear * amplitude_rad)
-    magnitude = np.abs(ratio)
-    off = np.abs(20.0 * np.log10(np.maximum(magnitude, 1e-300))) > FRICTION_DB
-    off |= np.abs(np.degrees(np.angle(ratio))) > FRICTION_DEG
     limited = fractions.max(axis=1) > 0.0
     stuck = result.window_stick_fraction >= STICK_FRACTION
     choices = [
         CAUSES.index(LIMITERS[0]) + np.argmax(fractions, axis=1),
-        np.full(len(off), CAUSES.index("stiction")),
-        np.full(len(off), CAUSES.index("friction")),
+        np.full(len(limited), CAUSES.index("stiction")),
+        np.where(rubs, CAUSES.index("friction"), CAUSES.index("other")),
     ]
-    return np.select([limited, stuck, off], choices, CAUSES.index("none"))
+    conditions = [limited, stuck, not_linear(result, linear, amplitude_rad)]
+    return np.select(conditions, choices, CAUSES.index("none"))
+
+
+def not_linear(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
+    """Whether the fundamental of each run is off the linear one by more than `CAUSE_RULE` says."""
+    ratio = result.phasor("output_angle_rad") / (linear * amplitude_rad)
+    off = np.abs(20.0 * np.log10(np.maximum(np.abs(ratio), 1e-300))) > FRICTION_DB
+    return off | (np.abs(np.degrees(np.angle(ratio))) > FRICTION_DEG)

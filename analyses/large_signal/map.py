@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops
 from analyses.large_signal.border import slow_protection
-from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, waveforms
+from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
 from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
@@ -158,12 +158,20 @@ def amplitude_map(
         design, frequencies, which, amplitude, start, begin,
         load_Nm=load_Nm, friction_on=friction_on, insist=True, progress=progress,
     )  # fmt: skip
+    rubs = np.zeros(len(which), dtype=bool)
+    off = np.flatnonzero(friction_on & not_linear(result, start.output[which], amplitude))
+    if len(off):  # the same runs without dry friction: is it that?
+        free = run_tones(
+            design, frequencies, which[off], amplitude[off], start, begin[off],
+            load_Nm=load_Nm, friction_on=False,
+        )  # fmt: skip
+        rubs[off] = ~not_linear(free, start.output[which[off]], amplitude[off])
     shape = (len(levels), len(omega))
     return AmplitudeMap(
         load_Nm=load_Nm,
         amplitude_rad=levels,
         frequency_hz=omega / (2.0 * np.pi),
-        cause=causes(result, start.output[which], amplitude).reshape(shape),
+        cause=causes(result, start.output[which], amplitude, rubs).reshape(shape),
         waveform=waveforms(result).reshape(shape),
         limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),

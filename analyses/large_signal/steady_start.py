@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import speed_torque_Nm
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
@@ -33,7 +34,7 @@ LEFT_AT_REST = (
     r"hold_\w+|\w+_prev",
 )
 """States that a run begins at rest: rows have no word for them; the settling time counts their decay."""
-DECAY = math.log(1e3)
+DECAY = math.log(1e9)  # what begins at rest is gone by then, so that small sines are the linear ones
 LONGEST_PERIODS = 20_000
 
 
@@ -44,12 +45,12 @@ class LinearSteadyState:
     Attributes
     ----------
     output : ndarray of complex, shape (K,)
-        Command to output angle: the fundamental over all ticks.
+        Command to output angle: the fundamental over all ticks, the mean of a limited jerk included.
     states : dict of str to ndarray of complex, shape (K,)
         By column of the rows: value at t = 0 is the imaginary part.
     stable : bool
     settling_ticks : int
-        Ticks in which the slowest mode falls to a thousandth.
+        Ticks in which the slowest mode falls to 1e-9.
     """
 
     output: np.ndarray
@@ -78,10 +79,10 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
         A, B = A_j @ A, A_j @ B + B_j[:, 0]
     z = np.exp(1j * omega_rad_s * M * Ts)
     x = states_at(A, B[:, None], z)[..., 0]
-    th, speed = system.outputs.index("th"), "w_ref" in system.outputs
+    angle, speed = system.outputs.index("output_angle"), "w_ref" in system.outputs
     output = np.zeros(len(z), dtype=complex)
     for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
-        seen = (x @ A_b.T + B_b) @ C[th] + D[th, 0]
+        seen = (x @ A_b.T + B_b) @ C[angle] + D[angle, 0]
         output += seen * np.exp(-1j * omega_rad_s * j * Ts) / M
     unknown = without_value(system.states, PLACES.keys(), LEFT_AT_REST)
     if unknown:
@@ -98,7 +99,12 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS) if 0.0 < radius < 1.0 else 1
     if not stable:
         periods = 500
-    return LinearSteadyState(output / loops.design.total_ratio, states, stable, periods * M)
+    mean = command_mean(loops.design)
+    if mean is not None:  # in front of the loop: all that follows it is that much smaller and later
+        before_loop = mean.response(omega_rad_s)
+        output, states = output * before_loop, {name: x * before_loop for name, x in states.items()}
+        periods += math.ceil(mean.samples * loops.design.controller.position_loop.every / M)
+    return LinearSteadyState(output, states, stable, periods * M)
 
 
 def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, QUANTITIES, judged_loops
 
@@ -43,6 +44,22 @@ def loops_of(design: Design) -> tuple[str, ...]:
 def drive_column(quantity: str, load_Nm: float | None) -> str:
     """Name of the column of a static figure at a load torque."""
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
+
+
+def in_populations(requirement: Requirement, design: Design) -> bool:
+    """Whether the figures of many designs at once have what a requirement is on.
+
+    They know the free rotor, and the response behind the profile's mean, through the filter.
+    """
+    quantity, command = QUANTITIES[requirement.quantity], design.command
+    if quantity.scope == "analysis" or requirement.rotor == "locked":
+        return False
+    stages = design.controller.stages
+    if not quantity.of_response or "position" not in judged_loops(requirement.loop, stages):
+        return True
+    if requirement.to == "reference":
+        return command.filter_time_s == 0.0
+    return command_mean(design) is None
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:

@@ -17,9 +17,9 @@ from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.extras import need
-from actuator_lti.quantities import ANALYSIS_QUANTITIES, QUANTITIES
+from actuator_lti.quantities import QUANTITIES
 from analyses.engine import Engine
-from analyses.monte_carlo.judging import judge, label, source_columns
+from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
@@ -125,7 +125,7 @@ def monte_carlo(
     def blocks() -> Iterator[Mapping[str, np.ndarray]]:
         return store.blocks(settings.samples)
 
-    tallies = [_Tally(r) for r in design.requirements if r.quantity not in ANALYSIS_QUANTITIES]
+    tallies = [_Tally(r) for r in design.requirements if in_populations(r, design)]
     together = 0
     for block in blocks():
         passed = np.ones(len(block["sample"]), dtype=bool)
@@ -214,7 +214,7 @@ def _notes(task: SampleTask) -> tuple[str, ...]:
         notes.append(
             "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together."
         )
-    left_out = [r.id for r in task.design.requirements if r.quantity in ANALYSIS_QUANTITIES]
+    left_out = [r.id for r in task.design.requirements if not in_populations(r, task.design)]
     if left_out:
-        notes.append(f"Not judged here, as each takes an analysis of one design: {', '.join(left_out)}.")
+        notes.append(f"Not sampled, as each takes a computation of one design: {', '.join(left_out)}.")
     return tuple(notes)

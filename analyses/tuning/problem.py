@@ -14,7 +14,7 @@ from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
-from analyses.monte_carlo.judging import judge
+from analyses.monte_carlo.judging import in_populations, judge
 from analyses.sampling import Factor, correlation_of, semidefinite_root
 from analyses.tuning.placing import Variable, change
 
@@ -204,7 +204,7 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     """Requirements on loops: those of the design, replaced by extra ones on the same figure."""
     replaced = {(r.quantity, r.loop) for r in extra}
     kept = [r for r in design.requirements if (r.quantity, r.loop) not in replaced]
-    chosen = tuple(r for r in (*kept, *extra) if r.quantity in LOOP_QUANTITIES)
+    chosen = tuple(r for r in (*kept, *extra) if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
     if not chosen:
         raise InputError("no requirement on a loop: nothing to tune for; state margins and bandwidths")
     return chosen

@@ -10,7 +10,8 @@ import numpy as np
 
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
-from analyses.monte_carlo.judging import label
+from actuator_lti.quantities import LOOP_QUANTITIES
+from analyses.monte_carlo.judging import in_populations, label
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.checking import confirm, nonlinear_checks
 from analyses.tuning.least import least_change
@@ -22,7 +23,6 @@ from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import Solution, solve
 from analyses.tuning.trade_off import trade_off
-from analyses.verdicts import tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -90,7 +90,7 @@ def tune(
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
-        bool(result.min() >= 0.0) and tally(confirmed).passes,
+        bool(result.min() >= 0.0) and all(v.passes for v in confirmed),
         design,
         tuned,
         _settings(problem, design, rules, solution.gains, gains),
@@ -100,7 +100,7 @@ def tune(
         checks,
         curve,
         searched,
-        (*_notes(problem, gains, result), *_said(confirmed)),
+        (*_notes(problem, gains, result), *_said(confirmed), *_left_out(design)),
         settings.aim,
         placed.elements,
         confirmed,
@@ -137,6 +137,13 @@ def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
         for v in confirmed
         if v.verdict != "met"
     )
+
+
+def _left_out(design: Design) -> tuple[str, ...]:
+    """Requirements on loops that the search does not see."""
+    of_loops = [item for item in design.requirements if item.quantity in LOOP_QUANTITIES]
+    names = ", ".join(item.id for item in of_loops if not in_populations(item, design))
+    return (f"Not searched for, as each takes a computation of one design: {names}.",) if names else ()
 
 
 def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from actuator_lti.loops import Loops
     from actuator_lti.verdict import Verdict
     from analyses.loop_figures import LoopFigures
+    from analyses.loop_survey import OperatingPointFigures
     from analyses.requirements import RequirementVerdict
 
 AroundOption = Annotated[
@@ -55,6 +56,7 @@ def margins(
     from actuator_lti.design import warnings_of
     from actuator_lti.loops import assemble_loops
     from analyses.loop_figures import all_loop_figures
+    from analyses.loop_survey import operating_points
     from analyses.requirements import evaluate_requirements
     from reports.cli.errors import leave_with
     from reports.cli.output import print_warning
@@ -71,7 +73,8 @@ def margins(
         load_Nm=load,
     )
     outer = _outer_figures(loops, around, step=form != "continuous")
-    figures = all_loop_figures(loops, step=form != "continuous", certify=True)
+    figures = all_loop_figures(loops, step=form != "continuous", certify=True, locked=True)
+    points = operating_points(drive, [], described=False, certify=False)
     judged = figures if (form, operating_point) == ("sampled", "sliding") else None
     verdicts = evaluate_requirements(drive, judged)
     where: Tree = {
@@ -82,9 +85,9 @@ def margins(
     }
     where["load_unit"] = load_unit(drive)
     if as_json:
-        _print_json(where, figures, verdicts, outer)
+        _print_json(where, figures, verdicts, outer, points)
     else:
-        _print_tables(where, figures, verdicts, outer)
+        _print_tables(where, figures, verdicts, outer, points)
     leave_with(_whole(verdicts, figures, outer).passes())
 
 
@@ -118,8 +121,12 @@ def _print_json(
     figures: Mapping[str, LoopFigures],
     verdicts: Sequence[RequirementVerdict],
     outer: Mapping[str, LoopFigures],
+    points: Sequence[OperatingPointFigures],
 ) -> None:
     """Print everything for a machine."""
+    from dataclasses import asdict
+
+    from analyses.weakest import spread
     from reports.cli.output import print_json
     from reports.loop_json import loop_json
     from reports.sections.requirements import item
@@ -134,6 +141,10 @@ def _print_json(
             "passed": whole.passes(),
             "loops": loops,
             **around,
+            "operating_points": {
+                loop: {name: asdict(one) for name, one in found.items()}
+                for loop, found in spread(points).items()
+            },
             "verdicts": [item(v, where["load_unit"]) for v in verdicts],
         }
     )
@@ -144,6 +155,7 @@ def _print_tables(
     figures: Mapping[str, LoopFigures],
     verdicts: Sequence[RequirementVerdict],
     outer: Mapping[str, LoopFigures],
+    points: Sequence[OperatingPointFigures],
 ) -> None:
     """Print the verdict, then the tables of the report for people."""
     from reports.sections.margins import (
@@ -152,7 +164,9 @@ def _print_tables(
         evidence_notes,
         margin_table,
         response_table,
+        spread_table,
         with_held,
+        with_own_margins,
     )
     from reports.sections.names import LOOPS
     from reports.sections.requirements import section
@@ -168,8 +182,12 @@ def _print_tables(
     load = f"load {where['load_Nm']:g} {where['load_unit']}"
     head = f"{where['design']}: {where['form']}, {where['operating_point']}, {load}"
     said = by_itself_notes(named)
-    named = with_held(named)
-    blocks: list[Any] = [side_by_side(head, [margin_table(named), response_table(named)])]
+    figures_of = named
+    every = with_held(named)
+    named = with_own_margins(every)
+    blocks: list[Any] = [
+        side_by_side(head, [margin_table(named), spread_table(points, figures_of), response_table(every)])
+    ]
     counts = [
         len(result.margins.gain_margins) + len(result.margins.phase_margins) for result in named.values()
     ]

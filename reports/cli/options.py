@@ -86,7 +86,10 @@ FormOption = Annotated[
 OperatingPointOption = Annotated[
     str,
     typer.Option(
-        "--operating-point", metavar="POINT", help="Friction: sliding, rest or describing-function."
+        "--operating-point",
+        metavar="POINT",
+        help="Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
+        "load's share of the friction) and gap (in the play).",
     ),
 ]
 WorkersOption = Annotated[

@@ -17,6 +17,7 @@ from actuator_lti.quantities import (
 )
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
+from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
 from reports.live.charts import BORDERS
@@ -137,7 +138,7 @@ def _on_loops(design: Design, held: Collection[str]) -> list[FollowedLimit]:
     return [
         {**_limit(item), "loop": loop}
         for item in design.requirements
-        if item.quantity in LOOP_QUANTITIES
+        if item.quantity in LOOP_QUANTITIES and in_populations(item, design)
         for loop in judged_loops(item.loop, stages)
         if loop in stages and loop not in held
     ]
@@ -167,9 +168,14 @@ def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection
     of_held: list[NotFollowed] = [
         {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {loop} loop held"}
         for item in design.requirements
-        if item.quantity in LOOP_QUANTITIES
+        if item.quantity in LOOP_QUANTITIES and in_populations(item, design)
         for loop in judged_loops(item.loop, stages)
         if loop in held
+    ]
+    of_held += [
+        {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {_which(item)}"}
+        for item in design.requirements
+        if item.quantity in LOOP_QUANTITIES and not in_populations(item, design)
     ]
     others: list[NotFollowed] = [
         {"id": item.id, "words": QUANTITIES[item.quantity].words}
@@ -177,6 +183,11 @@ def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection
         if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
     ]
     return [*of_held, *others]
+
+
+def _which(item: Requirement) -> str:
+    """What the page does not follow of a figure of a loop."""
+    return "rotor locked" if item.rotor == "locked" else f"to the {item.to or 'command'}"
 
 
 def _step(design: Design) -> StepData:

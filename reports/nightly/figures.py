@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from actuator_lti.quantities import reserve
 from actuator_lti.tree import Tree
 from reports.nightly.text import one_line
 from reports.verdict_summary import role, tally, verdict_words, why
@@ -106,16 +107,19 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
     limit = number(item.get("limit"))
     if limit is None:
         limit = first_number(str(item.get("limit", "")))
-    scale = abs(limit) if limit else 1.0
-    ranked = distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met")
+    value = number(item.get("value"))
+    left = None
+    if distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met"):
+        of = str(item.get("quantity", ""))
+        left = distance if limit is None or value is None else reserve(of, value, limit, distance)
     return Verdict(
         id=name,
         label=str(item.get("label", "") or name),
-        value=number(item.get("value")),
+        value=value,
         limit=_limit_text(item),
         unit=str(item.get("unit", "") or ""),
         distance=distance,
-        relative=distance / scale if ranked and distance is not None else None,
+        relative=left,
         verdict=item["verdict"],
         waiver=item["waiver"],
         source=str(item.get("source", "") or ""),

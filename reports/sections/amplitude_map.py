@@ -17,12 +17,15 @@ if TYPE_CHECKING:
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
-COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE} | {
+COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED} | {
     name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()
 }
-WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"} | {
-    name: limiter.words for name, limiter in LIMITERS.items()
-}
+WORDS = {
+    "friction": "dry friction",
+    "stiction": "stiction",
+    "none": "linear",
+    "other": "play, gravity or counts",
+} | {name: limiter.words for name, limiter in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},

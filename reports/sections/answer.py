@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
-from actuator_lti.quantities import AT_A_GLANCE
+from actuator_lti.quantities import AT_A_GLANCE, QUANTITIES, reserve
 from analyses.held_loops import HELD
 from analyses.loop_figures import LoopFigures
 from analyses.responses import frequency_grid
+from analyses.weakest import Spread, WeakPoint
 from reports import document as doc
 from reports.document_schema import (
     Block,
@@ -15,15 +17,15 @@ from reports.document_schema import (
     GlanceFigure,
     GlanceLoop,
     Section,
+    Status,
     VerdictItem,
     Weakest,
 )
 from reports.findings import Finding, gathered, plain
 from reports.numbers import short
 from reports.sections import loop as loop_section
-from reports.sections.margins import margin_row, shown, worst_status
-from reports.sections.names import LOOPS
-from reports.verdict_summary import role
+from reports.sections.margins import margin_row, range_words, shown, worst_status
+from reports.sections.names import LOOPS, POINTS, loop_words
 
 SHOWN = 5
 
@@ -32,13 +34,18 @@ def section(
     figures: Mapping[str, LoopFigures],
     items: Sequence[VerdictItem],
     sections: Sequence[Section],
+    point: WeakPoint | None = None,
+    ranges: Mapping[str, Mapping[str, Spread]] | None = None,
 ) -> Section:
-    """Make the first screen from the loops, the verdicts on the requirements and all other sections."""
+    """Make the first screen from the loops, the verdicts on the requirements and all other sections.
+
+    ``point`` is the weakest of all views, ``ranges`` the margins over the operating points.
+    """
     result = gathered(sections)
     glance: GlanceBlock = {
         "kind": "glance",
-        "loops": [_loop(name, one, items) for name, one in figures.items()],
-        "weakest": weakest(items),
+        "loops": [_loop(name, one, items, (ranges or {}).get(name, {})) for name, one in figures.items()],
+        "weakest": weakest(point) if point else None,
         "findings": plain(result[:SHOWN]),
         "more": max(len(result) - SHOWN, 0),
     }
@@ -48,7 +55,9 @@ def section(
     return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
 
 
-def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> GlanceLoop:
+def _loop(
+    name: str, figures: LoopFigures, items: Sequence[VerdictItem], ranges: Mapping[str, Spread]
+) -> GlanceLoop:
     """Give the chosen figures of a loop, each with the requirement that is nearest to it."""
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
@@ -64,36 +73,46 @@ def _loop(name: str, figures: LoopFigures, items: Sequence[VerdictItem]) -> Glan
                 "comparison": nearest["comparison"] if nearest else "",
                 "distance": nearest["distance"] if nearest else None,
                 "verdict": nearest["verdict"] if nearest else None,
+                "spread": range_words(ranges[quantity.name]) if quantity.name in ranges else "",
             }
         )
     stable = margin_row(figures.judged)["stable"]
     if figures.held is not None:
         stable = {**stable, "text": f"{stable['text']}, {HELD[name]}"}
-    return {"loop": LOOPS[name], "anchor": f"loop-{name}", "stable": stable, "figures": cells}
+    return {
+        "loop": loop_words(name, figures.rotor),
+        "anchor": f"loop-{name}",
+        "stable": stable,
+        "figures": cells,
+    }
 
 
-def weakest(items: Sequence[VerdictItem]) -> Weakest | None:
-    """Give the requirement that is nearest to its limit, or furthest beyond it, as part of the limit."""
-    ranked = [item for item in items if item.get("distance") is not None and item.get("limit")]
-    item = min(ranked, key=_nearness, default=None)
-    if item is None:
-        return None
-    distance, found, bound, unit = item["distance"], item["value"], item["limit"], item["unit"]
-    assert distance is not None
-    assert found is not None
-    assert bound is not None
-    share = 100.0 * abs(_nearness(item))
-    side, value = "inside" if distance >= 0.0 else "beyond", short(found, 4)
-    limit = f"{item['comparison']} {short(bound, 6)}".strip()
-    words = f"{value} {unit}, limit {limit} {unit}: {share:.0f} % {side} its limit"
-    return {"label": item["label"], "words": " ".join(words.split()), "status": role(item)}
+def weakest(point: WeakPoint) -> Weakest:
+    """Say which margin of which view has least left to its limit, or lies furthest beyond it."""
+    view = point.view
+    loop = loop_words(view.loop, view.rotor) if view.loop else ""
+    cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
+    label = ", ".join(filter(None, (loop, view.place, cut)))
+    label = label[0].upper() + label[1:]
+    if not point.quantity:
+        return {"label": label, "words": "not stable", "status": "warn" if view.place else "fail"}
+    quantity = QUANTITIES[point.quantity]
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    kind, left = "required" if point.required else "customary", point.value - point.limit
+    side = "inside" if left >= 0.0 else "beyond"
+    words = (
+        f"{quantity.words} {short(point.value, 3)}{unit}, {kind} {short(point.limit, 6)}{unit}: "
+        f"{short(abs(left), 3)}{unit} {side}"
+    )
+    status: Status = "pass" if left >= 0.0 else "fail" if point.required else "warn"
+    return {"label": label, "words": words, "status": status}
 
 
 def _nearness(item: VerdictItem) -> float:
-    """Distance to the limit over the limit; without a distance the requirement is as good as far away."""
-    if item["distance"] is None or not item["limit"]:
-        return 1e9
-    return float(item["distance"]) / abs(float(item["limit"]))
+    """What is left to the limit; without a distance the requirement is as good as far away."""
+    if item["distance"] is None or item["value"] is None or item["limit"] is None:
+        return math.inf
+    return reserve(item.get("quantity", ""), item["value"], item["limit"], item["distance"])
 
 
 def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from actuator_lti.quantities import reserve
 from analyses.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Section
@@ -32,8 +33,8 @@ def section(comparison: Comparison) -> Section:
     return doc.section(
         "best", "Which variant for what", blocks, result=_result(everything, met),
         intro=(
-            "Distance is what is left to the limit, as part of the limit. The smallest one is the weakest "
-            "point."
+            "Distance is what is left to the limit, as part of the limit; of a margin, as part of the "
+            "distance from -1 that the limit keeps. The smallest one is the weakest point."
         ),
         status="fail" if missed else "pass",
     )  # fmt: skip
@@ -58,12 +59,12 @@ def failed(one: Compared) -> int:
 
 
 def nearness(verdict: RequirementVerdict) -> float | None:
-    """Distance to the limit as part of the limit; ``None`` where either is missing."""
-    low, high = verdict.requirement.minimum, verdict.requirement.maximum
-    limits = [abs(limit) for limit in (low, high) if limit]
-    if verdict.distance is None or not math.isfinite(verdict.distance) or not limits:
+    """What is left to the nearer limit as a share of it; ``None`` where either is missing."""
+    of = verdict.requirement
+    limits = [limit for limit in (of.minimum, of.maximum) if limit]
+    if verdict.value is None or verdict.distance is None or not math.isfinite(verdict.distance) or not limits:
         return None
-    return verdict.distance / min(limits)
+    return reserve(of.quantity, verdict.value, min(limits, key=abs), verdict.distance)
 
 
 def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:

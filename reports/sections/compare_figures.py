@@ -46,7 +46,7 @@ def overlays(comparison: Comparison) -> Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
-    from analyses.responses import curve, frequency_grid
+    from analyses.responses import answer_curve, curve, frequency_grid
 
     which = "closed loop" if closed else "open loop"
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
@@ -57,7 +57,7 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         if result is None or (closed and not result.stable):
             continue
         grid = frequency_grid(result, 140)
-        response = curve(result.plain_response if closed else result.loop.plain_open, grid)
+        response = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
         magnitude = response.magnitude_db - (_dc_db(result) if closed else 0.0)
         label, look = one.variant.name[:60], _look(len(made))
         top.curve(response.frequency_hz, magnitude, label, **look)

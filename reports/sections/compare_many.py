@@ -97,7 +97,7 @@ def table_text(comparison: Comparison) -> str:
     from reports.nightly.text import csv_text
 
     wanted = comparison.base.verdicts
-    header = ["design", "met", "not_met", "weakest", "room_percent"]
+    header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {verdict.id} [{verdict.requirement.unit}]" for verdict in wanted]
     return csv_text(header, (_row(one, comparison) for one in comparison.all))
@@ -105,11 +105,12 @@ def table_text(comparison: Comparison) -> str:
 
 def _row(one: Compared, comparison: Comparison) -> list[object]:
     near, verdict = weakest(one)
-    values = {v.id: v.value for v in one.verdicts}
+    values, count = {v.id: v.value for v in one.verdicts}, tally(one.verdicts)
     return [
         one.variant.name,
-        tally(one.verdicts).met,
-        failed(one),
+        count.met,
+        count.not_met,
+        count.not_proven,
         None if verdict is None else verdict.id,
         None if verdict is None else 100.0 * near,
         *(one.figures.get(name.key) for name in comparison.names),

@@ -9,7 +9,7 @@ from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
 from reports.sections.margins import shown
-from reports.sections.names import LOOPS, figure_column
+from reports.sections.names import figure_column, loop_words
 
 if TYPE_CHECKING:
     from analyses.corners import Corner, Corners
@@ -74,7 +74,8 @@ def _summary_table(result: Corners) -> Block:
         row: Row = {"corner": corner.name}
         for name in CORNERED:
             found = worst(corner, QUANTITIES[name])
-            row |= {name: found and found[0], f"{name}_loop": LOOPS[found[1]] if found else ""}
+            of = found and loop_words(found[1], corner.figures[found[1]].rotor)
+            row |= {name: found and found[0], f"{name}_loop": of or ""}
         rows.append({**row, "unmet": unmet(corner), "_status": None if corner.passed else "fail"})
     note = "The least margin is that of the stable loops; others are named under what is not met."
     return doc.table("Corners", columns, rows, note)
@@ -101,7 +102,7 @@ def _loop_table(rows: list[Row]) -> Block:
 def _row(corner: Corner, name: str, one: LoopFigures) -> Row:
     return {
         "corner": corner.name,
-        "loop": LOOPS[name],
+        "loop": loop_words(name, one.rotor),
         "stable": one.sound is True,
         **{each.name: shown(each, one.judged) for each in PER_LOOP},
     }

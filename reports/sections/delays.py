@@ -10,7 +10,7 @@ from reports.charts import style
 from reports.charts.paint import HATCHES
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Row, Section
-from reports.sections.names import LOOPS, hertz
+from reports.sections.names import hertz, loop_words
 
 PARTS = {
     "controller": "controller",
@@ -109,7 +109,7 @@ def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
 
 def _row(name: str, budget: DelayBudget) -> Row:
     return {
-        "loop": LOOPS[name],
+        "loop": loop_words(name),
         "crossover_hz": hertz(budget.frequency_rad_s),
         **budget.items,
         "total": budget.total_deg,

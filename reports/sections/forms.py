@@ -15,7 +15,7 @@ from reports.numbers import to_minus
 from reports.sections.loop import nyquist_hz
 from reports.sections.loop_charts import both
 from reports.sections.margins import cells, evidence_notes, margin_row, response_row
-from reports.sections.names import FORMS, LOOPS, figure_column
+from reports.sections.names import FORMS, figure_column, loop_words
 
 COLUMNS = [
     doc.column("loop", "Loop"),
@@ -74,7 +74,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {**cells(margins, response), "loop": LOOPS[name], "form": FORMS[form], "phase_cost_deg": cost}
+    row = {**cells(margins, response), "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
@@ -88,7 +88,7 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
             for form, result in forms.items()
             if name in result
         ]
-        top, bottom = chart.column(1.0, 1.0, title=LOOPS[name])
+        top, bottom = chart.column(1.0, 1.0, title=loop_words(name))
         both(curves, nyquist_hz(sampled), top, bottom, span=120.0)
         top.rule_y(0.0, colour=style.INK)
         bottom.rule_y(-180.0, colour=style.INK)

@@ -8,8 +8,9 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.quantities import AT_A_GLANCE
+from analyses.command_limits import said_of
 from analyses.loop_figures import LoopFigures
-from analyses.responses import curve, frequency_grid, nyquist_curve, response_at, sampled_step
+from analyses.responses import answer_curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import fixed, seconds, to_minus
@@ -31,8 +32,9 @@ FRAME = 1.6
 STEP_POINTS = 300
 
 
-def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures | None = None) -> Section:
-    """Make the section of one loop; ``locked`` is drawn beside it where given (current loop)."""
+def section(name: str, design: Design, figures: LoopFigures) -> Section:
+    """Make the section of one loop; of a current loop that with the rotor locked is drawn beside it."""
+    locked = figures.locked
     grid = frequency_grid(figures)
     title, status = LOOPS[name], worst_status([figures.sound])
     blocks = [_facts(figures), open_bode(title, figures, grid, name=name)]
@@ -44,7 +46,9 @@ def section(name: str, design: Design, figures: LoopFigures, locked: LoopFigures
     if figures.step is not None:
         blocks.append(step(title, figures, locked, name=name))
     blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
+    corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
     notes = [
+        *filter(None, [said_of(design, corner)]),
         *by_itself_notes({title: figures}),
         *evidence_notes({title: figures}),
         *figures.margins.notes,
@@ -70,7 +74,9 @@ def result(figures: LoopFigures) -> str:
     ]
     if bandwidth is not None:
         words.append(f"bandwidth {hertz_words(bandwidth)}")
-    verdict = f"{figures.margins.verdict.capitalize()} ({figures.margins.evidence})"
+    rotor = "Rotor free, " if figures.loop.name == "current" else ""
+    verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
+    verdict = verdict[0].upper() + verdict[1:]
     return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
 
 
@@ -119,7 +125,11 @@ def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> Block:
     """Make the closed-loop Bode figure with the bandwidths."""
-    curves = [("rotor free" if locked else "closed loop", curve(figures.plain_response, grid))]
+    other = figures.reference
+    first = "rotor free" if locked else "to the command" if other else "closed loop"
+    curves = [(first, answer_curve(figures, grid))]
+    if other is not None:
+        curves.append(("to the reference", answer_curve(other, grid)))
     if locked is not None and locked.stable:
         curves.append(("rotor locked", curve(locked.plain_response, grid)))
     band = figures.bandwidth
@@ -221,7 +231,7 @@ def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None)
     settled = figures.settling_time_s
     if end_s is None and settled is not None and math.isfinite(settled) and settled > 0:
         end_s = 2.2 * settled
-    period = loop_figures.loop.period_s
+    period = None if loop_figures.mean else loop_figures.loop.period_s
     if end_s is not None and period is not None and end_s / period < STEP_POINTS:
         response = sampled_step(loop_figures.plain_response, math.ceil(end_s / period) + 1)
         time = period * np.arange(len(response))

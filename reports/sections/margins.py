@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypedDict, cast
 
 from actuator_lti.quantities import Quantity
 from actuator_lti.verdict import Verdict
 from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
+from analyses.loop_survey import OperatingPointFigures
+from analyses.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
-from reports.numbers import to_minus
-from reports.sections.names import LOOPS, figure_column, hertz
+from reports.numbers import short, to_minus
+from reports.sections.names import LOOPS, figure_column, hertz, loop_words
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -63,18 +65,18 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures], locked: LoopFigures | None = None) -> Section:
-    """Make the section from the figures of the sampled, sliding loops."""
-    named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
+def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
+    """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
+    loops = named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
     notes = by_itself_notes(named)
     named = with_held(named)
-    if locked is not None and "Current loop, rotor held" not in named:
-        named["Current loop, rotor held"] = locked
+    own = with_own_margins(named)
     blocks = [
         *(doc.text(note) for note in notes),
-        margin_table(named),
+        margin_table(own),
+        *([spread_table(points, loops)] if points else ()),
         response_table(named),
-        doc.details("Every crossing of every loop", [crossing_table(named)]),
+        doc.details("Every crossing of every loop", [crossing_table(own)]),
         *(doc.text(note) for note in evidence_notes(named)),
     ]
     intro = (
@@ -95,7 +97,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
     ]
     if unstable:
         return f"Not known to be stable: {', '.join(unstable)}."
-    rows = {LOOPS[name].lower(): margin_row(loop_figures.judged) for name, loop_figures in figures.items()}
+    rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
     for margins, what, unit in (
         ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
@@ -153,11 +155,42 @@ def response_table(named: Mapping[str, LoopFigures]) -> Block:
     """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
-        "−90°. Current and velocity: the feedback loop. Position: the response from the command to the "
-        "output shaft, feed-forward and filters of the command included."
+        "−90°. Current and velocity: the feedback loop. Position: the response from the user's command to "
+        "the output shaft, feed-forward, mean of the profile and filter of the command included; to the "
+        "reference: behind profile and filter."
     )
     rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
+
+
+SPREAD_COLUMNS = [
+    doc.column("loop", "Loop"),
+    doc.column("gain", "Gain margin, operating points", "dB"),
+    doc.column("phase", "Phase margin, operating points", "deg"),
+]
+
+
+def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> Block:
+    """Make the table of the least and largest margins over the operating points that the drive has."""
+    seen = [point for point in points if point.kind != "describing-function"]
+    places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
+    labels = [next(iter(with_held({label: figures}))) for label, figures in named.items()]
+    rows: list[Row] = []
+    for label, figures in zip(labels, named.values(), strict=True):
+        name, own = figures.loop.name, spread(seen).get(figures.loop.name, {})
+        row: Row = {"loop": label}
+        row |= {key: range_words(own[f"{key}_margin"]) for key in ("gain", "phase") if f"{key}_margin" in own}
+        doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
+        row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
+        rows += [row] if len(row) > 1 else []
+    note = f"Operating points: {places}."
+    return doc.table("Margins over the operating points", SPREAD_COLUMNS, rows, note)
+
+
+def range_words(range_: Spread) -> str:
+    """Say between which values a figure lies over the operating points; empty where they agree."""
+    least, most = short(range_.least, 3), "∞" if math.isinf(range_.most) else short(range_.most, 3)
+    return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
 def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
@@ -235,13 +268,28 @@ def _state(figures: LoopFigures) -> State:
 
 
 def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
-    """Put the held loop behind each that is unstable only by itself, under a name that says so."""
+    """Put the other row of a loop behind it, under names that say which is which.
+
+    Of a current loop that with the rotor locked; of an inner loop that is unstable only by itself, the held
+    one; of a position loop behind a mean or filter of the command, its response to the reference.
+    """
     every: dict[str, LoopFigures] = {}
     for label, figures in named.items():
-        every[label] = figures
-        if figures.held is not None:
+        free = figures.loop.name == "current" and (figures.locked or figures.held)
+        every[f"{label}, rotor free" if free else label] = figures
+        if free:
+            every[f"{label}, rotor locked"] = free
+        elif figures.held is not None:
             every[f"{label}, {HELD[figures.loop.name]}"] = figures.held
+        if figures.reference is not None:
+            every[f"{label}, to the reference"] = figures.reference
     return every
+
+
+def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
+    """Without the rows that are another response of the same loop."""
+    others = [id(figures.reference) for figures in named.values() if figures.reference is not None]
+    return {label: figures for label, figures in named.items() if id(figures) not in others}
 
 
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
@@ -302,7 +350,7 @@ def _crossings(name: str, figures: LoopFigures) -> list[Row]:
 
 def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> Row:
     row = {
-        "_loop": next((key for key, words in LOOPS.items() if words == name), ""),
+        "_loop": next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), ""),
         "_hz": finite(hertz(omega_rad_s)) or None,
         "loop": name,
         "kind": kind,

@@ -20,6 +20,11 @@ POINTS = {
 QUANTITIES = {name: quantity.words for name, quantity in REGISTRY.items()}
 
 
+def loop_words(name: str, rotor: str = "free") -> str:
+    """Name a loop; of the current loop there are two."""
+    return f"{LOOPS[name]}, rotor {rotor or 'free'}" if name == "current" else LOOPS[name]
+
+
 def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> Column:
     """Describe the column of a figure of the registry: its heading, unit and better direction."""
     of = REGISTRY[quantity]

@@ -68,7 +68,9 @@ def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
     requirement = verdict.requirement
     what = QUANTITIES.get(requirement.quantity, requirement.quantity)
     if verdict.loop is not None:
-        return f"{verdict.loop.capitalize()} loop: {what}"
+        rotor = f", rotor {verdict.rotor}" if verdict.rotor else ""
+        to = f", to the {requirement.to}" if requirement.to and verdict.loop == "position" else ""
+        return f"{verdict.loop.capitalize()} loop{rotor}: {what}{to}"
     load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} {load_unit}"
     return f"Drive: {what}{load}"
 

@@ -194,7 +194,7 @@
     view(x.x_at(), count).set(hertz.map((f) => Math.min(2 * Math.PI * f * period, Math.PI)));
     if (x.limiters(count) <= 0) return null;
     const sizes = view(x.y_at(), 6 * count), input = data.step.of === "speed" ? ratio : 1;
-    const each = data.limits.map(([name, place, line]) => [name, hertz.map((f, k) => row[place] / (input * sizes[line * count + k]) / data.step.factor)]);
+    const each = data.limits.map(([name, place, line]) => [name, hertz.map((f, k) => row[place] / (input * sizes[line * count + k]) / data.step.factor / (sines ? Math.abs(sines.meanAt(row, f * period)[0]) : 1))]);
     return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
   };
   // the drive with all its limits and its friction, from rest; command and output as shares of the scale

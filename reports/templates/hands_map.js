@@ -1,6 +1,6 @@
 "use strict";
 // The map behind the sliders: sines from rest over frequency and amplitude, each run in the module with all limits and friction.
-// What a cell shows is named by the rule of analyses.large_signal.classify: the limit that acts most, stiction, friction, linear.
+// What a cell shows is named by the rule of analyses.large_signal.classify: the limit that acts most, stiction, friction (of a drive that has any) or what else is not linear, linear.
 const sineMap = ({ x, view, data }) => {
   const { columns, levels, updates, lowest, stick, decibel, degrees, longest, colours: COLOURS } = data.map, at = data.places;
   const spread = (low, high, count) => Array.from({ length: count }, (_, k) => low * (high / low) ** (k / (count - 1)));
@@ -16,11 +16,19 @@ const sineMap = ({ x, view, data }) => {
     view(x.x_at(), hertz.length).set(hertz.map((f) => 2 * Math.PI * f * x.period_of(3)));
     x.respond(3, hertz.length);
     const pairs = Array.from(view(x.y_at(), 2 * hertz.length));
-    return hertz.map((_, k) => [pairs[2 * k], pairs[2 * k + 1]]);
+    return hertz.map((f, k) => {
+      const [size, turn] = meanAt(row, f * x.period_of(3)), re = size * Math.cos(turn), im = size * Math.sin(turn);
+      return [pairs[2 * k] * re - pairs[2 * k + 1] * im, pairs[2 * k] * im + pairs[2 * k + 1] * re];
+    });
   };
+  const meanAt = (row, turns) => { // gain and phase of the mean over n samples that limits the jerk
+    const n = row[at.mean], half = Math.PI * turns;
+    return n > 1 ? [Math.sin(n * half) / (n * Math.sin(half)), -half * (n - 1)] : [1, 0];
+  };
+  const rubs = (row) => [at.dry, at.dry_reverse, at.load_dry, at.load_coefficient, at.friction_map].some((place) => row[place] > 0);
   const startUp = (row, settling) => { // ticks before a cell is looked at
     const every = row[at.outer];
-    return Math.min(Math.ceil(settling / row[at.period] / every) * every, Math.floor(longest / every) * every);
+    return Math.min((Math.ceil(settling / row[at.period] / every) + Math.max(row[at.mean], 1) - 1) * every, Math.floor(longest / every) * every);
   };
   const cell = (row, tone, amplitude, linear, before) => {
     view(x.p_at(), row.length).set(row);
@@ -46,7 +54,7 @@ const sineMap = ({ x, view, data }) => {
     const scale = 2 / (tone.count * amplitude), size = linear[0] ** 2 + linear[1] ** 2;
     const re = (inPhase * linear[0] + across * linear[1]) * scale / size, im = (across * linear[0] - inPhase * linear[1]) * scale / size;
     const off = Math.abs(20 * Math.log10(Math.max(Math.hypot(re, im), 1e-300))) > decibel || Math.abs(Math.atan2(im, re) * 180 / Math.PI) > degrees;
-    return off ? "friction" : "none";
+    return off ? (rubs(row) ? "friction" : "other") : "none";
   };
-  return { COLOURS, gridOf, startUp, toneOf, linearAt, cell };
+  return { COLOURS, gridOf, startUp, toneOf, linearAt, meanAt, cell };
 };

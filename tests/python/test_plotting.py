@@ -82,7 +82,7 @@ def test_the_border_and_the_map() -> None:
     assert {text.get_text() for text in panel.get_legend().get_texts()} == {
         f"{n} limit" for n in border.each_rad
     }
-    survey = LoopSurvey(design, loops, {"sampled": {}}, None, {}, (), {}, border)
+    survey = LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, border)
     assert len(survey.plot_map().lines) == len(panel.lines)
     map_ = amplitude_map(design, loops, counts=(4, 5))
     drawn = map_.plot_map()
@@ -92,7 +92,7 @@ def test_the_border_and_the_map() -> None:
     assert set(frame["cause"]) == present
     assert len(frame) == 20
     with pytest.raises(InputError, match="nothing limits"):
-        LoopSurvey(design, loops, {"sampled": {}}, None, {}, (), {}, None).plot_map()
+        LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map()
 
 
 def test_cells_keep_their_colours_when_some_are_missing() -> None:

@@ -68,7 +68,7 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert tally(verdicts).passes
     found = {verdict.loop: verdict for verdict in verdicts}
     assert found["current"].value == pytest.approx(expected, abs=1e-6)
-    assert "with the rotor held" in found["current"].reason
+    assert "with the rotor locked" in found["current"].reason
     assert "held" not in found["velocity"].reason
 
 
@@ -134,13 +134,13 @@ def test_the_command_line_says_which_case_it_is() -> None:
     assert done.exit_code == 0, done.output
     first = " ".join(done.output.split())
     assert first.startswith("PASS")
-    for words in ("all loops closed", "with the rotor held", "outer loops open and rotor free"):
+    for words in ("all loops closed", "with the rotor locked", "outer loops open and rotor free"):
         assert words in first
     done = run.invoke(build(), ["margins", "ilr33-amber", *PUSHED, "--json"])
     made = json.loads(done.output)
     assert (done.exit_code, made["passed"]) == (0, True)
     assert made["loops"]["current"]["stable"] is False
-    assert made["loops"]["current"]["judged"]["how"] == "rotor held"
+    assert made["loops"]["current"]["judged"]["how"] == "rotor locked"
     assert made["loops"]["current"]["judged"]["stable"] is True
     gone = [*SET, "load.moment_slope=1e9 N*m/rad"]
     done = run.invoke(build(), ["margins", "ilr33-amber", *gone])

@@ -1,0 +1,147 @@
+"""A requirement says which current loop and which response it means."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.bandwidth import closed_loop_bandwidth
+from actuator_lti.commanded import commanded_bandwidth, commanded_step
+from actuator_lti.design import design_hash, read_design_text, with_overrides, write_design
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.drive.profile import CommandMean, command_mean
+from actuator_lti.errors import InputError
+from actuator_lti.step import step_figures
+from analyses.loop_figures import all_loop_figures
+from analyses.requirements import evaluate_requirements
+from analyses.responses import answer_curve, response_at
+from nonlinear import commands, simulate
+from reports.sections.requirements import label
+
+
+def asking(design: Design, **keys: object) -> Design:
+    kept = {"id": "r", "quantity": "bandwidth", "unit": "Hz", "loop": "position", "minimum": 1.0}
+    return replace(design, requirements=(Requirement(**{**kept, **keys}),))  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def screw() -> Design:
+    return load_design("ballscrew")
+
+
+def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115(screw: Design) -> None:
+    """Simulated small sines: -2.37 dB at 5 Hz, -12.7 dB at 20 Hz; the profile alone is -3 dB at 5.5 Hz."""
+    smooth = replace(screw, friction=replace(screw.friction, load_coefficient=0.0))
+    figures = all_loop_figures(assemble_loops(smooth), step=False)["position"]
+    db = answer_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
+    assert db[0] == pytest.approx(-2.37, abs=0.01)
+    assert db[1] == pytest.approx(-12.7, abs=0.05)
+    (to_command,) = evaluate_requirements(asking(screw, to="command"))
+    (to_reference,) = evaluate_requirements(asking(screw, to="reference"))
+    (default,) = evaluate_requirements(asking(screw))
+    assert to_command.value == default.value == pytest.approx(5.62, abs=0.01)
+    assert to_reference.value == pytest.approx(114.8, abs=0.05)
+    assert label(to_command) == "Position loop: bandwidth (−3 dB), to the command"
+    assert "rate and acceleration of the command are not in it: they act above" in to_command.reason
+    assert "rate and acceleration" not in to_reference.reason
+
+
+def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
+    """The sentence beside the requirement, against a run of the simulator read by hand."""
+    (verdict,) = evaluate_requirements(asking(screw, to="command"))
+    full = screw.validation.full_deflection_rad
+    hz = verdict.value
+    assert hz is not None
+    onset = 1e3 * min(0.4 / (2.0 * np.pi * hz), 4.0 / (2.0 * np.pi * hz) ** 2)
+    assert f"above {onset:.3g} mm" in verdict.reason
+    run = simulate(screw, commands.sine(full, hz), 60.0 / hz)
+    late = run.time_s >= 20.0 / hz
+    turn, y = np.exp(-2j * np.pi * hz * run.time_s[late]), run.output_angle_rad[late]
+    gain_db = 20.0 * np.log10(2.0 * abs(np.mean((y - y.mean()) * turn)) / full)
+    said = float(verdict.reason.partition("50 mm: ")[2].partition(" dB")[0])
+    assert said == pytest.approx(gain_db, abs=0.1)
+
+
+@settings(max_examples=12, deadline=None)
+@given(samples=st.integers(2, 900))
+def test_the_bandwidth_behind_a_mean_is_that_of_a_dense_grid(samples: int) -> None:
+    response = assemble_loops(load_design("ilr33-amber")).plain_response
+    mean = CommandMean(samples, response.dt)
+    band = commanded_bandwidth(response, mean)
+    omega = np.linspace(0.0, 2.0 * np.pi / (samples * mean.period_s), 20_001)[1:-1]
+    omega = omega[omega < np.pi / response.dt]
+    z = np.exp(-1j * omega * response.dt)
+    total = response_at(response, omega) * (1.0 - z**samples) / (1.0 - z) / samples
+    below = int(np.argmax(np.abs(total) < np.sqrt(0.5)))
+    assert band.minus3db_rad_s is not None
+    assert omega[below - 1] * (1 - 1e-9) <= band.minus3db_rad_s <= omega[below] * (1 + 1e-9)
+    turned = int(np.argmax(np.unwrap(np.angle(total)) < -0.5 * np.pi))
+    assert band.minus90deg_rad_s is not None
+    assert omega[turned - 1] * (1 - 1e-9) <= band.minus90deg_rad_s <= omega[turned] * (1 + 1e-9)
+    assert band.resonance_peak_db == pytest.approx(max(20.0 * np.log10(np.abs(total)).max(), 0.0), abs=1e-5)
+
+
+def test_the_step_behind_a_mean_is_the_simulated_one(screw: Design) -> None:
+    response, mean = assemble_loops(screw).plain_response, command_mean(screw)
+    assert mean is not None
+    figures = commanded_step(response, step_figures(response), mean)
+    y = [0.0] * mean.samples
+    loop_y, x = [], np.zeros(len(response.A))
+    for _ in range(len(figures.time_s)):
+        loop_y.append(float((response.C @ x).item() + response.D.item()))
+        x = response.A @ x + response.B[:, 0]
+    y = [sum(loop_y[max(0, k - mean.samples + 1) : k + 1]) / mean.samples for k in range(len(loop_y))]
+    np.testing.assert_allclose(figures.response, y, atol=1e-9)
+    assert figures.overshoot_percent == pytest.approx(100.0 * (max(y) / figures.final_value - 1.0))
+    assert figures.settling_time_s == pytest.approx(
+        (1 + max(k for k, v in enumerate(y) if abs(v / figures.final_value - 1.0) > 0.02)) * mean.period_s
+    )
+
+
+def test_a_filter_of_the_command_is_in_one_response_only() -> None:
+    design = with_overrides(load_design("ilr33-amber"), {"command.filter_time": "50 ms"})
+    (to_command,) = evaluate_requirements(asking(design))
+    (to_reference,) = evaluate_requirements(asking(design, to="reference"))
+    bare = closed_loop_bandwidth(assemble_loops(load_design("ilr33-amber")).plain_response)
+    assert to_reference.value == pytest.approx(bare.minus3db_hz)
+    assert to_command.value is not None
+    assert to_command.value < 3.2 < to_reference.value  # 1/(2 pi 50 ms) = 3.18 Hz
+
+
+def test_a_requirement_chooses_the_current_loop() -> None:
+    design = load_design("ilr33-amber")
+    keys = {"quantity": "phase_margin", "unit": "deg", "loop": "current"}
+    for rotor, loops in (
+        ("free", assemble_loops(design)),
+        ("locked", assemble_loops(design, rotor="locked")),
+    ):
+        (verdict,) = evaluate_requirements(asking(design, **keys, rotor=rotor))
+        assert loops.current is not None
+        assert verdict.value == pytest.approx(stability_margins(loops.current.open_loop).phase_margin_deg)
+        assert label(verdict) == f"Current loop, rotor {rotor}: phase margin"
+    (verdict,) = evaluate_requirements(asking(design, **keys))
+    assert verdict.rotor == "free"
+
+
+def test_the_keys_are_read_written_and_hashed_where_they_stand() -> None:
+    bare, chosen = asking(load_design("ilr33-amber")), asking(load_design("ilr33-amber"), to="reference")
+    assert read_design_text(write_design(chosen), "d").requirements == chosen.requirements
+    assert design_hash(chosen) != design_hash(bare)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"rotor": "locked"}, "requirement.r.rotor"),
+        ({"to": "reference", "quantity": "phase_margin", "unit": "deg"}, "requirement.r.to"),
+        ({"to": "reference", "loop": "velocity"}, "requirement.r.to"),
+    ],
+)
+def test_a_key_that_says_nothing_is_refused(keys: dict[str, str], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_design_text(write_design(asking(load_design("ilr33-amber"), **keys)), "d")
