@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -44,11 +44,13 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from reports.charts.chart import Chart
 
+T = TypeVar("T")
+
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
-    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "load", "loads", "plain",
-    "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived", "walk",
-    "with_columns",
+    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "listing", "load",
+    "loads", "plain", "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived",
+    "walk", "with_columns",
 ]  # fmt: skip
 
 
@@ -120,6 +122,27 @@ def table(
         "rows": [plain(row) for row in rows],
         "note": note,
     }
+
+
+def listing(
+    caption: str,
+    items: Iterable[T],
+    columns: Sequence[tuple[Column, Callable[[T], Any]]],
+    note: str = "",
+    status: Callable[[T], Status | None] | None = None,
+) -> Block:
+    """Make a table of items, a row each: every column with what it shows of an item.
+
+    Examples
+    --------
+    >>> listing("Squares", [2, 3], [(column("n", "n", format="int"), lambda n: n * n)])["rows"]
+    [{'n': 4}, {'n': 9}]
+    """
+    rows = [
+        {one["key"]: read(item) for one, read in columns} | ({"_status": status(item)} if status else {})
+        for item in items
+    ]
+    return table(caption, [one for one, _ in columns], rows, note)
 
 
 def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = "wide") -> Block:
