@@ -15,7 +15,7 @@ def states_at(A: np.ndarray, B: np.ndarray, points: np.ndarray) -> np.ndarray:
     The states are scaled by powers of two first: of ones of very different size a small response, behind a
     soft spring say, would keep few digits.
     """
-    A, scale = _balanced(A)
+    A, scale = balanced(A)
     B = B / scale[:, None]
     result = np.empty((len(points), *B.shape), dtype=complex)
     own = np.arange(len(A))
@@ -28,7 +28,7 @@ def states_at(A: np.ndarray, B: np.ndarray, points: np.ndarray) -> np.ndarray:
     return result * scale[:, None]
 
 
-def _balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def balanced(A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """D^-1 A D with rows and columns of like size, and the diagonal of D."""
     from scipy.linalg import matrix_balance
 

@@ -32,6 +32,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.errors import NumericalError
+from actuator_lti.resolvent import balanced
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
 from nonlinear.loop_setup import LoopSetup, every, loop_setup
@@ -48,9 +49,14 @@ RETURNED = {
 }  # fmt: skip
 GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where the error is stated
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
-PASSES = 2  # of choosing steps by what they do to the response that the last choice gave
-DECADES = range(-5, 13)  # of a step, about the kick's own motion
-BENT = 100.0  # times the best agreement: the step is so large that the derivative bends
+ROUGH, FINE = 10, 1  # largest decade of a step: about the motion that a kick begins with, and in a sine
+STEPS, LEAST_DECADE = 10, -30
+LEAST_STEP = 1e-9  # of the number itself
+FALLING = 0.2  # of the disagreement of the step before: it still falls as a bend lets it
+PASSES = 3  # of choosing steps by what they do to the response that the last choice gave
+BENT = 100.0  # times the best agreement: a step so large that the derivative bends
+LOST = 1e-3  # of a response
+NONE = 1e-14  # of a response: no difference
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
 
 
@@ -72,6 +78,8 @@ class Tangent:
         Names of the numbers of the state that the injection moves, as the layout has them.
     stated_error : float
         Largest error of the response, relative, by what two step sizes differ in.
+    places : ndarray of int, shape (n,)
+        Where the states lie in the row of the state.
     """
 
     place: str
@@ -82,7 +90,8 @@ class Tangent:
     period_s: float
     hold_s: float
     states: tuple[str, ...]
-    stated_error: float = field(repr=False)
+    stated_error: float
+    places: npt.NDArray[np.intp] = field(repr=False, default_factory=lambda: np.empty(0, np.intp))
 
     @cached_property
     def system(self) -> Any:
@@ -107,10 +116,11 @@ class Tangent:
         closed = self.closed(points)
         return np.asarray(closed / (1.0 - closed))
 
-    def lifted(self, z: complex) -> Complexes:
-        """The transfer matrix over a base period, shape (M, M), at a point z of the place's own rate."""
-        turned = z ** self.B.shape[1] * np.eye(len(self.A)) - self.A
-        return np.asarray(self.C @ np.linalg.solve(turned, self.B.astype(complex)) + self.D)
+    def lifted(self, point: complex) -> Complexes:
+        """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
+        A, scale = balanced(self.A)
+        inside = np.linalg.solve(point * np.eye(len(A)) - A, (self.B / scale[:, None]).astype(complex))
+        return np.asarray(self.C * scale @ inside + self.D)
 
     def at_gain(self, gain: float) -> Floats:
         """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""
@@ -127,6 +137,8 @@ class Tangent:
 
 def response(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> Complexes:
     """The fundamental of a lifted system at points of the faster rate, shape of z."""
+    A, scale = balanced(A)
+    B, C = B / scale[:, None], C * scale
     M, n = B.shape[1], len(A)
     points = z.reshape(-1, 1, 1)
     inside = np.linalg.solve(points**M * np.eye(n) - A, np.broadcast_to(B.astype(complex), (z.size, n, M)))
@@ -196,22 +208,22 @@ class _Bench:
         self.watched = places_of(self.drive.p, FLAG, COUNTER)
         self.calm = self._over(self.drive.start, np.zeros(self.updates))
         self.moved, self.scale, self.kick = self._reached()
+        self._known: dict[tuple[int, bytes], list[_Column]] = {}
 
     def tangent(self) -> Tangent:
         """Every column by the step that serves the response best, and the error that is left in it."""
         n, z = self.moved.size, np.exp(1j * GRID)
-        columns = [self._tried(k) for k in range(n + self.updates)]
-        weight = 1.0 / np.concatenate([self.scale, np.full(self.updates, self.kick)])
-        chosen = [each.best(weight[None], np.ones(1)) for each in columns]
+        rough = np.stack([column for column, _ in self._columns(self.scale, ROUGH, None)], axis=1)
+        left, right = sensitivities(*_split(rough, n), z)
+        sway = self.kick * np.max(np.abs(right[:, :n]), axis=0)  # of each number in a sine of the kick's size
+        seen = None
         for _ in range(PASSES):
+            chosen = self._columns(np.where(np.isfinite(sway) & (sway > 0.0), sway, self.scale), FINE, seen)
             parts = _split(np.stack([column for column, _ in chosen], axis=1), n)
-            left, right = sensitivities(*parts, z)
-            chosen = [each.best(np.abs(left), np.abs(right[:, k])) for k, each in enumerate(columns)]
-        parts = _split(np.stack([column for column, _ in chosen], axis=1), n)
-        left, right = (np.abs(each) for each in sensitivities(*parts, z))
+            left, right = (np.abs(each) for each in sensitivities(*parts, z))
+            size = sized(response(*parts, z))
+            seen = left / size[:, None], right
         off = np.stack([error for _, error in chosen], axis=1)
-        size = np.abs(response(*parts, z))
-        error = np.einsum("zi,ik,zk->z", left, off, right) / (size + FAINT * size.max(initial=1e-300))
         tick_s = self.setup.design.controller.period_s
         return Tangent(
             self.place,
@@ -219,8 +231,23 @@ class _Bench:
             period_s=self.setup.base_ticks * tick_s,
             hold_s=self.hold * tick_s,
             states=names_of(self.moved),
-            stated_error=float(np.max(error)),
+            stated_error=float(np.max(np.einsum("zi,ik,zk->z", seen[0], off, right))),
+            places=self.moved,
         )
+
+    def _columns(
+        self, scale: Floats, most: int, seen: tuple[Floats, Floats] | None
+    ) -> list[tuple[Floats, Floats]]:
+        """Columns of A over C beside B over D, and their errors, by what the response sees of them."""
+        felt = np.maximum(scale, LEAST_STEP * np.abs(self.drive.start[self.moved]))
+        units = np.concatenate([felt, np.full(self.updates, self.kick)])
+        key = (most, units.tobytes())
+        if key not in self._known:
+            self._known[key] = [self._tried(k, unit, most) for k, unit in enumerate(units)]
+        tried = self._known[key]
+        if seen is None:
+            return [each.best(1.0 / units[None], np.array([units[k]])) for k, each in enumerate(tried)]
+        return [each.best(seen[0], seen[1][:, k]) for k, each in enumerate(tried)]
 
     def _over(self, state: Floats, injected: Floats) -> tuple[Floats, Floats, Floats]:
         """State behind one base period, what came back at each update, and the flags on the way."""
@@ -279,23 +306,25 @@ class _Bench:
             quiet, period = (0 if new.any() else quiet + 1), period + 1
         return moved
 
-    def _tried(self, k: int) -> _Column:
-        """One column of A over C (B over D) by every step without an event."""
-        n = self.moved.size
-        unit = self.scale[k] if k < n else self.kick
-        found = []
-        for decade in DECADES:
+    def _tried(self, k: int, unit: float, most: int) -> _Column:
+        """One column by steps that fall by tens from ``unit`` times ten to the ``most``, without an event."""
+        found: list[tuple[Floats, Floats]] = []
+        off = [np.inf]
+        for decade in range(most, LEAST_DECADE, -1):
             quotient, rounding = self._difference(k, unit * 10.0**decade)
-            if quotient is None:
+            if quotient is None or not np.isfinite(rounding).all():
+                continue
+            if found:
+                off.append(float(np.max(np.abs(quotient - found[-1][0]))))
+            found.append((quotient, rounding))
+            if len(found) >= STEPS and off[-1] > FALLING * off[-2]:  # no longer bent
                 break
-            if np.isfinite(rounding).all():
-                found.append((quotient, rounding))
         if len(found) < 2:
-            name = names_of(self.moved)[k] if k < n else "the injection"
+            name = names_of(self.moved)[k] if k < self.moved.size else "the injection"
             raise NumericalError(
                 f"{self.setup.design.name}: {self.place}: every step of {name} ends in an event"
             )
-        return _Column(*(np.stack(each) for each in zip(*found, strict=True)))
+        return _Column(*(np.stack(each[::-1]) for each in zip(*found, strict=True)))
 
     def _difference(self, k: int, step: float) -> tuple[Floats | None, Floats]:
         """Central difference of state and returned values over one number, and what rounding may make of it.
@@ -334,11 +363,9 @@ class _Column:
         The error of a step is what it differs in from the next smaller one, and what rounding may make of it.
         """
         off = np.maximum(np.abs(np.diff(self.values, axis=0)), self.rounding[1:])
-        seen = np.max((off @ left.T) * right, axis=1)
-        least = np.minimum.accumulate(seen)
-        bent = np.flatnonzero((seen > BENT * least) & (seen > 0.0))
-        last = int(bent[0]) if bent.size else seen.size
-        k = int(np.argmin(seen[:last]))
+        seen = np.maximum(np.max((off @ left.T) * right, axis=1), NONE)
+        bent = np.flatnonzero((seen > BENT * np.minimum.accumulate(seen)) & (seen > LOST))
+        k = int(np.argmin(seen[: bent[0]] if bent.size else seen))
         return self.values[k + 1], off[k]
 
 
@@ -380,13 +407,15 @@ class _Injection:
 
 def sensitivities(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> tuple[Complexes, Complexes]:
     """What an entry (i, k) of A over C beside B over D does to the fundamental at z: left_i right_k."""
+    A, scale = balanced(A)
+    B, C = B / scale[:, None], C * scale
     M, n = B.shape[1], len(A)
     turned = z.reshape(-1, 1, 1) ** M * np.eye(n) - A
     turn = z.reshape(-1, 1) ** np.arange(M)
     back = 1.0 / (turn * M)
     right = np.linalg.solve(turned, (turn @ B.T)[:, :, None])[:, :, 0]
     left = np.linalg.solve(turned.transpose(0, 2, 1), (back @ C)[:, :, None])[:, :, 0]
-    return np.concatenate([left, back], axis=1), np.concatenate([right, turn], axis=1)
+    return np.concatenate([left / scale, back], axis=1), np.concatenate([right * scale, turn], axis=1)
 
 
 def _split(whole: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats]:
@@ -394,6 +423,11 @@ def _split(whole: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> Floats:
-    """Difference over size, a faint part of a response by its dominant part."""
-    size = np.abs(wanted)
-    return np.asarray(np.abs(np.asarray(found) - wanted) / (size + FAINT * np.max(size, initial=1e-300)))
+    """Difference over size, see `sized`."""
+    return np.asarray(np.abs(np.asarray(found) - wanted) / sized(wanted))
+
+
+def sized(response: npt.ArrayLike) -> Floats:
+    """Size of a response, of a faint part of it that of its dominant part in part."""
+    size = np.abs(response)
+    return np.asarray(size + FAINT * np.max(size, initial=1e-300))

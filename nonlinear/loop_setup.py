@@ -51,6 +51,8 @@ class LoopSetup:
     limits_on : bool
     held : bool
         Whether the rotor is held at its speed.
+    gain : float
+        Factor on the loop gain at the place.
     """
 
     design: Design
@@ -58,6 +60,7 @@ class LoopSetup:
     bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
+    gain: float = 1.0
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -118,9 +121,9 @@ class LoopSetup:
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 
-    def row(self, *, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
+    def row(self) -> Rows:
         """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
-        return self.rows(np.array([gain]), np.array([delay_samples]))
+        return self.rows(self.gain)
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
         """Parameters of runs that start in the steady state of the operating motion, one a value.

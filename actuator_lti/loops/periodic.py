@@ -22,6 +22,7 @@ from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block, seen, siso
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.resolvent import balanced
 from actuator_lti.rest_mode import System, without_common_rest_mode
 
 if TYPE_CHECKING:
@@ -123,11 +124,15 @@ class PeriodicLoop:
 
     def modes(self, gain: float = 1.0) -> np.ndarray:
         """Eigenvalues over one period with the loop closed through a gain."""
+        modes = np.asarray(np.linalg.eigvals(self._over(gain)), dtype=complex)
+        return modes[np.argsort(np.abs(modes - 1.0))[self.hidden :]] if self.hidden else modes
+
+    def _over(self, gain: float) -> np.ndarray:
+        """What one period does to the states with the loop closed through a gain."""
         over = np.eye(self.systems[0][0].shape[0])
         for A, B, C in self.systems:
             over = (A - gain * B @ C) @ over
-        modes = np.asarray(np.linalg.eigvals(over), dtype=complex)
-        return modes[np.argsort(np.abs(modes - 1.0))[self.hidden :]] if self.hidden else modes
+        return over
 
     def radius(self, gain: float = 1.0) -> float:
         """Largest magnitude of a mode."""
@@ -155,7 +160,10 @@ class PeriodicLoop:
         z = np.asarray(points, dtype=complex)
         turn, n = z.reshape(-1, 1), self.systems[0][0].shape[0]
         forced, over = np.zeros((turn.size, n), dtype=complex), np.eye(n)
-        closed = [(A - B @ C, B[:, 0], C[0]) for A, B, C in self.systems]
+        _, scale = balanced(self._over(1.0))
+        closed = [
+            ((A - B @ C) * scale / scale[:, None], B[:, 0] / scale, C[0] * scale) for A, B, C in self.systems
+        ]
         for m, (A, b, _) in enumerate(closed):
             forced, over = forced @ A.T + turn**m * b, A @ over
         M = len(closed)

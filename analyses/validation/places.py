@@ -1,0 +1,159 @@
+"""The places of a drive that are judged: its loops, its break points, the command and the load.
+
+Loops stand on the operating motion that `nonlinear.operating_motion` chooses, without counts, noise and
+supply, which are no part of a loop.  The linear writing may be that of another drive, the ``model``: a wrong
+one shows what a validation sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from analyses.loop_figures import LoopFigures, loop_figures
+from analyses.validation.small_signal import Place
+from nonlinear import tangent
+from nonlinear.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
+from nonlinear.on_the_bench import on_the_bench
+from nonlinear.operating_motion import on_its_stand
+
+if TYPE_CHECKING:
+    from actuator_lti.drive.operating import Operating
+    from actuator_lti.loops import Loop, Loops
+    from nonlinear import Tangent
+
+Complexes = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A drive on the bench in both writings.
+
+    Attributes
+    ----------
+    design : Design
+        What is simulated.
+    model : Design
+        What predictions are made of.
+    """
+
+    design: Design
+    model: Design
+    _assembled: dict[Operating, Loops] = field(default_factory=dict, init=False, repr=False)
+
+    @cached_property
+    def drive(self) -> Design:
+        """The simulated drive as its loops are tested; a faint command does not reach the profile."""
+        return _faint(on_its_stand(on_the_bench(self.design)), self.design)
+
+    @cached_property
+    def linear(self) -> Design:
+        """The drive that is predicted, tested alike."""
+        return _faint(on_its_stand(on_the_bench(self.model), self.design), self.model)
+
+    def setup(self, name: str) -> LoopSetup:
+        """How a place is tested; without limits."""
+        return loop_setup(self.drive, name, limits_on=False, held=name == "current")
+
+    def loops(self, name: str) -> Loops:
+        """The linear loops on the motion of a place."""
+        from actuator_lti.loops import assemble_loops
+
+        at = self.setup(name).bias.operating(self.drive)
+        if at not in self._assembled:
+            self._assembled[at] = assemble_loops(
+                self.linear, operating_point=at.point, speed_rad_s=at.speed_rad_s
+            )
+        return self._assembled[at]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Loops innermost first, break points, paths."""
+        behind = self.design.coupling is not None or self.design.load.path == "back-drivable"
+        paths = PATHS if behind else ("command",)  # a self-locking rigid drive does not yield to its load
+        return (*stages_of(self.design), *points_of(self.design), *paths)
+
+    def loop(self, name: str) -> Loop:
+        """The linear loop of a stage; of the current with the rotor locked, as it is tested."""
+        from actuator_lti.loops import assemble_loops
+
+        if name == "current":
+            return assemble_loops(self.linear, rotor="locked").present["current"]
+        return self.loops(name).present[name]
+
+    @cached_property
+    def figures(self) -> dict[str, LoopFigures]:
+        """Figures of the loops with the outer ones open, by stage."""
+        return {name: loop_figures(self.loop(name)) for name in stages_of(self.design)}
+
+    def places(self) -> Iterator[Place]:
+        """All of them; a tangent is measured as each is asked for."""
+        for name in self.names:
+            yield self.place(name)
+
+    def place(self, name: str) -> Place:
+        """One place, its tangent measured."""
+        setup = self.setup(name)
+        found = tangent(self.drive, name, setup=setup)
+        if name in self.figures:
+            own = self.figures[name]
+            closed = own.loop.plain_closed
+            return Place(
+                name=name, condition=setup.condition, tangent=found, predicted=closed, poles=closed.poles(),
+                figures=own,
+            )  # fmt: skip
+        loops = self.loops(name)
+        if name in PATHS:
+            response, poles = self._path(name, loops)
+            return Place(name=name, condition=setup.condition, tangent=found, predicted=response, poles=poles)
+        return self._point(name, setup, found, loops)
+
+    def _path(self, name: str, loops: Loops) -> tuple[Callable[[Complexes], Complexes], Complexes]:
+        """Response of the output to command or load, and no poles: those of the loops are its own."""
+        none = np.empty(0, complex)
+        if name == "load":
+            assert loops.moment_system is not None
+            return loops.moment_system(), none
+        scale = self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
+        return (lambda z: scale * np.asarray(loops.plain_response(z), complex)), none
+
+    def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
+        """A break point with all loops closed."""
+        from actuator_lti.loops import exact_margins, periodic_loop
+
+        loop = periodic_loop(loops, name)
+        own = loops.break_points[name]
+        return Place(
+            name=name, condition=setup.condition, tangent=found, predicted=loop.closed, poles=loop.modes(),
+            exact=exact_margins(loops, name), critical=loop.modes,
+            figures=None if own.periodic else loop_figures(own, bandwidth=False, step=False),
+            delayed=(lambda delay_s: self._delayed(delay_s)) if name == "u" else None,
+        )  # fmt: skip
+
+    def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
+        """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
+        from actuator_lti.loops import periodic_loop
+
+        longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
+        return tangent(longer.drive, "u", setup=longer.setup("u")), periodic_loop(
+            longer.loops("u"), "u"
+        ).modes()
+
+
+def _later(design: Design, more_s: float) -> Design:
+    control = design.controller
+    return replace(design, controller=replace(control, computing_delay_s=control.computing_delay_s + more_s))
+
+
+def _faint(bench: Design, design: Design) -> Design:
+    """With the filter of the command, whose rates a faint command does not reach."""
+    return replace(
+        bench, command=replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+    )

@@ -1,0 +1,88 @@
+"""One check of a validation: what is predicted, what the simulator shows, and whether the two agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+from actuator_lti.verdict import Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One prediction beside what the simulator shows of it.
+
+    Attributes
+    ----------
+    name : str
+        Quantity: ``"response"``, ``"gain_margin"``, ``"breakaway_torque"``, ...
+    loop : str
+        Stage, break point, ``"command"``, ``"load"``, or ``"drive"``.
+    unit : str
+        Of the predicted and found value.
+    predicted, found : float or None
+        ``None`` where the row judges more than one number (a response); ``because`` says which was worst.
+    error, allowed : float
+        Difference, and the largest that is agreement; in ``unit``, relative where both values are ``None``.
+    verdict : Verdict
+        ``met``, ``not met``, or ``not proven``: the simulator's own accuracy does not suffice.
+    because : str
+    condition : str
+        On which motion.
+    """
+
+    name: str
+    loop: str
+    unit: str = ""
+    predicted: float | None = None
+    found: float | None = None
+    error: float = 0.0
+    allowed: float = 0.0
+    verdict: Verdict = Verdict.MET
+    because: str = ""
+    condition: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What the row judges: the same in every design."""
+        return self.loop, self.name, self.condition
+
+    def __str__(self) -> str:
+        known = self.found is not None and self.predicted is not None
+        values = f" predicted {self.predicted:.6g}, found {self.found:.6g} {self.unit}" if known else ""
+        words = f"error {self.error:.2g}, allowed {self.allowed:.2g}"
+        return f"{self.loop} {self.name}:{values} {self.verdict}; {words}"
+
+
+def judged(
+    name: str,
+    loop: str,
+    predicted: float | None,
+    found: float | None,
+    allowed: float,
+    *,
+    unit: str = "",
+    because: str = "",
+    condition: str = "",
+    resolved: bool = True,
+) -> Row:
+    """Judge one number: both there and within ``allowed``, or both absent.
+
+    ``resolved`` says whether the measurement is good enough to tell a wrong prediction.
+    """
+    if predicted is None or found is None:
+        error = 0.0 if predicted is found else inf
+    else:
+        error = abs(found - predicted) if isfinite(found) else inf
+    return Row(
+        name=name,
+        loop=loop,
+        unit=unit,
+        predicted=predicted,
+        found=found,
+        error=error,
+        allowed=allowed,
+        verdict=Verdict.of(error <= allowed) if resolved else Verdict.NOT_PROVEN,
+        because=because,
+        condition=condition,
+    )

@@ -1,0 +1,333 @@
+"""Every small-signal prediction judged by the simulator's own derivative (`nonlinear.tangent`).
+
+The tangent T of a place and the linear writing are two linear models of the same drive that share no code.
+Compared are the response at `GRID` and at every figure's own frequency, the poles, every gain and phase
+margin, the delay margin at the voltage, bandwidths and peaks.  What is allowed is 1e-6 of the response, or
+ten times the tangent's stated error; for a figure, what that does to it.
+
+A gain margin is a gain K and a point on the unit circle where, with G the tangent over one base period,
+
+    det(I + (K - 1) G(lambda)) = 0,   |lambda| = 1:
+
+there the simulator has a closed-loop pole.  It is solved for K and the angle from the predicted ones, and the
+same pole is followed to K (1 - 1e-6) and K (1 + 1e-6), where it lies on either side of the circle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from math import degrees, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.verdict import Verdict
+from analyses.loop_figures import LoopFigures
+from analyses.validation.row import Row, judged
+from nonlinear import Tangent
+from nonlinear.derivative import GRID, relative
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import ExactMargins
+
+Complexes = npt.NDArray[np.complex128]
+WITHIN = 1e-6  # of a response, of a margin
+SURE = 10.0  # times the stated error
+RESOLVED = 1e-4  # of a response: a tangent that is worse proves nothing
+BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the circle
+ROUNDING = 1e-12  # of the norm of A, that an eigenvalue is computed with
+NEWTON_STEPS = 25
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A loop or a path in both writings.
+
+    Attributes
+    ----------
+    name : str
+    condition : str
+        The motion that it is tested on, in words.
+    tangent : Tangent
+    predicted : callable
+        T at points z of the place's own rate, by the linear writing.
+    poles : ndarray
+        Closed-loop poles over one base period, by the linear writing.
+    figures : LoopFigures or None
+        Of a loop; its margins are judged where it is not periodic.
+    exact : ExactMargins or None
+        Of a break point with all loops closed.
+    critical : callable
+        Eigenvalues over one base period at a gain, by the linear writing.
+    delayed : callable or None
+        Design with a longer computing delay, and its poles over one base period; only at the voltage.
+    """
+
+    name: str
+    condition: str
+    tangent: Tangent
+    predicted: Callable[[Complexes], Complexes]
+    poles: Complexes
+    figures: LoopFigures | None = None
+    exact: ExactMargins | None = None
+    critical: Callable[[float], Complexes] | None = None
+    delayed: Callable[[float], tuple[Tangent, Complexes]] | None = None
+
+    @property
+    def allowed(self) -> float:
+        """Relative difference of the response that is agreement."""
+        return max(WITHIN, SURE * self.tangent.stated_error)
+
+    def judged(self, name: str, predicted: float | None, found: float | None, allowed: float, unit: str,
+               because: str = "") -> Row:  # fmt: skip
+        """A row of this place; not proven where the tangent is too coarse."""
+        proven = self.allowed <= RESOLVED
+        why = because if proven else f"stated error of the tangent {self.tangent.stated_error:.1e}"
+        return judged(
+            name, self.name, predicted, found, allowed, unit=unit, because=why, condition=self.condition,
+            resolved=proven,
+        )  # fmt: skip
+
+
+def small_signal(place: Place) -> list[Row]:
+    """All rows of one place."""
+    rows = [_response(place)]
+    if place.poles.size:
+        rows.append(_poles(place))
+    if place.exact is not None and place.exact.stable:
+        rows += _exact_margins(place, place.exact)
+    if place.figures is not None:
+        rows += _loop_margins(place, place.figures)
+        rows += _figures(place, place.figures)
+    return rows
+
+
+def _response(place: Place) -> Row:
+    """The response at the grid and at every figure's own frequency."""
+    angles = np.unique(np.concatenate([GRID, [x for x in _marks(place) if 0.0 < x < pi]]))
+    z = np.exp(1j * angles)
+    wanted = place.predicted(z)
+    off = relative(place.tangent.closed(z), wanted)
+    k = int(np.argmax(off))
+    where = f"worst at {angles[k] / (2.0 * pi * place.tangent.hold_s):.3g} Hz, of {angles.size} frequencies"
+    row = place.judged("response", 0.0, float(off[k]), place.allowed, "1", where)
+    return replace(row, predicted=None, found=None, error=float(off[k]))
+
+
+def _marks(place: Place) -> list[float]:
+    """Angles a sample at which the loop has figures."""
+    if place.figures is None:
+        return []
+    figures, hold = place.figures, place.tangent.hold_s
+    at = [m.frequency_rad_s for m in (*figures.margins.gain_margins, *figures.margins.phase_margins)]
+    if figures.bandwidth is not None:
+        band = figures.bandwidth
+        at += [x for x in (band.minus3db_rad_s, band.minus90deg_rad_s, band.resonance_rad_s) if x]
+    if figures.peaks is not None:
+        at += [figures.peaks.sensitivity_rad_s, figures.peaks.complementary_rad_s]
+    return [x * hold for x in at]
+
+
+def _poles(place: Place) -> Row:
+    """Each predicted pole beside the tangent's nearest eigenvalue, by their rates."""
+    from scipy.linalg import eig, matrix_balance
+
+    A = matrix_balance(place.tangent.A, permute=False)[0]
+    found, left, right = eig(A, left=True)
+    sharp = np.abs(np.sum(left.conj() * right, axis=0))  # of unit vectors: 1 over the condition number
+    rounding = ROUNDING * float(np.linalg.norm(A))
+    worst, at, resolved = 0.0, 0j, 0
+    for pole in place.poles[np.abs(place.poles) > 0.0]:
+        k = int(np.argmin(np.abs(found - pole)))
+        blur = rounding / max(float(sharp[k]), 1e-300)
+        if blur > WITHIN * abs(pole):
+            continue
+        resolved += 1
+        rate = abs(np.log(complex(pole)))
+        off = abs(found[k] - pole) / abs(pole) / (rate + blur / WITHIN)
+        if off > worst:
+            worst, at = float(off), complex(pole)
+    size = abs(at)
+    words = f"{resolved} of {place.poles.size} poles resolved in double precision"
+    if worst:
+        words += f"; worst at |z| = {size:.6g} over {place.tangent.period_s:.3g} s"
+    row = place.judged("poles", 0.0, worst, place.allowed, "1", words)
+    return replace(row, predicted=None, found=None, error=worst)
+
+
+def _pole_equation(t: Tangent, gain: complex, point: complex) -> complex:
+    """Zero where the tangent has a closed-loop pole at a point (over one base period) at a gain."""
+    whole = t.lifted(point)
+    return complex(np.linalg.det(np.eye(len(whole)) + (gain - 1.0) * whole))
+
+
+def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
+    """Gain and angle of the closed-loop pole on the circle nearest to those given, by Newton's method."""
+    log_gain, step = float(np.log(gain)), 1e-6
+    turn = 0.0 if angle == 0.0 or abs(angle - pi) < 1e-12 else 1.0
+    for _ in range(NEWTON_STEPS):
+        value, by_gain, by_angle = (
+            _pole_equation(t, np.exp(log_gain + a), np.exp(1j * (angle + b)))
+            for a, b in ((0.0, 0.0), (step, 0.0), (0.0, step))
+        )
+        gains, angles = (by_gain - value) / step, (by_angle - value) / step
+        if turn:
+            slope = np.array([[gains.real, angles.real], [gains.imag, angles.imag]])
+            try:
+                move = np.linalg.solve(slope, [-value.real, -value.imag])
+            except np.linalg.LinAlgError:
+                return None
+        else:
+            move = np.array([-value.real / gains.real, 0.0]) if gains.real else np.array([np.nan, 0.0])
+        if not np.isfinite(move).all() or abs(log_gain + move[0]) > 50.0:
+            return None
+        move[1] = np.clip(move[1], -0.1, 0.1)
+        log_gain, angle = log_gain + float(move[0]), angle + float(move[1])
+        if abs(move[0]) < 1e-14 and abs(move[1]) < 1e-13:
+            break
+    return float(np.exp(log_gain)), angle
+
+
+def _followed(t: Tangent, gain: float, point: complex) -> complex:
+    """The closed-loop pole at a gain nearest to a point, by Newton's method."""
+    for _ in range(NEWTON_STEPS):
+        step = 1e-7 * abs(point)
+        value = _pole_equation(t, gain, point)
+        slope = (_pole_equation(t, gain, point + step) - value) / step
+        if slope == 0.0 or not np.isfinite(slope):
+            break
+        move = value / slope
+        point -= move
+        if abs(move) < 1e-15 * abs(point):
+            break
+    return point
+
+
+def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
+    """One gain margin: where the tangent's pole crosses, and on which side it lies to either side of it.
+
+    ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
+    """
+    t = place.tangent
+    allowed = place.allowed * _lever(ratio)
+    found = _crossing(t, ratio, angle)
+    if found is None:
+        return place.judged(name, ratio, None, allowed * ratio, "1", "no closed-loop pole crosses there")
+    gain, turned = found
+    sides = [abs(_followed(t, ratio * x, np.exp(1j * turned))) - 1.0 for x in (1.0 - BESIDE, 1.0 + BESIDE)]
+    hertz = turned / (2.0 * pi * t.period_s)
+    words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
+    row = place.judged(name, ratio, gain, allowed * ratio, "1", words)
+    crossed = sides[0] < 0.0 < sides[1] if outward == 1 else sides[1] < 0.0 < sides[0]
+    if (
+        outward is not None
+        and row.error < 0.1 * BESIDE * ratio
+        and not crossed
+        and max(map(abs, sides)) > 1e-13
+    ):
+        return replace(row, verdict=Verdict.NOT_MET, because=f"{words}: it crosses the other way")
+    return row
+
+
+def _lever(ratio: float) -> float:
+    """What a relative change of T makes of a gain margin K, where T = -1/(K - 1), at least 1."""
+    return max(1.0, abs(ratio - 1.0) / ratio)
+
+
+def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:
+    """Gain limits with all loops closed, up and down, and the computing delay at the voltage."""
+    assert place.critical is not None
+    for name, gain, outward in (
+        ("gain_margin_up", exact.gain_upper, 1),
+        ("gain_margin_down", exact.gain_lower, -1),
+    ):
+        if 0.0 < gain < np.inf:
+            yield _gain_row(place, name, gain, _angle_on_circle(place.critical(gain)), outward)
+    if exact.delay_s is not None and np.isfinite(exact.delay_s) and place.delayed is not None:
+        yield _delay_row(place, exact.delay_s)
+
+
+def _angle_on_circle(poles: Complexes) -> float:
+    """Angle of the pole nearest to the unit circle, 0 to pi."""
+    pole = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
+    return float(abs(np.angle(pole)))
+
+
+def _delay_row(place: Place, delay_s: float) -> Row:
+    """The computing delay lengthened to either side of its margin: the critical pole lies inside, outside."""
+    assert place.delayed is not None
+    sizes = []
+    for side in (1.0 - BESIDE, 1.0 + BESIDE):
+        longer, poles = place.delayed(delay_s * side)
+        critical = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
+        sizes.append(abs(_nearest(longer, critical)))
+    rates = np.log(sizes)
+    found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
+    words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"
+    return place.judged("delay_margin", delay_s, found, place.allowed * delay_s, "s", words)
+
+
+def _nearest(t: Tangent, pole: complex) -> complex:
+    poles = np.linalg.eigvals(t.A)
+    return complex(poles[int(np.argmin(np.abs(poles - pole)))])
+
+
+def _loop_margins(place: Place, figures: LoopFigures) -> Iterator[Row]:
+    """Every gain and phase margin of a loop with the outer ones open."""
+    hold = place.tangent.hold_s
+    for margin in figures.margins.gain_margins:
+        yield _gain_row(place, "gain_margin", margin.ratio, margin.frequency_rad_s * hold, None)
+    for phase in figures.margins.phase_margins:
+        z = np.array([np.exp(1j * phase.frequency_rad_s * hold)])
+        seen = complex(place.tangent.open(z)[0])
+        turned = seen / -np.exp(1j * np.radians(phase.deg))
+        off = degrees(float(np.angle(turned)))
+        error = max(degrees(abs(abs(turned) - 1.0)), abs(off))
+        allowed = degrees(place.allowed * max(1.0, abs(1.0 + seen)))
+        words = f"{phase.frequency_rad_s / (2.0 * pi):.6g} Hz; |L| = 1 {abs(turned) - 1.0:+.1e}"
+        row = place.judged("phase_margin", 0.0, error, allowed, "deg", words)
+        yield replace(row, predicted=phase.deg, found=phase.deg + off)
+
+
+def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
+    """Bandwidths, resonance and peaks: each where it is predicted."""
+    band, peaks, t = figures.bandwidth, figures.peaks, place.tangent
+    if band is not None and figures.plain_response is figures.loop.plain_closed:
+        level = abs(band.dc_gain) / np.sqrt(2.0)
+        yield from _fall(place, "bandwidth", band.minus3db_rad_s, lambda T: np.log(np.abs(T) / level))
+        yield from _fall(
+            place, "bandwidth_90deg", band.minus90deg_rad_s, lambda T: np.angle(T * 1j / band.dc_gain)
+        )
+    if peaks is None:
+        return
+    for name, at, value, read in (
+        ("sensitivity_peak", peaks.sensitivity_rad_s, peaks.sensitivity_db, lambda T: 1.0 - T),
+        ("complementary_peak", peaks.complementary_rad_s, peaks.complementary_db, lambda T: T),
+    ):
+        if not 0.0 < at * t.hold_s <= pi:
+            continue
+        T = t.closed(np.array([np.exp(1j * at * t.hold_s)]))
+        seen = 20.0 * float(np.log10(np.abs(read(T))[0]))
+        lever = float(np.abs(T)[0] / np.abs(read(T))[0])
+        yield place.judged(name, value, seen, 8.686 * place.allowed * max(lever, 1.0) + 1e-9, "dB")
+
+
+def _fall(
+    place: Place, name: str, at: float | None, off: Callable[[Complexes], npt.NDArray[np.float64]]
+) -> Iterator[Row]:
+    """The frequency at which ``off`` of T is zero, by one Newton step from the predicted one."""
+    hold = place.tangent.hold_s
+    if at is None or not 0.0 < at * hold < pi:
+        return
+    near = np.exp(1j * at * hold * np.array([1.0, 1.0 - 1e-5, 1.0 + 1e-5]))
+    now = float(off(place.tangent.closed(near[:1]))[0])
+    low, high = off(place.predicted(near))[1:]
+    slope = float(high - low) / 2e-5  # over the relative frequency
+    hertz = at / (2.0 * pi)
+    if slope == 0.0:
+        return
+    yield place.judged(
+        name, hertz, hertz * (1.0 - now / slope), hertz * place.allowed * (1.0 + 1.0 / abs(slope)), "Hz"
+    )
