@@ -19,6 +19,7 @@ from actuator_lti.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.tree import Tree
 from actuator_lti.verdict import Verdict
 from reports.certain import certain
+from reports.charts.data import chart_data, chart_of
 from reports.document_schema import (
     SCHEMA,
     VERSION,
@@ -159,8 +160,6 @@ def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = 
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
-    from reports.charts.data import chart_data
-
     return {
         "kind": "figure",
         "figure": name,
@@ -374,10 +373,16 @@ def load(path: str | Path) -> Tree:
     Raises
     ------
     InputError
-        Also where its verdict is not that of its sections.
+        Also where its verdict is not that of its sections, or a figure holds no chart.
     """
     made = read_json(path)
     check(made, shown_path(path))
+    for k, block in enumerate(figures(made), 1):
+        assert block["kind"] == "figure"
+        try:
+            chart_of(block["chart"])
+        except InputError as error:
+            raise InputError(f"figure {k}: {error.message}", where=shown_path(path)) from None
     counted = verdict_of(made["sections"], made["kind"])
     if made["verdict"] != counted:
         raise InputError("verdict: does not agree with the verdicts in its sections", where=shown_path(path))
