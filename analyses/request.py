@@ -28,12 +28,15 @@ class Option:
         The option, without dashes; the field's name without its unit where empty.
     kind : {"plain", "output", "load"}
         ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without.
+    argument : bool
+        Whether it stands by its place, without a flag, and has to be given.
     """
 
     words: str
     metavar: str = ""
     flag: str = ""
     kind: Kind = "plain"
+    argument: bool = False
 
 
 def options(request: type) -> dict[str, tuple[Any, Option]]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.tree import Tree
 from analyses.corners.asked import Asked as CornersAsked
+from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
 from analyses.motion.asked import Asked as MotionAsked
@@ -45,6 +46,8 @@ class Analysis:
         Whether a report has the section where it is asked for (``--also``).
     doing : str
         What the bar says while the function works, which then takes ``progress``.
+    stem : str
+        Name of the page's files; that of the command where empty.
     out : str
         Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
     """
@@ -56,6 +59,7 @@ class Analysis:
     function: str = ""
     also: bool = False
     doing: str = ""
+    stem: str = ""
     out: str = ""
 
     def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
@@ -71,10 +75,10 @@ class Analysis:
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
         return getattr(import_module(package), name)(design, *asked, **more)
 
-    def section(self, result: Any) -> Section:
-        """Show."""
-        made: Section = self._shown.section(result)
-        return made
+    def sections(self, result: Any) -> list[Section]:
+        """Show: ``section(result)`` of the section's module, one or several."""
+        made = self._shown.section(result)
+        return made if isinstance(made, list) else [made]
 
     def data(self, result: Any) -> Any:
         """The result as plain data: what the section's module says (``data``), else by its names."""
@@ -162,6 +166,43 @@ ANALYSES = (
         Each is foreseen by describing function in the exact sampled loop, then the simulator is
         started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
         waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+    Analysis(
+        name="correlate",
+        group="Bench records",
+        request=CorrelationAsked,
+        function="analyses.correlation.run.correlate",
+        doing="simulating",
+        stem="correlation",
+        words="""
+        Run the model with each record's own command, load and supply, and say how
+        far off it is.
+
+        For every signal that both have: relative error, fit, mean, rms and largest
+        error, delay; over several records also all together, and the worst; with
+        --out pictures of both and the difference. Where a record contradicts
+        itself or the design's limits (a wrong unit, swapped columns, a clock that
+        is off), or a signal is off by more than --error-limit, the status is 1.
+
+        The outermost command that is recorded drives the model: reference of the
+        output angle, speed, current (or torque), or voltage; loops outside it do
+        not act. A recorded supply limits the voltage over time, and scales it
+        where a loop sets the voltage itself.
+
+        A CSV, Parquet or MATLAB file with columns such as time_s, reference_deg,
+        Output angle \\[deg], motor_speed_rpm, current_A, load_Nm is read as it is,
+        with commas, semicolons or tabs; so is what simulate writes, and the EMPS
+        benchmark's file. Any other layout is told by a
+        record file in TOML, a line for each: file = "log.csv", separator = ";",
+        decimal = ",", time = { column = "t", unit = "ms" }, signals.reference = {
+        column = "cmd", unit = "deg" }.
+
+        Try: actuator-lti correlate emps DATA_EMPS.mat
+
+        With --predict the records are steps of a motor on a voltage (ODrive
+        recorder): gain and time constant are fitted to them and predict the speed
+        over a chirp.
         """,
     ),
     Analysis(

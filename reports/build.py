@@ -155,7 +155,8 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
 
 
 def _further(one: Analysis, design: Design) -> doc.Section:
-    return one.section(one.run(design, *one.asked(design, {})))
+    (made,) = one.sections(one.run(design, *one.asked(design, {})))
+    return made
 
 
 def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from actuator_lti.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.tree import Tree
 from actuator_lti.verdict import Verdict
 from reports.certain import certain
+from reports.charts.data import chart_data
 from reports.document_schema import (
     SCHEMA,
     VERSION,
@@ -44,11 +45,13 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from reports.charts.chart import Chart
 
+T = TypeVar("T")
+
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
-    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "load", "loads", "plain",
-    "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived", "walk",
-    "with_columns",
+    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "listing", "load",
+    "loads", "plain", "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived",
+    "walk", "with_columns",
 ]  # fmt: skip
 
 
@@ -122,6 +125,27 @@ def table(
     }
 
 
+def listing(
+    caption: str,
+    items: Iterable[T],
+    columns: Sequence[tuple[Column, Callable[[T], Any]]],
+    note: str = "",
+    status: Callable[[T], Status | None] | None = None,
+) -> Block:
+    """Make a table of items, a row each: every column with what it shows of an item.
+
+    Examples
+    --------
+    >>> listing("Squares", [2, 3], [(column("n", "n", format="int"), lambda n: n * n)])["rows"]
+    [{'n': 4}, {'n': 9}]
+    """
+    rows = [
+        {one["key"]: read(item) for one, read in columns} | ({"_status": status(item)} if status else {})
+        for item in items
+    ]
+    return table(caption, [one for one, _ in columns], rows, note)
+
+
 def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = "wide") -> Block:
     """Make a figure of a chart.
 
@@ -136,8 +160,6 @@ def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = 
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
-    from reports.charts.data import chart_data
-
     return {
         "kind": "figure",
         "figure": name,

@@ -65,3 +65,12 @@ def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, S
             return max(held, key=lambda pair: pair[1].relative_error)
     every = [(result, signal) for result in results for signal in result.signals]
     return max(every, key=lambda pair: pair[1].relative_error)
+
+
+def agrees(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
+    """Whether no record contradicts itself or the design and, with a limit, no error is above it."""
+    if any(finding.passed is False for result in results for finding in result.findings):
+        return False
+    return error_limit is None or all(
+        signal.relative_error <= error_limit for result in results for signal in result.signals
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -146,3 +146,16 @@ def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
     line = values[:-span] + (values[span:] - values[:-span]) * share
     error = float(np.quantile(np.abs(values[half : half + len(line)] - line), 0.95)) / span_of_values
     return error if gap >= 1.5 else 0.25 * error
+
+
+def named_apart(records: Sequence[Record], taken: Sequence[str] = ()) -> list[Record]:
+    """Records with names of their own, where files of one name lie in several folders."""
+    seen: list[str] = list(taken)
+    out = []
+    for record in records:
+        name, k = record.name, 2
+        while name in seen:
+            name, k = f"{record.name} ({k})", k + 1
+        seen.append(name)
+        out.append(record if name == record.name else replace(record, name=name))
+    return out

@@ -48,7 +48,7 @@ def chart_of(data: Mapping[str, Any]) -> Chart:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
-        raise InputError(f"figure: {place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from None
+        raise InputError(f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from None
     for column in chart.columns:
         if column.shared:
             for panel in column.panels:

@@ -32,8 +32,9 @@ def command(one: Analysis) -> Callable[..., None]:
     ) -> None:
         answer(one, load_drive(design, changes), chosen, out, as_json, quiet)
 
+    needed = any(option.argument for _, option in _options(one).values())  # then a design is, too
     parameters = [
-        _parameter("design", DesignArgument, DEFAULT_DESIGN),
+        _parameter("design", DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN),
         _parameter("changes", SetOption, None),
         *(
             _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
@@ -63,18 +64,20 @@ def answer(
     with progress(f"{one.doing} {drive.name}", quiet=quiet) as doing:
         more = {"progress": doing} if one.doing else {}
         result = one.run(drive, *one.asked(drive, values), **more)
-    part = one.section(result)
+    first, *others = parts = one.sections(result)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
     files = one.write(result, out)
     if out is not None:
-        title = f"{drive.title or drive.name}: {part['title'].lower()}"
-        made = study_document(drive, [part], title=title, subtitle=part["result"], kind=one.name)
+        title = f"{drive.title or drive.name}: {first['title']}"
+        made = study_document(drive, parts, title=title, subtitle=first["result"], kind=one.name)
         with progress("drawing figures", quiet=quiet) as drawing:
-            files += map(str, write_pages(made, out, one.name, progress=drawing))
+            files += map(str, write_pages(made, out, one.stem or one.name, progress=drawing))
     if as_json:
         print_json(one.data(result))
     else:
-        print_section(part, passed, name=drive.name)
+        print_section(first, passed, name=drive.name)
+        for part in others:
+            print_section(part, None)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
@@ -88,6 +91,8 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
     """A field as an option of typer; what is not given is None, and the request knows what then."""
     text = {"plain": kind, "output": str, "load": float}[option.kind]
     more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
+    if option.argument:
+        return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], Parameter.empty
     made = typer.Option(
         f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words, **more
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: 
     """Identify from records, print or write the result, and end with the verdict's status."""
     from analyses.identification.bench import BenchSettings, identify_bench
     from analyses.records import open_record
+    from analyses.records.record import named_apart
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json
     from reports.cli.progress import progress
@@ -39,20 +40,6 @@ def run(paths: Sequence[Path], unseen: Sequence[Path], common: Common, options: 
     else:
         say(made, written, result.items)
     leave_with(result.passed)
-
-
-def named_apart(records: Sequence[Any], taken: Sequence[str] = ()) -> list[Any]:
-    """Records with names of their own, where files of one name lie in several folders."""
-
-    seen: list[str] = list(taken)
-    out = []
-    for record in records:
-        name, k = record.name, 2
-        while name in seen:
-            name, k = f"{record.name} ({k})", k + 1
-        seen.append(name)
-        out.append(record if name == record.name else replace(record, name=name))
-    return out
 
 
 def as_data(result: BenchResult, written: Path | None) -> Tree:

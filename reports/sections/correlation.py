@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from analyses.correlation.summary import summarise, worst_of
+from analyses.correlation.summary import agrees, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -47,7 +47,7 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
         finding_table(result.record, result.findings),
         *[doc.remark(note) for note in result.notes],
     ]
-    judged = verdict([result], error_limit)
+    judged = agrees([result], error_limit)
     return doc.section(
         f"correlation-{number}",
         f"Model against {result.record}",
@@ -55,15 +55,6 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
         result=words([result], error_limit),
         intro=intro,
         status="pass" if judged else "fail",
-    )
-
-
-def verdict(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
-    """Whether no record contradicts itself or the design and, with a limit, no error is above it."""
-    if any(finding.passed is False for result in results for finding in result.findings):
-        return False
-    return error_limit is None or all(
-        signal.relative_error <= error_limit for result in results for signal in result.signals
     )
 
 
@@ -113,7 +104,7 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
     figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
     table = doc.table("All records", columns, rows)
-    judged = verdict(results, error_limit)
+    judged = agrees(results, error_limit)
     status: Status = "pass" if judged else "fail"
     return doc.section(
         "correlation", "All records", [table, figure],

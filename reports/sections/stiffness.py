@@ -10,12 +10,12 @@ import numpy as np
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, Status
+from reports.document_schema import Block, Section, Status
 from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.stiffness import AtRest, Check, Stiffness, StiffnessCurve
+    from analyses.stiffness import Stiffness, StiffnessCurve
 
 STATES = {
     "powered": "powered, command held",
@@ -90,26 +90,25 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
 
 
 def _table(result: Stiffness, unit: str) -> Block:
-    columns = [
-        doc.column("state", "State"),
-        doc.column("static", "Static", unit, format="sig:4", better=1),
-        doc.column("least", "Least", unit, format="sig:4", better=1),
-        doc.column("at", "at", "Hz", format="sig:4"),
-    ]
-    rows = [_row(curve) for curve in result.curves]
     note = "Infinite: the output comes back to its place, or does not move at all."
-    return doc.table("Stiffness by state", columns, rows, note)
+    return doc.listing(
+        "Stiffness by state",
+        result.curves,
+        [
+            (doc.column("state", "State"), lambda one: STATES[one.state]),
+            (doc.column("static", "Static", unit, format="sig:4", better=1), _static),
+            (doc.column("least", "Least", unit, format="sig:4", better=1), lambda one: one.least[0]),
+            (
+                doc.column("at", "at", "Hz", format="sig:4"),
+                lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
+            ),
+        ],
+        note,
+    )
 
 
-def _row(curve: StiffnessCurve) -> Row:
-    least, at = curve.least
-    moves = math.isfinite(least)
-    return {
-        "state": STATES[curve.state],
-        "static": curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else "infinite",
-        "least": least if moves else None,
-        "at": at if moves else None,
-    }
+def _static(curve: StiffnessCurve) -> float | str:
+    return curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else "infinite"
 
 
 def _lost_motion(result: Stiffness) -> Block:
@@ -134,46 +133,39 @@ def _lost_motion(result: Stiffness) -> Block:
 
 
 def _at_rest(result: Stiffness, unit: str) -> Block:
-    columns = [
-        doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
-        doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"),
-        doc.column("seen", "Stiffness", unit, format="sig:4"),
-    ]
     note = (
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
     )
-    return doc.table("At rest, by amplitude", columns, [_rest_row(one) for one in result.at_rest], note)
-
-
-def _rest_row(one: AtRest) -> Row:
-    size = abs(one.seen_Nm_rad)
-    return {
-        "moment": one.moment_Nm,
-        "frequency_hz": one.frequency_hz,
-        "seen": size if math.isfinite(size) else None,
-    }
+    return doc.listing(
+        "At rest, by amplitude",
+        result.at_rest,
+        [
+            (
+                doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+                lambda one: one.moment_Nm,
+            ),
+            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"), lambda one: one.frequency_hz),
+            (doc.column("seen", "Stiffness", unit, format="sig:4"), lambda one: abs(one.seen_Nm_rad)),
+        ],
+        note,
+    )
 
 
 def _checks(result: Stiffness, unit: str) -> Block:
-    columns = [
-        doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"),
-        doc.column("foreseen", "Foreseen", unit, format="sig:6"),
-        doc.column("seen", "Simulated", unit, format="sig:6"),
-        doc.column("difference", "Relative difference", format="sig:2"),
-    ]
     note = (
         "A small moment injected in the simulator, without play, quantisation, dry friction or friction by "
         "load: foreseen here is the linear stiffness of that drive, without the friction by load "
         "that the curves have."
     )
-    return doc.table("Injected moment", columns, [_check_row(check) for check in result.checks], note)
-
-
-def _check_row(check: Check) -> Row:
-    return {
-        "frequency_hz": check.frequency_hz,
-        "foreseen": abs(check.foreseen_Nm_rad),
-        "seen": abs(check.seen_Nm_rad),
-        "difference": check.difference,
-    }
+    return doc.listing(
+        "Injected moment",
+        result.checks,
+        [
+            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"), lambda one: one.frequency_hz),
+            (doc.column("foreseen", "Foreseen", unit, format="sig:6"), lambda one: abs(one.foreseen_Nm_rad)),
+            (doc.column("seen", "Simulated", unit, format="sig:6"), lambda one: abs(one.seen_Nm_rad)),
+            (doc.column("difference", "Relative difference", format="sig:2"), lambda one: one.difference),
+        ],
+        note,
+    )

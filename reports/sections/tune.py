@@ -3,55 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.atomic import write_text
 from actuator_lti.design import write_design
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Section, VerdictItem
+from reports.document_schema import Block, Column, Section, VerdictItem
 
 if TYPE_CHECKING:
-    from analyses.tuning import BindingRequirement, TuningResult
-
-GAIN_COLUMNS = [
-    doc.column("path", "Gain"),
-    doc.column("unit", "Unit"),
-    doc.column("before", "Before", format="sig:4"),
-    doc.column("rule", "By rule", format="sig:4"),
-    doc.column("tuned", "Optimised", format="sig:5"),
-    doc.column("rounded", "Tuned", format="sig:5"),
-    doc.column("object", "Object"),
-    doc.column("steps", "Written", align="right"),
-    doc.column("object_unit", "in"),
-]
-REQUIREMENT_COLUMNS = [
-    doc.column("label", "Requirement"),
-    doc.column("value", "Worst corner", format="sig:4"),
-    doc.column("limit", "Limit", format="sig:4"),
-    doc.column("distance", "Distance", format="sig:3"),
-    doc.column("unit", "Unit"),
-    doc.column("binds", "Binds", format="yesno"),
-    doc.column("corner", "At"),
-]
-CONFIRMED_COLUMNS = [
-    doc.column("label", "Requirement"),
-    doc.column("value", "Certified", format="sig:4"),
-    doc.column("limit", "Limit", format="sig:4"),
-    doc.column("unit", "Unit"),
-    doc.column("met", "Met", format="yesno"),
-]
-CHECK_COLUMNS = [
-    doc.column("corner", "Design"),
-    doc.column("amplitude", "Step", "deg", format="sig:3"),
-    doc.column("rise", "Rise", "ms", format="sig:3", better=-1),
-    doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1),
-    doc.column("settling", "Settling 2 %", "ms", format="sig:3", better=-1),
-    doc.column("error", "Final error", "%", format="fix:2"),
-    doc.column("limited", "Limits that act"),
-]
+    from analyses.tuning import BindingRequirement, GainSetting, TuningResult
+    from analyses.tuning.result import NonlinearCheck
+    from analyses.verdicts import RequirementVerdict
 
 
 def section(result: TuningResult) -> Section:
@@ -128,43 +94,54 @@ def _verdict(r: BindingRequirement) -> VerdictItem:
 
 def gains(result: TuningResult) -> Block:
     """Gains in SI and in the motion controller's objects."""
-    rows = [
-        {
-            "path": g.path, "unit": g.unit, "before": g.before, "rule": g.by_rule, "tuned": g.tuned,
-            "rounded": g.rounded, "object": g.object or None, "steps": g.steps, "object_unit": g.object_unit,
-        }
-        for g in result.gains
-    ]  # fmt: skip
     note = (
         "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
     )
-    return doc.table("Gains", GAIN_COLUMNS, rows, note)
+    columns: list[tuple[Column, Callable[[GainSetting], Any]]] = [
+        (doc.column("path", "Gain"), lambda g: g.path),
+        (doc.column("unit", "Unit"), lambda g: g.unit),
+        (doc.column("before", "Before", format="sig:4"), lambda g: g.before),
+        (doc.column("rule", "By rule", format="sig:4"), lambda g: g.by_rule),
+        (doc.column("tuned", "Optimised", format="sig:5"), lambda g: g.tuned),
+        (doc.column("rounded", "Tuned", format="sig:5"), lambda g: g.rounded),
+        (doc.column("object", "Object"), lambda g: g.object or None),
+        (doc.column("steps", "Written", align="right"), lambda g: g.steps),
+        (doc.column("object_unit", "in"), lambda g: g.object_unit),
+    ]
+    return doc.listing("Gains", result.gains, columns, note)
 
 
 def requirements(result: TuningResult) -> Block:
     """Every requirement at its worst corner."""
-    rows = [
-        {
-            "label": r.label, "value": r.value, "limit": r.limit, "distance": r.distance,
-            "unit": "" if r.unit == "1" else r.unit, "binds": r.binds, "corner": _corner(r),
-            "_status": "pass" if r.relative >= 0.0 else "fail",
-        }
-        for r in result.requirements
-    ]  # fmt: skip
-    return doc.table("Requirements at their worst corner", REQUIREMENT_COLUMNS, rows)
+    columns: list[tuple[Column, Callable[[BindingRequirement], Any]]] = [
+        (doc.column("label", "Requirement"), lambda r: r.label),
+        (doc.column("value", "Worst corner", format="sig:4"), lambda r: r.value),
+        (doc.column("limit", "Limit", format="sig:4"), lambda r: r.limit),
+        (doc.column("distance", "Distance", format="sig:3"), lambda r: r.distance),
+        (doc.column("unit", "Unit"), lambda r: "" if r.unit == "1" else r.unit),
+        (doc.column("binds", "Binds", format="yesno"), lambda r: r.binds),
+        (doc.column("corner", "At"), _corner),
+    ]
+    return doc.listing(
+        "Requirements at their worst corner", result.requirements, columns,
+        status=lambda r: "pass" if r.relative >= 0.0 else "fail",
+    )  # fmt: skip
 
 
 def confirmed(result: TuningResult) -> Block:
     """The requirements by certified margins."""
-    rows = [
-        {
-            "label": v.id, "value": v.value, "unit": "" if v.requirement.unit == "1" else v.requirement.unit,
-            "limit": v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum,
-            "met": v.verdict == "met", "_status": v.role,
-        }
-        for v in result.confirmed
-    ]  # fmt: skip
-    return doc.table("Confirmed by certified margins", CONFIRMED_COLUMNS, rows)
+
+    def limit(v: RequirementVerdict) -> float | None:
+        return v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum
+
+    columns: list[tuple[Column, Callable[[RequirementVerdict], Any]]] = [
+        (doc.column("label", "Requirement"), lambda v: v.id),
+        (doc.column("value", "Certified", format="sig:4"), lambda v: v.value),
+        (doc.column("limit", "Limit", format="sig:4"), limit),
+        (doc.column("unit", "Unit"), lambda v: "" if v.requirement.unit == "1" else v.requirement.unit),
+        (doc.column("met", "Met", format="yesno"), lambda v: v.verdict == "met"),
+    ]
+    return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)
 
 
 def _corner(r: BindingRequirement) -> str:
@@ -206,19 +183,25 @@ def _curve(result: TuningResult) -> Block:
 
 def checks(result: TuningResult) -> Block:
     """The nonlinear check."""
-    linear = result.design.axis == "linear"
-    columns = [c.copy() for c in CHECK_COLUMNS]
-    for c in columns:
-        c["unit"] = "mm" if linear and c["key"] == "amplitude" else c["unit"]
-    rows = [
-        {
-            "corner": c.corner, "amplitude": c.amplitude_rad * (1e3 if linear else math.degrees(1.0)),
-            "rise": None if c.rise_time_s is None else 1e3 * c.rise_time_s, "overshoot": c.overshoot_percent,
-            "settling": None if c.settling_time_s is None else 1e3 * c.settling_time_s,
-            "error": c.final_error_percent, "limited": c.limited or "none",
-            "_status": "pass" if c.settling_time_s is not None else "warn",
-        }
-        for c in result.checks
-    ]  # fmt: skip
+    scale, unit = (1e3, "mm") if result.design.axis == "linear" else (math.degrees(1.0), "deg")
+
+    def ms(seconds: float | None) -> float | None:
+        return None if seconds is None else 1e3 * seconds
+
+    columns: list[tuple[Column, Callable[[NonlinearCheck], Any]]] = [
+        (doc.column("corner", "Design"), lambda c: c.corner),
+        (doc.column("amplitude", "Step", unit, format="sig:3"), lambda c: scale * c.amplitude_rad),
+        (doc.column("rise", "Rise", "ms", format="sig:3", better=-1), lambda c: ms(c.rise_time_s)),
+        (doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1), lambda c: c.overshoot_percent),
+        (
+            doc.column("settling", "Settling 2 %", "ms", format="sig:3", better=-1),
+            lambda c: ms(c.settling_time_s),
+        ),
+        (doc.column("error", "Final error", "%", format="fix:2"), lambda c: c.final_error_percent),
+        (doc.column("limited", "Limits that act"), lambda c: c.limited or "none"),
+    ]
     note = "Steps from rest in the nonlinear model, dry friction and every limit on. A dash: not reached."
-    return doc.table("Checked in the nonlinear model", columns, rows, note)
+    return doc.listing(
+        "Checked in the nonlinear model", result.checks, columns, note,
+        lambda c: "pass" if c.settling_time_s is not None else "warn",
+    )  # fmt: skip

@@ -266,9 +266,9 @@ def test_correlate_begins_with_its_result_and_judges_on_demand(
     (tmp_path / "w.toml").write_text(write_design(_wrong(design)))
     arguments = ["correlate", str(tmp_path / "w.toml"), str(tmp_path / "r.csv")]
     assert not main(arguments)
-    assert capsys.readouterr().out.startswith("PASS  Motor angle of the model within")
+    assert capsys.readouterr().out.startswith("PASS  ctms-motor-position: Motor angle of the model within")
     assert main([*arguments, "--error-limit", "0.1"]) == 1
-    assert capsys.readouterr().out.startswith("FAIL  Motor angle of the model within")
+    assert capsys.readouterr().out.startswith("FAIL  ctms-motor-position: Motor angle of the model within")
     assert not main([*arguments, "--error-limit", "50"])
     assert capsys.readouterr().out.startswith("PASS")
 

@@ -1,0 +1,41 @@
+"""What is asked of the model against records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import Option
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Records, and what drives the model; with ``predict`` a motor is fitted to them and meets a chirp."""
+
+    records: Annotated[
+        list[Path],
+        Option(words="Records: CSV, .mat, or record files (TOML).", metavar="RECORD...", argument=True),
+    ]
+    command: Annotated[
+        str | None,
+        Option(
+            words="Signal that drives the model: a recorded command (default: the outermost), or voltage "
+            "(the motor's measured one).",
+            metavar="SIGNAL",
+        ),
+    ] = None
+    error_limit: Annotated[
+        float | None,
+        Option(words="Relative error above which a signal fails.", metavar="PERCENT"),
+    ] = None
+    predict: Annotated[
+        Path | None,
+        Option(words="Fit a motor to the RECORDs (voltage steps), predict this chirp.", metavar="CHIRP"),
+    ] = None
+
+    def __post_init__(self) -> None:
+        """Refuse a negative limit."""
+        if self.error_limit is not None and not self.error_limit >= 0.0:
+            raise InputError(f"error_limit = {self.error_limit:g}: must be 0 or more")
