@@ -6,7 +6,7 @@ from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
-import typer
+from actuator_lti.errors import InputError
 
 _WHOLE_BITS = 63
 
@@ -21,13 +21,15 @@ def bounded(command: Any) -> Any:
 
 
 def _checked(parameter: Any, cast: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    name = max(parameter.opts, key=len)
+
     def checked(context: Any, value: Any) -> Any:
         result = cast(context, value)
         for each in result if isinstance(result, list | tuple) else (result,):
             if isinstance(each, float) and not isfinite(each):
-                raise typer.BadParameter(f"{each}: must be a finite number", ctx=context, param=parameter)
+                raise InputError(f"{name} {each}: must be a finite number")
             if isinstance(each, int) and each.bit_length() > _WHOLE_BITS:
-                raise typer.BadParameter("must lie between -2^63 and 2^63", ctx=context, param=parameter)
+                raise InputError(f"{name}: must lie between -2^63 and 2^63")
         return result
 
     return checked

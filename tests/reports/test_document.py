@@ -146,7 +146,13 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
 
 @pytest.mark.parametrize(
     "damage",
-    [{"edges": []}, {"counts": [1]}, {"counts": [10**400, 1]}, {"edges": ["a", 1, 2]}, {"nominal": {}}],
+    [
+        {"edges": []},
+        {"counts": [1]},
+        {"edges": [0.0, 1e308, -1e308]},
+        {"edges": ["a", 1, 2]},
+        {"nominal": {}},
+    ],
 )
 def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(damage: dict[str, Any], tmp_path) -> None:
     marks = {"nominal": 1.0, "worst": 0.5, "minimum": 0.2, "maximum": None}
