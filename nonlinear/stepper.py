@@ -60,6 +60,11 @@ class Stepper:
         self.p[at.TICKS] = self.s[at.S_TICK] + ticks
         self._tick()
 
+    @property
+    def happened(self) -> tuple[float, float]:
+        """Events so far, and the status: equal in two runs on the same piece of the map."""
+        return float(self.s[at.S_EVENTS]), float(self.s[at.S_STATUS])
+
     def value(self, name: str) -> float:
         """A number of the state by its name in the layout, without ``S_`` or ``ES_``."""
         return float(self.s[_place(name)])

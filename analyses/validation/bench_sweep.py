@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
-from nonlinear._kernels import layout as at
 from nonlinear.derivative import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
@@ -86,5 +85,4 @@ def _sine(setup: LoopSetup, place: Place, part: float, angle: float, samples: in
         drive.run(setup.hold_ticks)
         calm.run(setup.hold_ticks)
         back[k] = calm.s[RETURNED[setup.point]] - drive.s[RETURNED[setup.point]]
-    same = drive.s[[at.S_EVENTS, at.S_STATUS]] == calm.s[[at.S_EVENTS, at.S_STATUS]]
-    return back / size if same.all() else None
+    return back / size if drive.happened == calm.happened else None

@@ -23,7 +23,6 @@ from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN
 from nonlinear import tangent
-from nonlinear._kernels import layout as at
 from nonlinear.derivative import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
@@ -144,7 +143,7 @@ def _run_step(setup: LoopSetup, part: float, samples: int) -> Floats | None:
             drive.run(setup.hold_ticks)
             back[k] = drive.s[RETURNED[setup.point]]
         runs.append(back)
-        flags.append((drive.s[at.S_EVENTS], drive.s[at.S_STATUS]))
+        flags.append(drive.happened)
     return None if flags[0] != flags[1] else np.asarray((runs[1] - runs[0]) / size, float)
 
 
@@ -235,5 +234,4 @@ def _course(
         seen[k] = left @ (drive.s[places] - calm.s[places])
         drive.run(setup.base_ticks)
         calm.run(setup.base_ticks)
-    same = drive.s[[at.S_EVENTS, at.S_STATUS]] == calm.s[[at.S_EVENTS, at.S_STATUS]]
-    return np.asarray(seen / size, complex) if same.all() else None
+    return np.asarray(seen / size, complex) if drive.happened == calm.happened else None
