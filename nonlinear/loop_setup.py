@@ -215,11 +215,6 @@ class LoopSetup:
         row["angle_start"] -= seen
         row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
 
-    @property
-    def steady_start(self) -> bool:
-        """Whether the steady state is known that a run begins in."""
-        return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
-
     @staticmethod
     def _constant(row: Rows, point: str, value: Value) -> None:
         """Replace the outer controllers, which are out of action, by a constant command."""
@@ -240,19 +235,6 @@ class LoopSetup:
             ranges |= {"current": limits.peak_current_A, "voltage": limits.voltage_V}
             return ranges[outermost]
         return ranges[self.point]
-
-    @cached_property
-    def room(self) -> dict[str, float]:
-        """How far each signal may move from its steady value: to its limit, and the speed to zero."""
-        row, limits = self.row(), self.design.limits
-        moving = self.bias.speed_rad_s != 0.0
-        room = {"motor_speed_rad_s": self.bias.room_rad_s if moving else inf}
-        room["voltage_V"] = limits.voltage_V - abs(row.value("voltage_start"))
-        room["current_command_A"] = limits.peak_current_A - abs(row.value("current_command_start"))
-        room["speed_command_rad_s"] = limits.speed_rad_s - abs(self.bias.speed_rad_s)
-        if not self.limits_on:
-            room = {name: value if name == "motor_speed_rad_s" else inf for name, value in room.items()}
-        return room
 
 
 FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
@@ -282,19 +264,6 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     if result.outer == "position" and remembers(design) and may_stand(design):
         return LoopSetup(design, loop, standing(design), limits_on, held)
     return result
-
-
-def standing_setup(design: Design, loop: str, *, held: bool = False) -> LoopSetup:
-    """Set a drive up for its linear border: without limits, standing, without dry friction, where it may.
-
-    At many times the gain a motion that dies out may still reach a limit or reverse on its way, which is no
-    growth.  With play, or friction that differs by direction, the drive has to move on: these have a slope of
-    their own about rest.
-    """
-    setup = loop_setup(design, loop, limits_on=False, held=held)
-    if not may_stand(design):
-        return setup
-    return LoopSetup(design, loop, standing(design), limits_on=False, held=held)
 
 
 def remembers(design: Design) -> bool:

@@ -234,4 +234,4 @@ def _course(
         seen[k] = left @ (drive.s[places] - calm.s[places])
         drive.run(setup.base_ticks)
         calm.run(setup.base_ticks)
-    return np.asarray(seen / size, complex) if drive.happened == calm.happened else None
+    return np.asarray(seen / seen[0], complex) if drive.happened == calm.happened else None

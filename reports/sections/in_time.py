@@ -10,15 +10,14 @@ import numpy as np
 from actuator_lti.verdict import Verdict
 from analyses.validation import Validation
 from analyses.validation.bench_sweep import BenchSweep
-from analyses.validation.by_amplitude import AmplitudeMargin
 from analyses.validation.in_time import MarginShown, StepShown
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, Status
+from reports.document_schema import Block, Section, Status
+from reports.findings import Finding
+from reports.sections import by_amplitude
 from reports.sections.names import LOOPS
-
-KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 
 
 def sections(validation: Validation) -> list[Section]:
@@ -69,8 +68,11 @@ def _in_time(validation: Validation) -> Section:
             blocks.append(_step(validation.steps[name]))
         if name in validation.margins:
             blocks.append(_margin(validation.margins[name]))
-    if validation.amplitude_margins:
-        blocks.append(_by_amplitude(validation.amplitude_margins))
+    blocks += by_amplitude.blocks(validation.amplitude_margins)
+    findings = [
+        Finding(severity="warn", text=words, where="confirmation")
+        for words in by_amplitude.remarks(validation.amplitude_margins)
+    ]
     rows = [shown.row for shown in validation.steps.values()]
     rows += [row for shown in validation.margins.values() for row in shown.rows]
     met = sum(row.verdict is Verdict.MET for row in rows)
@@ -82,8 +84,9 @@ def _in_time(validation: Validation) -> Section:
     )
     result = f"{met} of {len(rows)} runs go as predicted."
     return doc.section(
-        "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status
-    )
+        "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
+        findings=findings,
+    )  # fmt: skip
 
 
 def _step(shown: StepShown) -> Block:
@@ -119,47 +122,3 @@ def _margin(shown: MarginShown) -> Block:
         "dies out, the run outside grows, each by the predicted factor."
     )
     return doc.figure("margin_runs", chart, caption=caption, alt=caption, layout="half")
-
-
-def _by_amplitude(items: Sequence[AmplitudeMargin]) -> Block:
-    columns = [
-        doc.column("loop", "Loop"),
-        doc.column("kind", "Varied"),
-        doc.column("size", "Released from"),
-        doc.column("friction", "Dry friction"),
-        doc.column("linear", "Linear margin", format="sig:4"),
-        doc.column("value", "Oscillation lasts from", format="sig:3"),
-        doc.column("unit", "Unit"),
-        doc.column("limiter", "Limit acting"),
-        doc.column("remark", ""),
-    ]
-    rows = [_released(item) for item in items]
-    return doc.details(
-        "Margins from small, medium and large deviations",
-        [doc.table("Margins by amplitude", columns, rows)],
-    )
-
-
-def _released(item: AmplitudeMargin) -> Row:
-    delay = item.kind == "delay"
-    unit = "ms" if delay else "dB"
-    remark = ""
-    if item.value is None:
-        remark = f"no oscillation lasts up to {_shown(item.furthest, item):.3g} {unit}"
-    elif item.value == (0.0 if delay else 1.0):
-        remark = "the nominal drive oscillates"
-    return {
-        "loop": item.loop,
-        "kind": KINDS[item.kind],
-        "size": f"{100.0 * item.part:.0f} % of full range",
-        "friction": "on" if item.friction_on else "off",
-        "linear": _shown(item.linear, item),
-        "value": None if item.value is None else _shown(item.value, item),
-        "unit": unit,
-        "limiter": item.limiter,
-        "remark": remark,
-    }
-
-
-def _shown(value: float, item: AmplitudeMargin) -> float:
-    return 1e3 * value * item.period_s if item.kind == "delay" else 20.0 * math.log10(value)

@@ -6,15 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from analyses.validation.borders import Border
-from analyses.validation.release import AmplitudeMargin
 from built_report import Built
-from reports.sections.confirmation import _remark
 
 from actuator_lti import load_design
+from analyses.validation.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.build import design_report
 from reports.findings import Finding, gathered
+from reports.sections.by_amplitude import remark
 
 
 def glance(document: dict[str, Any]) -> dict[str, Any]:
@@ -55,27 +54,25 @@ def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
 
 
 def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field() -> None:
-    border = Border(value=2.0, bracket=(1.9, 2.1), frequency_hz=30.0, runs=9)
     item = AmplitudeMargin(
-        loop="position", kind="gain up", size="large", part=0.5, friction_on=True, linear=10.0, border=border,
-        period_s=1e-4, limiter="current",
+        loop="position", kind="gain", size="large", part=0.5, friction_on=True, linear=10.0, value=2.0,
+        furthest=40.0, period_s=1e-4, limiter="current",
     )  # fmt: skip
-    assert _remark(item) == (
+    assert remark(item) == (
         "The position loop sustains an oscillation if its gain is raised by 6.02 dB or more after release "
         "from 50 % of full range; the linear gain margin is 20 dB. The current limit acts."
     )
 
 
-@pytest.mark.parametrize(("kind", "value", "words"), [("gain up", 1.0, "20 dB"), ("delay", 1e-5, "1 ms")])
+@pytest.mark.parametrize(("kind", "value", "words"), [("gain", 1.0, "20 dB"), ("delay", 1e-5, "1 ms")])
 def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, words: str) -> None:
-    border = Border(value=value, bracket=(value, value), frequency_hz=30.0, runs=1)
     item = AmplitudeMargin(
-        loop="position", kind=kind, size="small", part=0.02, friction_on=False, linear=10.0, border=border,
-        period_s=1e-4, limiter="",
+        loop="position", kind=kind, size="small", part=0.02, friction_on=False, linear=10.0, value=value,
+        furthest=40.0, period_s=1e-4, limiter="",
     )  # fmt: skip
-    assert _remark(item) == (
+    assert remark(item) == (
         "The position loop, without dry friction, sustains an oscillation as designed after release from 2 % "
-        f"of full range; the linear {kind.split()[0]} margin is {words}."
+        f"of full range; the linear {kind} margin is {words}."
     )
 
 

@@ -281,13 +281,13 @@ def test_a_single_design_is_a_study_of_one():
     assert alone.variants == ()
 
 
-def test_the_ledger_of_every_design_stands_side_by_side(tmp_path):
+def test_the_checks_of_every_design_stands_side_by_side(tmp_path):
     from reports.sections.compare_ledger import sections
 
     change = 'override = { "control.velocity.gain" = "0.2 A*s/rad" }\n'
     path = study(tmp_path, HEAD + '[[variant]]\nname = "faster"\n' + change)
     result = compare(load_study(path), validation=True)
-    assert len(result.base.ledger) == len(result.variants[0].ledger) > 20
+    assert len(result.base.checks) == len(result.variants[0].checks) > 20
     (made,) = sections(result)
     assert made["status"] == "pass"
     first = made["blocks"][0]

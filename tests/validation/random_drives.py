@@ -1,4 +1,4 @@
-# ruff: noqa: T201, BLE001, E501 - a script that prints lines for people
+# ruff: noqa: T201, BLE001 - a script that prints lines for people
 """Random drives over decades, stable by their exact loops: what the validator is tried on.
 
 Run as a script it validates a number of them and prints a line for each::
@@ -19,7 +19,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from actuator_lti.design import load_design
 from actuator_lti.design.model import (
     Command,
     Controller,
@@ -45,18 +44,8 @@ from actuator_lti.design.model import (
     VelocityLoop,
 )
 from actuator_lti.errors import InputError, NumericalError
-from analyses.validation.settings import QUICK, Settings
+from analyses.validation.settings import CHECKS, Settings
 
-TRIAL = Settings(
-    frequencies=20,
-    point_frequencies=0,
-    multisine=False,
-    amplitude_margins=False,
-    rest_frequencies=8,
-    large_signals=False,
-    friction_effects=False,
-    specification=False,
-)
 DAMPED = 80_000  # seeds from here on have damping of the load as well
 T = TypeVar("T")
 
@@ -567,19 +556,18 @@ def is_stable(design: Design) -> bool:
 
 
 @dataclass
-class Tally:
+class Tried:
     """What some validations came to."""
 
     drives: int = 0
-    judged: int = 0
-    nothing_judged: int = 0
+    rows: int = 0
+    not_met: int = 0
+    not_proven: int = 0
     tracebacks: int = 0
     refused: int = 0
-    failed: int = 0
     large_commands: int = 0
+    hunting: int = 0
     unstable: int = 0
-    cut: int = 0
-    over_time: int = 0
     last: str = ""
 
     def __str__(self) -> str:
@@ -587,97 +575,68 @@ class Tally:
         return f"TABLE {words}"
 
 
-BOUND_S = 1.1 * Settings().seconds  # what is done when the time is up is a part of the last batch
-
-
-def main(first: int, count: int, kind: str, everything: bool, until_s: float = inf) -> Tally:
+def main(first: int, count: int, kind: str, everything: bool, until_s: float = inf) -> Tried:
     """Validate and print a line for each, and at the end what they came to."""
     import time
 
-    began, tally = time.monotonic(), Tally()
-    validate_one(load_design("ilr33-amber"), QUICK, Tally())  # libraries loaded, kernels compiled
+    began, tried = time.monotonic(), Tried()
     for design in stable_drives(first, count, kind):
         if time.monotonic() - began > until_s:
             break
-        validate_one(design, Settings() if everything else TRIAL, tally)
-        tally.last = design.name
-        if tally.drives % 10 == 0:
-            print(tally, flush=True)
-    print(tally, flush=True)
-    return tally
+        validate_one(design, Settings() if everything else CHECKS, tried)
+        tried.last = design.name
+        if tried.drives % 10 == 0:
+            print(tried, flush=True)
+    print(tried, flush=True)
+    return tried
 
 
-def validate_one(design: Design, settings: Settings, tally: Tally) -> None:
+def validate_one(design: Design, settings: Settings, tried: Tried) -> None:
     """Validate one drive and print what it came to."""
     import time
     import traceback
 
+    from actuator_lti.verdict import Verdict
     from analyses.isolation import isolated
     from analyses.validation import validate
 
     started = time.process_time()
-    tally.drives += 1
+    tried.drives += 1
     try:
         with isolated() as missing:
             found = validate(design, settings)
     except InputError as error:
-        tally.refused += 1
+        tried.refused += 1
         print(f"{design.name}  refused: {error}", flush=True)
         return
     except Exception:
-        tally.tracebacks += 1
+        tried.tracebacks += 1
         print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
         return
-    took = time.process_time() - started
-    judged = [row for row in found.ledger if row.passed is not None]
-    border = None if found.large_signals is None else found.large_signals.border
-    wrong_border = border is not None and border.passed is False
-    diverges = found.conditional is not None and found.conditional.diverges
-    stages = "".join(stage[0] for stage in design.controller.stages)
-    verdict = "pass" if found.passed else "FAIL"
-    print(
-        f"{design.name}  {stages} {verdict} {len(judged)} judged, {len(found.failed)} failed, {took:.1f} s",
-        flush=True,
-    )
-    tally.judged += len(judged)
-    tally.nothing_judged += not judged
-    tally.tracebacks += len(missing)
-    tally.failed += bool(found.failed) or wrong_border
-    tally.large_commands += diverges
-    tally.unstable += any(not loop.figures.stable for loop in found.loops.values())
-    tally.cut += any("cut" in note for note in found.notes)
-    tally.over_time += took > BOUND_S
+    print(f"{found}; {time.process_time() - started:.1f} s", flush=True)
+    tally = found.tally
+    tried.rows += tally.total
+    tried.not_met += tally.not_met
+    tried.not_proven += tally.not_proven
+    tried.tracebacks += len(missing)
+    tried.large_commands += found.conditional is not None and found.conditional.diverges
+    tried.hunting += found.hunting
+    tried.unstable += bool(found.unstable)
     for item in missing:
         print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
-    for row in found.failed:
-        print(
-            f"    {row.loop} {row.quantity}: {row.predicted} {row.measured} +- {row.tolerance:.3g} {row.unit} {row.reason} [{row.condition}]"
-        )
-    if wrong_border:
-        print(f"    BORDER {border}")
-    if found.conditional is not None and diverges:
-        one = found.conditional
-        print(
-            f"    LARGE COMMANDS: {one.ending} from {one.next_rad} of {one.full_deflection_rad}: {one.limiter} limit {one.limiter_share:.0%}"
-        )
-    points = () if found.friction is None else found.friction.points
-    for swing in (point.cycles.hunting for point in points):
-        if swing is not None:
-            print(
-                f"    HUNTS +-{swing.swing_rad} rad at {swing.rest.frequency_hz} Hz after {swing.amplitude_rad} rad"
-                f"{', limited' * swing.limited}"
-            )
-    if not judged:
-        print(f"    NOTES {found.notes} {[row.reason for row in found.ledger][:6]}")
-    for note in found.notes:
-        if "cut" in note or "refused" in note:
-            print(f"    {note}")
+    for row in found.rows:
+        if row.verdict is not Verdict.MET:
+            print(f"    {row}: {row.because} [{row.condition}]")
 
 
 if __name__ == "__main__":
     import sys
 
-    words = sys.argv[3:]
-    seconds = next((float(w) for w in words if w.replace(".", "").isdigit()), inf)
-    kinds = [w for w in words if w in ("wider", "full")]
-    main(int(sys.argv[1]), int(sys.argv[2]), kinds[0] if kinds else "", "all" in words, seconds)
+    arguments = sys.argv[1:]
+    main(
+        int(arguments[0]),
+        int(arguments[1]),
+        "full" if "full" in arguments else "",
+        "all" in arguments,
+        float(arguments[4]) if len(arguments) > 4 else inf,
+    )

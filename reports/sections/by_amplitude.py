@@ -1,0 +1,138 @@
+"""Margins from small, medium and large deviations: where an oscillation lasts, with and without friction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from analyses.validation.by_amplitude import AmplitudeMargin
+from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
+from reports.document_schema import Block, Row
+
+KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
+NEXT_TO_NOTHING = 0.01  # of the linear margin
+WORTH_SAYING = 0.9  # of the linear margin: what takes less is not said
+LOWEST = 0.02  # of the linear margin: what lies below is drawn here
+
+
+def blocks(items: Sequence[AmplitudeMargin]) -> list[Block]:
+    """Make figure, remarks and table, if there are any."""
+    if not items:
+        return []
+    return [_figure(items), *(doc.text(words) for words in remarks(items)), _table(items)]
+
+
+def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
+    """Say where large motion takes more than a tenth of a margin, worst case of each loop and kind."""
+    worst: dict[tuple[str, str], AmplitudeMargin] = {}
+    for item in items:
+        known = worst.get((item.loop, item.kind))
+        if item.value is None or item.value > WORTH_SAYING * item.linear:
+            continue
+        if known is None or item.value < (known.value or item.value):
+            worst[item.loop, item.kind] = item
+    return [remark(item) for item in worst.values()]
+
+
+def remark(item: AmplitudeMargin) -> str:
+    """Say from where on a large motion keeps oscillating."""
+    value, linear = _text(item.value or 0.0, item), _text(item.linear, item)
+    if _already(item):
+        cause = "as designed"
+    elif item.kind == "gain":
+        cause = f"if its gain is raised by {value} or more"
+    else:
+        cause = f"if a delay of {value} or more is added"
+    quiet = "" if item.friction_on else ", without dry friction,"
+    acting = f" The {item.limiter} limit acts." if item.limiter else ""
+    return (
+        f"The {item.loop} loop{quiet} sustains an oscillation {cause} after release from "
+        f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin is {linear}.{acting}"
+    )
+
+
+def _already(item: AmplitudeMargin) -> bool:
+    """Whether it is the drive as designed: less than a hundredth of the linear margin away."""
+    value = item.value or 0.0
+    if item.kind == "delay":
+        return value < NEXT_TO_NOTHING * item.linear
+    return abs(math.log(value)) < NEXT_TO_NOTHING * abs(math.log(item.linear))
+
+
+def _figure(items: Sequence[AmplitudeMargin]) -> Block:
+    chart = Chart(width=style.HALF, height=300.0)
+    panel = chart.panel()
+    sizes = list(dict.fromkeys(item.size for item in items))
+    keys = list(dict.fromkeys((item.loop, item.kind) for item in items))
+    for k, (loop, kind) in enumerate(keys):
+        for friction_on in (False, True):
+            own = [x for x in items if (x.loop, x.kind, x.friction_on) == (loop, kind, friction_on)]
+            x = [sizes.index(item.size) + 0.06 * (k - len(keys) / 2) for item in own]
+            y = [None if item.value is None else max(item.value / item.linear, LOWEST) for item in own]
+            look: style.Style = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
+            if friction_on:
+                look |= {"hollow": True, "dash": 1, "marker": "s"}
+            panel.curve(x, y, f"{loop}: {KINDS[kind]}", **({"marker": "o"} | look))
+    panel.rule_y(1.0)
+    panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
+    panel.x.limits(-0.4, len(sizes) - 0.6)
+    panel.y.log, panel.by_point = True, True
+    values = [max(item.value / item.linear, LOWEST) for item in items if item.value]
+    panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
+    panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)]
+    panel.x.label, panel.y.label = "initial deviation", "margin over linear margin"
+    caption = (
+        "Margins after release from rest at small, medium and large deviations, limits active; hollow and "
+        "dashed: with dry friction."
+    )
+    return doc.figure("margins_by_amplitude", chart, caption=caption, alt=caption, layout="half")
+
+
+def _table(items: Sequence[AmplitudeMargin]) -> Block:
+    columns = [
+        doc.column("loop", "Loop"),
+        doc.column("kind", "Varied"),
+        doc.column("size", "Released from"),
+        doc.column("friction", "Dry friction"),
+        doc.column("linear", "Linear margin", format="sig:4"),
+        doc.column("value", "Oscillation lasts from", format="sig:3"),
+        doc.column("unit", "Unit"),
+        doc.column("limiter", "Limit acting"),
+        doc.column("remark", ""),
+    ]
+    rows = [_row(item) for item in items]
+    return doc.details(
+        "Margins from small, medium and large deviations",
+        [doc.table("Margins by amplitude", columns, rows)],
+    )
+
+
+def _row(item: AmplitudeMargin) -> Row:
+    delay = item.kind == "delay"
+    unit = "ms" if delay else "dB"
+    remark = ""
+    if item.value is None:
+        remark = f"no oscillation lasts up to {_shown(item.furthest, item):.3g} {unit}"
+    elif item.value == (0.0 if delay else 1.0):
+        remark = "the nominal drive oscillates"
+    return {
+        "loop": item.loop,
+        "kind": KINDS[item.kind],
+        "size": f"{100.0 * item.part:.0f} % of full range",
+        "friction": "on" if item.friction_on else "off",
+        "linear": _shown(item.linear, item),
+        "value": None if item.value is None else _shown(item.value, item),
+        "unit": unit,
+        "limiter": item.limiter,
+        "remark": remark,
+    }
+
+
+def _shown(value: float, item: AmplitudeMargin) -> float:
+    return 1e3 * value * item.period_s if item.kind == "delay" else 20.0 * math.log10(value)
+
+
+def _text(value: float, item: AmplitudeMargin) -> str:
+    return f"{_shown(value, item):.3g} {'ms' if item.kind == 'delay' else 'dB'}"
