@@ -215,6 +215,11 @@ class LoopSetup:
         row["angle_start"] -= seen
         row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
 
+    @property
+    def steady_start(self) -> bool:
+        """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
+        return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
+
     @staticmethod
     def _constant(row: Rows, point: str, value: Value) -> None:
         """Replace the outer controllers, which are out of action, by a constant command."""

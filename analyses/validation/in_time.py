@@ -22,7 +22,7 @@ from actuator_lti.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN
-from nonlinear import tangent
+from nonlinear import Tangent, tangent
 from nonlinear.derivative import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
@@ -79,9 +79,9 @@ class MarginShown:
 
 
 def step_shown(bench: Bench, name: str) -> StepShown | None:
-    """One small step of a stable loop; None where its figures have no step."""
+    """One small step of a stable loop; None where its figures have no step, or no run begins steady."""
     figures = bench.figures[name]
-    if figures.step is None:
+    if figures.step is None or not bench.setup(name).steady_start:
         return None
     setup, closed = bench.setup(name), figures.loop.plain_closed
     samples = int(min(max(SETTLINGS * figures.step.settling_time_s / closed.dt, 20.0), MOST_SAMPLES))
@@ -144,14 +144,14 @@ def _run_step(setup: LoopSetup, part: float, samples: int) -> Floats | None:
             back[k] = drive.s[RETURNED[setup.point]]
         runs.append(back)
         flags.append(drive.happened)
-    return None if flags[0] != flags[1] else np.asarray((runs[1] - runs[0]) / size, float)
+    return None if flags != [(0.0, 0.0)] * 2 else np.asarray((runs[1] - runs[0]) / size, float)
 
 
 def margin_shown(bench: Bench, name: str) -> MarginShown | None:
-    """Runs on either side of the gain margin that is quoted of a stable loop; None where there is none."""
+    """Runs on either side of the quoted gain margin of a stable loop; None as for a step."""
     figures = bench.figures[name]
     margin = figures.margins.gain_margin
-    if margin is None or not 0.0 < margin.ratio < np.inf:
+    if margin is None or not 0.0 < margin.ratio < np.inf or not bench.setup(name).steady_start:
         return None
     outward = 1.0 + BESIDE if margin.ratio > 1.0 else 1.0 / (1.0 + BESIDE)
     runs = [_beside(bench, name, margin.ratio * x, margin.frequency_rad_s) for x in (1.0 / outward, outward)]
@@ -182,7 +182,7 @@ def _beside(
     wanted = predicted ** np.arange(periods + 1)
 
     def course(size: float) -> Complexes | None:
-        return _course(setup, found.places, left, right, size, periods)
+        return _course(setup, found, left, right, size, periods)
 
     seen, own = _agreed(course)
     course_off = float(np.abs(seen[-1]) / np.abs(wanted[-1]))
@@ -215,23 +215,23 @@ def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes, complex]:
 
 
 def _course(
-    setup: LoopSetup,
-    places: npt.NDArray[np.intp],
-    left: Complexes,
-    right: Complexes,
-    part: float,
-    periods: int,
+    setup: LoopSetup, found: Tangent, left: Complexes, right: Complexes, part: float, periods: int
 ) -> Complexes | None:
-    """Amplitude of a mode over a run that starts on it, over the first; None after an event."""
+    """Amplitude of a mode over a run that starts on it, over the first; None after an event.
+
+    The signal at the place begins with a part of what would be a large one.
+    """
     rows = setup.row()
     drive, calm = Stepper(rows), Stepper(rows)
-    start = drive.start[places]
-    speeds = np.abs(right) / np.maximum(np.abs(start), 1e-3 * np.max(np.abs(right)) + 1e-300)
-    size = part / float(np.max(speeds))
-    drive.s[places] += 2.0 * size * right.real
+    shown = float(np.max(np.abs(found.C @ right)))
+    if shown == 0.0:
+        raise NumericalError("the critical mode does not show at the place")
+    size = part * (setup.range if np.isfinite(setup.range) else 1.0) / shown
+    drive.s[found.places] += size * right.real
     seen = np.empty(periods + 1, complex)
     for k in range(periods + 1):
-        seen[k] = left @ (drive.s[places] - calm.s[places])
+        seen[k] = left @ (drive.s[found.places] - calm.s[found.places])
         drive.run(setup.base_ticks)
         calm.run(setup.base_ticks)
-    return np.asarray(seen / seen[0], complex) if drive.happened == calm.happened else None
+    calm_still = drive.happened == calm.happened == (0.0, 0.0)
+    return np.asarray(seen / seen[0], complex) if calm_still and seen[0] != 0.0 else None
