@@ -59,10 +59,13 @@ def refuse_undrawable(blocks: Sequence[Mapping[str, Any]], origin: str) -> None:
     Raises
     ------
     InputError
-        Naming the figure, and what went wrong.
+        Naming the figure's number, its name, and what is wrong with it.
     """
-    for k, block in enumerate(blocks):
-        _, missing = caught(block["figure"], partial(draw_svg, block, "f", False))
-        if missing:
-            why = missing.why.removeprefix("unforeseen ")
-            raise InputError(f"figure {k + 1} ({block['figure']}): its data cannot be drawn ({why})", origin)
+    for k, block in enumerate(blocks, 1):
+        try:
+            _, missing = caught(block["figure"], partial(draw_svg, block, "f", False))
+            why = missing.why.removeprefix("unforeseen ") if missing else ""
+        except InputError as error:
+            why = error.message
+        if why:
+            raise InputError(f"figure {k} ({block['figure']}): its data cannot be drawn ({why})", origin)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+from functools import reduce
+from operator import getitem
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +14,7 @@ import pytest
 from actuator_lti.errors import InputError
 from actuator_lti.verdict import Verdict
 from reports import document as doc
+from reports.charts.chart import Chart
 from reports.numbers import fixed, show, significant
 from reports.verdict_summary import verdict_lines, verdict_of, verdict_words
 
@@ -144,34 +148,39 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
         doc.load(path)
 
 
+CURVE = ("columns", 0, "panels", 0, "items", 0)
+
+
 @pytest.mark.parametrize(
-    "damage",
+    ("place", "value", "words"),
     [
-        {"edges": []},
-        {"counts": [1]},
-        {"edges": [0.0, 1e308, -1e308]},
-        {"edges": ["a", 1, 2]},
-        {"nominal": {}},
+        (("columns",), [], "columns: a chart has at least one"),
+        (("columns", 0, "heights"), [0], "ZeroDivisionError"),
+        (("columns", 0, "panels", 0, "x", "seen"), [-1e308, 1e308], "OverflowError"),
+        ((*CURVE, "x"), [], "ValueError"),
+        ((*CURVE, "y"), [1.0], "ValueError"),
+        ((*CURVE, "x"), ["a", 1, 2], r"columns\.0\.panels\.0\.items\.0\.curve\.x: .*'a'"),
+        ((*CURVE, "look"), {"marker": "?"}, "KeyError"),
     ],
 )
-def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(damage: dict[str, Any], tmp_path) -> None:
-    marks = {"nominal": 1.0, "worst": 0.5, "minimum": 0.2, "maximum": None}
-    panel = {"label": "g", "unit": "dB", "edges": [0.0, 1.0, 2.0], "counts": [3, 4], **marks}
-    for changed in ({}, damage):
-        drawn = doc.figure("distribution", {"panels": [{**panel, **changed}]}, caption="c", alt="a")
-        made = doc.document(
-            title="t", subtitle="s", design={"name": "d", "revision": "1"},
-            provenance={"time": None, "version": "1"}, sections=[doc.section("one", "One", [drawn])],
-        )  # fmt: skip
-        path = tmp_path / "report.json"
-        path.write_text(json.dumps(made))
-        if not changed:
-            assert doc.load(path)["title"] == "t"
-            continue
-        with pytest.raises(
-            InputError, match=r"report\.json: figure 1 \(distribution\): its data cannot be drawn"
-        ):
-            doc.load(path)
+def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(
+    place: tuple[str | int, ...], value: Any, words: str, tmp_path: Path
+) -> None:
+    chart = Chart()
+    chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")
+    first, second = (doc.figure(name, chart, caption="c", alt="a") for name in ("bode", "distribution"))
+    path = tmp_path / "report.json"
+    parts = [doc.section("one", "One", [first, second])]
+    written = json.dumps(made(sections=parts, verdict=verdict_of(parts, "report")))
+    path.write_text(written)
+    assert len(doc.figures(doc.load(path))) == 2
+    damaged = json.loads(written)
+    *way, last = place
+    reduce(getitem, way, damaged["sections"][0]["blocks"][1]["chart"])[last] = value
+    path.write_text(json.dumps(damaged))
+    where = r"report\.json: figure 2 \(distribution\): its data cannot be drawn"
+    with pytest.raises(InputError, match=rf"{where} \({words}"):
+        doc.load(path)
 
 
 @pytest.mark.parametrize("format", ["sig:0", "short:0", "ms:0", "sig", "fix:99", "sig:3x", ""])
