@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.drive.choice import where
 from actuator_lti.loops.compliance import Compliance, compliance
 
 if TYPE_CHECKING:
@@ -105,10 +106,10 @@ def lost_motion_rad(design: Design) -> Any:
     if coupling is None:
         return 0.0
     dry = 0.0 if friction is None else friction.dry_torque_Nm
-    m = LOST_MOTION_SHARE * np.asarray(design.load.moment_max_Nm) / design.ratio_behind_coupling
-    branches = (m - dry, m + dry)
-    twist = sum(T / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad * np.sign(T) for T in branches)
-    return _plain(np.where(m == 0.0, coupling.play_rad, twist) / design.ratio_behind_coupling)
+    m = LOST_MOTION_SHARE * design.load.moment_max_Nm / design.ratio_behind_coupling
+    behind_dry = where(m > dry, 1.0, where(m < dry, 0.0, 0.5))  # share of the play that the width leaves
+    twist = 2.0 * m / coupling.stiffness_Nm_rad + behind_dry * coupling.play_rad
+    return where(m == 0.0, coupling.play_rad, twist) / design.ratio_behind_coupling
 
 
 def _plain(value: Any) -> Any:
