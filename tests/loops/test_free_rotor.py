@@ -68,13 +68,16 @@ def test_a_servo_without_viscous_friction_is_stable_in_every_form(form: Any, con
 
 @pytest.mark.parametrize("certify", [False, True])
 def test_a_gain_of_one_at_rest_has_its_distances(certify: bool) -> None:
-    """Velocity gain kE on a free rotor: L(0) = 1, where the disk margin's criterion has its pole."""
+    """Velocity gain kE on a free rotor: L(0) = 1, where the disk margin's criterion has its pole.
+
+    Whether |L| crosses one beside zero frequency is a question for exact arithmetic, asked or not.
+    """
     text = SERVO + WITHOUT.replace("0.02 V*s/rad", "6 mV*s/rad")
     loop = assemble_loops(read_design_text(text, "rc"), form="continuous").velocity
     assert loop is not None
     result = stability_margins(loop.open_loop, certify=certify)
     assert result.stable is True
-    assert result.evidence == ("certified" if certify else "checked")
+    assert result.evidence == "certified"
     assert result.phase_margins == ()  # |L| starts at one and falls
     grid = 1j * np.geomspace(1.0, 1e5, 20_001)
     L = np.array([loop.open_loop(s) for s in grid]).ravel()
@@ -107,12 +110,12 @@ def test_the_gain_at_rest_of_a_current_loop_on_a_free_rotor() -> None:
 
 @pytest.mark.parametrize("slope", [-40.0, -0.1, 50.0])
 def test_a_slow_pole_behind_two_integrators_is_no_turn_of_the_delay(slope: float) -> None:
-    """Cut at the voltage L falls by 25 decades before it crosses one, which rounding does not follow."""
+    """Cut at the voltage L falls by 25 decades before it crosses one: by its factors or exactly."""
     design = load_design("ilr33-amber")
     load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope)
     cuts = assemble_loops(replace(design, load=load), form="continuous").break_points
     result = stability_margins(cuts["u"].open_loop)
-    assert result.evidence == "certified"
+    assert result.evidence in ("checked", "certified")
     assert result.stable is stability_margins(cuts["w_ref"].open_loop).stable  # the same closed-loop poles
     w = np.concatenate((np.geomspace(1e-6, 99.0, 500), np.geomspace(1e2, 1e5, 3_001)))
     L = np.array([cuts["u"].open_loop(1j * x) for x in w]).ravel()
