@@ -49,8 +49,8 @@ RETURNED = {
 }  # fmt: skip
 GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where the error is stated
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
-ROUGH, FINE = 10, 1  # largest decade of a step: about the motion that a kick begins with, and in a sine
-STEPS, LEAST_DECADE = 10, -30
+ROUGH, FINE = (10, 4), (1, 10)  # largest decade of a step about a kick's first motion, a sine; and steps
+LEAST_DECADE = -30
 LEAST_STEP = 1e-9  # of the number itself
 FALLING = 0.2  # of the disagreement of the step before: it still falls as a bend lets it
 PASSES = 3  # of choosing steps by what they do to the response that the last choice gave
@@ -208,16 +208,14 @@ class _Bench:
         self.watched = places_of(self.drive.p, FLAG, COUNTER)
         self.calm = self._over(self.drive.start, np.zeros(self.updates))
         self.moved, self.scale, self.kick = self._reached()
-        self._known: dict[tuple[int, bytes], list[_Column]] = {}
+        self._known: dict[tuple[tuple[int, int], bytes], list[_Column]] = {}
 
     def tangent(self) -> Tangent:
         """Every column by the step that serves the response best, and the error that is left in it."""
         n, z = self.moved.size, np.exp(1j * GRID)
         rough = np.stack([column for column, _ in self._columns(self.scale, ROUGH, None)], axis=1)
         forced = sensitivities(*_split(rough, n), z)[1]
-        sway = self.kick * np.max(
-            np.abs(forced[:, :n]), axis=0
-        )  # of each number in a sine of the kick's size
+        sway = self.kick * np.max(np.abs(forced[:, :n]), axis=0)  # of each number, in a sine
         seen: tuple[Floats, Floats] | None = None
         for _ in range(PASSES):
             chosen = self._columns(np.where(np.isfinite(sway) & (sway > 0.0), sway, self.scale), FINE, seen)
@@ -238,14 +236,14 @@ class _Bench:
         )
 
     def _columns(
-        self, scale: Floats, most: int, seen: tuple[Floats, Floats] | None
+        self, scale: Floats, extent: tuple[int, int], seen: tuple[Floats, Floats] | None
     ) -> list[tuple[Floats, Floats]]:
         """Columns of A over C beside B over D, and their errors, by what the response sees of them."""
         felt = np.maximum(scale, LEAST_STEP * np.abs(self.drive.start[self.moved]))
         units = np.concatenate([felt, np.full(self.updates, self.kick)])
-        key = (most, units.tobytes())
+        key = (extent, units.tobytes())
         if key not in self._known:
-            self._known[key] = [self._tried(k, unit, most) for k, unit in enumerate(units)]
+            self._known[key] = [self._tried(k, unit, *extent) for k, unit in enumerate(units)]
         tried = self._known[key]
         if seen is None:
             return [each.best(1.0 / units[None], np.array([units[k]])) for k, each in enumerate(tried)]
@@ -308,7 +306,7 @@ class _Bench:
             quiet, period = (0 if new.any() else quiet + 1), period + 1
         return moved
 
-    def _tried(self, k: int, unit: float, most: int) -> _Column:
+    def _tried(self, k: int, unit: float, most: int, steps: int) -> _Column:
         """One column by steps that fall by tens from ``unit`` times ten to the ``most``, without an event."""
         found: list[tuple[Floats, Floats]] = []
         off = [np.inf]
@@ -319,7 +317,7 @@ class _Bench:
             if found:
                 off.append(float(np.max(np.abs(quotient - found[-1][0]))))
             found.append((quotient, rounding))
-            if len(found) >= STEPS and off[-1] > FALLING * off[-2]:  # no longer bent
+            if len(found) >= steps and off[-1] > FALLING * off[-2]:  # no longer bent
                 break
         if len(found) < 2:
             name = names_of(self.moved)[k] if k < self.moved.size else "the injection"
