@@ -26,6 +26,11 @@ class Conduct:
     status: str
     detail: str = ""
 
+    @property
+    def wanted(self) -> bool:
+        """Whether the drive rests, turns steadily or follows, no limit in its way."""
+        return self.status in ("comes to rest", "becomes steady", "following")
+
 
 def conduct(run: Trajectory) -> Conduct:
     """Judge a run; where its end comes too early, the drive is followed beyond it.

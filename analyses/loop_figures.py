@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.as_control import as_control
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.quantities import MOST_RESONANCE_DB
+from analyses.isolation import attempt
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth, Peaks
@@ -205,27 +206,24 @@ def all_loop_figures(
         Whether the margins are to be known by exact arithmetic.
     locked : bool, optional
         Whether the current loop is wanted with the rotor locked as well; where left out, if a requirement
-        is on it.
+        is on it. Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
 
     Raises
     ------
     InputError, NumericalError
         If the margins of a loop cannot be found, and ``refused`` is not given.
     """
-    from analyses.held_loops import other_loops
-
     result = {}
-    both = any(r.rotor == "locked" for r in loops.design.requirements) if locked is None else locked
+    needed = any(r.rotor == "locked" for r in loops.design.requirements)
     for name, loop in loops.present.items():
         try:
             if name == "position":
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
-            if name == "current" and both and loops.operating.rotor == "free":
-                fixed = other_loops(loops, loops.design, rotor="locked").current
-                assert fixed is not None
-                with_it = loop_figures(fixed, step=step, certify=certify)
+            if name == "current" and (needed if locked is None else locked):
+                own = partial(_locked, loops, step=step, certify=certify)
+                with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
                 result[name] = replace(result[name], locked=with_it)
         except (InputError, NumericalError) as error:
             if refused is None:
@@ -234,6 +232,17 @@ def all_loop_figures(
     if result and (whole := result.get(loops.design.controller.outermost)) and whole.stable:
         return {name: _with_held(one, loops, name, step, certify) for name, one in result.items()}
     return result
+
+
+def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures | None:
+    """The current loop with the rotor locked; ``None`` where it is the one that stands there already."""
+    from analyses.held_loops import other_loops
+
+    if loops.operating.rotor == "locked":
+        return None
+    fixed = other_loops(loops, loops.design, rotor="locked").current
+    assert fixed is not None
+    return loop_figures(fixed, step=step, certify=certify)
 
 
 def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:

@@ -11,9 +11,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, PlainValidator
+from pydantic import AfterValidator, Discriminator, PlainValidator
 
+from actuator_lti.reading import shown
 from reports.charts.axis import Axis
+from reports.charts.paint import COLOURS
 
 Values = Sequence[float | None] | Sequence[float] | np.ndarray
 
@@ -30,21 +32,28 @@ def _read_numbers(values: Any) -> np.ndarray:
         raise ValueError(str(error)) from None
 
 
+def _read_colour(name: str) -> str:
+    if name not in COLOURS and name not in ("", "none"):
+        raise ValueError(f"{shown(name)}: allowed: {', '.join(COLOURS)}, none")
+    return name
+
+
 Numbers = Annotated[np.ndarray, PlainValidator(_read_numbers)]
+Colour = Annotated[str, AfterValidator(_read_colour)]  # a pen writes it as it stands
 
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
     """How an item is painted; ``colour`` is a key of `reports.charts.paint.COLOURS`."""
 
-    colour: str = "c1"
+    colour: Colour = "c1"
     dash: int = 0
     width: float = 1.9
     opacity: float = 1.0
     marker: str = ""
     size: float = 5.0
     hollow: bool = False
-    fill: str = ""
+    fill: Colour = ""
     hatch: str = ""
 
 
@@ -110,7 +119,7 @@ class Note:
     words: str
     at: tuple[float, float] | None = None
     corner: str = ""
-    colour: str = "ink"
+    colour: Colour = "ink"
     bold: bool = False
     pinned: bool = False
     over: bool = False

@@ -48,7 +48,8 @@ def chart_of(data: Mapping[str, Any]) -> Chart:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
-        raise InputError(f"{place}: {first['msg'][:1].lower()}{first['msg'][1:]}") from None
+        words = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"{place}: {words[:1].lower()}{words[1:]}") from None
     if not chart.columns:
         raise InputError("columns: a chart has at least one")
     for column in chart.columns:

@@ -31,7 +31,7 @@ def section(result: Motion) -> Section:
     detail = f" ({ended.detail})" if ended.detail else ""
     blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
-    status: Status = "info" if ended.status == "ok" else "warn"
+    status: Status = "info" if ended.wanted else "warn"
     words = f"{run.time_s.size} rows, status {ended.status}{detail}"
     return doc.section("simulate", "Motion", [figure, *blocks], result=words, status=status)
 

@@ -20,9 +20,9 @@ REPORT = ("report", "ilr33-amber", "--quiet")
 BROKEN = {
     "analyses.loop_survey:survey_loops": {"parameters", "provenance"},
     "analyses.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
-    "analyses.loop_survey:_locked": {"margins", "loop-current", "parameters"},
+    "analyses.loop_figures:_locked": {"margins", "loop-current", "parameters"},
     "analyses.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
-    "analyses.loop_survey:_operating_points": {"margins", "loop-position", "parameters"},
+    "analyses.loop_survey:operating_points": {"margins", "loop-position", "parameters"},
     "analyses.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
     "analyses.loop_survey:_onset": {"margins", "loop-position", "parameters"},
     "analyses.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},

@@ -1,4 +1,6 @@
-"""Random drives by the hundred: whoever asks for rest gets one answer.  Run by hand: FIRST COUNT.
+"""Random drives by the hundred: whoever asks for rest gets one answer.  Run by hand::
+
+    python -m tests.nonlinear.rest_agreement FIRST COUNT
 
 For each stable position drive a step of 1 % of full deflection, as `cycles` waits for it, and as `simulate`
 judges it after runs of two lengths.
@@ -7,15 +9,12 @@ judges it after runs of two lengths.
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from random_drives import stable_drives
 
 from actuator_lti.design.model import Design
 from analyses.settling import settle
 from nonlinear import commands, simulate
 from nonlinear.rest import judge
+from tests.validation.random_drives import stable_drives
 
 LENGTHS = (1_000, 20_000)  # ticks of the runs
 

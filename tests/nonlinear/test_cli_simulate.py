@@ -82,14 +82,14 @@ def test_every_command(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = f"simulate --command {kind} --amplitude 0.2 --frequency 5 --to 20 --count 3"
     assert main(f"{arguments} --duration {duration} --bias-rate 5 --load-slope -20 --every 10".split()) == 0
     out = capsys.readouterr().out
-    assert f"{1000 * duration:.0f} rows, status ok" in out
+    assert f"{1000 * duration:.0f} rows, status following" in out
 
 
 def test_a_stepped_sine_runs_to_its_end(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = "--command stepped-sine --frequency 5 --to 20 --count 3 --every 10"
     assert main(["simulate", *arguments.split()]) == 0
     out = capsys.readouterr().out
-    assert "1750 rows, status ok" in out
+    assert "1750 rows, status comes to rest" in out
     assert " deg " in out
 
 

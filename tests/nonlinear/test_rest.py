@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,11 +16,8 @@ from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.drift import overload
 from nonlinear.rest import first_motion_s, judge
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from random_drives import full_drive, is_stable
-
 from tests.nonlinear.rest_agreement import answers
+from tests.validation.random_drives import full_drive, is_stable
 
 HERE = Path(__file__).parent
 AMBER = load_design("ilr33-amber")

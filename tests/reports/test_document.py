@@ -161,6 +161,7 @@ CURVE = ("columns", 0, "panels", 0, "items", 0)
         ((*CURVE, "y"), [1.0], "ValueError"),
         ((*CURVE, "x"), ["a", 1, 2], r"columns\.0\.panels\.0\.items\.0\.curve\.x: .*'a'"),
         ((*CURVE, "look"), {"marker": "?"}, "KeyError"),
+        ((*CURVE, "look"), {"colour": 'red"/><b>'}, r"columns\..*\.look\.colour: .*allowed: ink"),
     ],
 )
 def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(

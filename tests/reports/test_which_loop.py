@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import CommandMean, command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.step import step_figures
+from analyses.isolation import isolated
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import evaluate_requirements
 from analyses.responses import answer_curve, response_at
@@ -126,6 +128,19 @@ def test_a_requirement_chooses_the_current_loop() -> None:
         assert label(verdict) == f"Current loop, rotor {rotor}: phase margin"
     (verdict,) = evaluate_requirements(asking(design, **keys))
     assert verdict.rotor == "free"
+
+
+@pytest.mark.parametrize("rotor", ["free", "locked"])
+def test_a_locked_loop_that_fails_is_never_judged_by_the_free_one(
+    rotor: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor does it take the others with it where nobody requires anything of it."""
+    keys = {"quantity": "phase_margin", "unit": "deg", "loop": "current"}
+    loops = assemble_loops(asking(load_design("ilr33-amber"), **keys, rotor=rotor))
+    monkeypatch.setattr("analyses.loop_figures._locked", lambda *_a, **_k: 1 / 0)
+    with isolated() as missing, nullcontext() if rotor == "free" else pytest.raises(ZeroDivisionError):
+        assert all_loop_figures(loops, locked=True)["current"].locked is None
+    assert [one.part for one in missing] == ["current loop with the rotor locked"] * (rotor == "free")
 
 
 def test_the_keys_are_read_written_and_hashed_where_they_stand() -> None:

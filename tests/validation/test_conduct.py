@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
-from pathlib import Path
+from math import radians
 
+import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.design import with_values
 from analyses.conduct import conduct
+from analyses.motion import Asked, Motion
 from nonlinear import commands, simulate
+from nonlinear.rest import PERIODS
 from reports.cli.main import main
+from reports.sections.simulate import section
 
 AMBER = load_design("ilr33-amber")
-CONDITIONAL = Path(__file__).with_name("conditional.toml")
 
 
 @pytest.mark.parametrize("duration", [0.02, 0.4])
@@ -51,6 +56,7 @@ def test_noise_is_no_limit_cycle() -> None:
 
 
 def test_the_command_line_says_it(capsys: pytest.CaptureFixture[str]) -> None:
+    """In the figures that passages through the middle of a long run give."""
     arguments = ["simulate", "--amplitude", "3", "--duration", "0.5", "--quiet"]
     arguments += ["--set", "control.position.gain=4000 1/s"]
     assert main(arguments) == 0
@@ -58,4 +64,29 @@ def test_the_command_line_says_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*arguments, "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["status"] == "limit cycle"
-    assert facts["status_detail"].startswith("±0.16 deg at 16.2 Hz (9 periods seen")
+    found = re.fullmatch(
+        r"±(\S+) deg at (\S+) Hz \((\d+) periods seen, (.*) limit acting\)", facts["status_detail"]
+    )
+    assert found is not None
+    run = simulate(with_values(AMBER, {"control.position.gain": 4000.0}), commands.step(radians(3.0)), 4.0)
+    late = np.degrees(run.output_angle_rad[run.time_s.size // 2 :])
+    above = late > 0.5 * (late.max() + late.min())
+    passages = np.flatnonzero(above[1:] & ~above[:-1]) * run.period_s
+    assert float(found[1]) == pytest.approx(0.5 * np.ptp(late), rel=5e-3)  # of three digits
+    assert float(found[2]) == pytest.approx(1.0 / np.diff(passages).mean(), rel=5e-3)
+    assert int(found[3]) >= PERIODS
+    acting = [name for name, use in run.limits.items() if use.fraction > 0.0]
+    assert found[4].split(" and ") == acting
+
+
+@pytest.mark.parametrize(
+    ("gain", "command", "status"),
+    [
+        (None, commands.step(0.02), "info"),
+        (None, commands.sine(0.01, 5.0), "info"),
+        (4000.0, commands.step(0.05), "warn"),
+    ],
+)
+def test_only_what_nobody_wants_is_marked(gain: float | None, command: commands.Command, status: str) -> None:
+    design = AMBER if gain is None else with_values(AMBER, {"control.position.gain": gain})
+    assert section(Motion(design, Asked(), simulate(design, command, 0.3)))["status"] == status

@@ -11,6 +11,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design import with_overrides, with_values
 from actuator_lti.drive.steady import motor_torque_Nm
+from actuator_lti.verdict import Verdict
 from analyses.drive_figures import drive_figures
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
@@ -131,7 +132,7 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     made = friction_section.section(friction_effects(with_values(load_design("ilr33-amber"), values)))
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
-    assert any(item["passed"] is False and "refuted" in item["reason"] for item in items)
+    assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
 
 
 @pytest.mark.parametrize(
