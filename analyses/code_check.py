@@ -16,6 +16,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.verdict import Verdict
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
+from nonlinear.native import borrowed
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,6 @@ def check_code(design: Design) -> CodeCheck:
     """
     from nonlinear.export.build import FLAGS, compile_files, system_compiler
     from nonlinear.export.run_library import run_sources
-    from nonlinear.native import borrowed
 
     compiler = system_compiler()
     if compiler is None or not sys.platform.startswith(("linux", "darwin")):

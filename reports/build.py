@@ -12,6 +12,7 @@ from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
+from analyses.corners import corners
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
@@ -102,7 +103,6 @@ def _views(
     design: Design, survey: LoopSurvey | None
 ) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]]]:
     """The weakest point of all views, and the spread over the operating points."""
-    from analyses.corners import corners
     from analyses.isolation import attempt
     from analyses.weakest import spread, weakest
 

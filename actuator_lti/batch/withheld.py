@@ -10,6 +10,8 @@ below the angles that were scanned.
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from actuator_lti.batch._figures import (
@@ -23,6 +25,7 @@ from actuator_lti.batch._figures import (
     STABLE,
 )
 from actuator_lti.margins.trust import told_from_zero
+from actuator_lti.rest_mode import without_rest_mode
 
 AT_BORDER = 1e-10  # distance of the largest pole from the unit circle within which rounding decides
 _GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
@@ -83,8 +86,18 @@ def _lost(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> np.n
 
 
 def _told(A: np.ndarray, B: np.ndarray, C: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """How many of its own rounding errors the response of one design is; 0 where it has a pole there."""
-    try:
-        return told_from_zero(A, B, C, np.zeros(()), points)
-    except np.linalg.LinAlgError:
-        return np.zeros(points.shape)
+    """How many of its own rounding errors the response of one design is; 0 where it has a pole there.
+
+    At zero frequency it is that of the loop without a mode at rest that it does not show, as its figures are
+    (`actuator_lti.batch.rest`).
+    """
+    result = np.zeros(points.shape)
+    here = points == 1.0
+    for chosen in (here, ~here):
+        a, b, c = A, B, C
+        if chosen is here and here.any():
+            a, column, row, _ = without_rest_mode(A, B[:, None], C[None], 1.0)
+            b, c = column[:, 0], row[0]
+        with suppress(np.linalg.LinAlgError):
+            result[chosen] = told_from_zero(a, b, c, np.zeros(()), points[chosen])
+    return result

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from analyses.loop_figures import loop_figures
+from analyses.responses import response_at
 from analyses.validation.coherent import coherent
 from analyses.validation.conditional import step_rows
 from analyses.validation.settling import LONGEST_TICKS, full_range
@@ -219,7 +220,6 @@ def _linearity(
 ) -> Floats:
     """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
     from analyses.limit_cycles.foreseen import without_nonlinearities
-    from analyses.responses import response_at
 
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
