@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_drives import full_drive, is_stable
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import shipped_designs
@@ -18,6 +17,7 @@ from nonlinear.derivative import GRID, Tangent, relative
 from nonlinear.loop_setup import points_of, stages_of
 from nonlinear.on_the_bench import on_the_bench
 from nonlinear.operating_motion import on_its_stand, operating_motion
+from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)
 
