@@ -64,7 +64,8 @@ def words(rest: Rest, factor: float, unit: str) -> str:
 
     Examples
     --------
-    >>> words(settle("ilr33-amber", 0.0, 0.01).rest, 57.3, "deg")
+    >>> from actuator_lti.design import load_design
+    >>> words(settle(load_design("ilr33-amber"), 0.0, 0.01).rest, 57.3, "deg")
     'comes to rest'
     """
     if rest.verdict == "at rest":

@@ -22,6 +22,7 @@ from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 
 COUNT = 64
+TIMES = ("rise_time", "settling_time")
 
 
 def nudged(block: Block, rng: np.random.Generator) -> Block:
@@ -41,7 +42,11 @@ def nudged(block: Block, rng: np.random.Generator) -> Block:
 
 @lru_cache(maxsize=1)
 def moved_by_an_ulp(design: Design, loop: str, timed: bool) -> dict[str, float]:
-    """The largest change of each figure over the copies."""
+    """The largest change of each figure over the copies.
+
+    A time is a whole number of ticks, which hide what moves it by less: it moves with the slowest pole's time
+    constant at least.
+    """
     rng = np.random.default_rng(0)
     wired = wire(Population(design, {}, COUNT).stacked, Operating())
     rows, out = np.full((COUNT, COLUMNS), np.nan), np.full((COUNT, len(LOOPS), COLUMNS), np.nan)
@@ -58,6 +63,11 @@ def moved_by_an_ulp(design: Design, loop: str, timed: bool) -> dict[str, float]:
     figures = many.LinearFigures(wired.stages, COUNT, out, period)
     values = {name: figures.quantity(name, loop) for name in LOOP_QUANTITIES}
     with np.errstate(invalid="ignore"):
-        return {
+        result = {
             name: float(np.nan_to_num(np.abs(each - each[0]), nan=0.0).max()) for name, each in values.items()
         }
+        slowest = 1.0 - figures.pole_radius(loop)
+        share = np.nan_to_num(np.abs(slowest / slowest[0] - 1.0), nan=0.0).max()
+    for name in TIMES:
+        result[name] = max(result[name], float(share * np.nan_to_num(values[name][0])))
+    return result
