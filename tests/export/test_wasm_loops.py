@@ -233,8 +233,8 @@ def test_seeds_that_once_differed(tmp_path: Path) -> None:
 
 
 def test_a_pole_on_the_unit_circle_is_no_verdict() -> None:
-    """Seed 14: poles at 1 and -1 but for rounding; one kind of processor said stable, another unstable."""
-    design = replace(random_elastic_drive(np.random.default_rng(14)), instruments=Instruments())
+    """Seed 431: poles at 1 and -1 but for rounding; one kind of processor said stable, another unstable."""
+    design = replace(random_elastic_drive(np.random.default_rng(431)), instruments=Instruments())
     truth = stability_margins(assemble_loops(design).present["current"].open_loop)
     assert truth.stable is None
     many = linear_figures(Population(design, {}, 1), time_figures=False)
