@@ -22,16 +22,16 @@ def at_rest(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> No
     rows : ndarray, shape (count, columns)
         Figures, changed in place.
     """
-    angles = rows[:, FIRST_PHASE : FIRST_PHASE + 2 * LISTED : 2]
-    for k, j in np.argwhere(angles == 0.0):
-        L0 = _at_rest(A[k], B[k], C[k])
-        if L0 is not None and L0 < 0.0:
-            rows[k, FIRST_PHASE + 2 * j + 1] = -1.0 / L0
     with np.errstate(divide="ignore", invalid="ignore"):
         # a gain that is nothing beside the peak is not quoted, and its final value is zero: L(0) is zero too
         closed = np.where(np.isnan(rows[:, DC_GAIN]) & (rows[:, FINAL] == 0.0), 0.0, rows[:, DC_GAIN])
         distance = 1.0 / np.abs(1.0 - closed)
-        nearer = distance < rows[:, MODULUS]
+    angles = rows[:, FIRST_PHASE : FIRST_PHASE + 2 * LISTED : 2]
+    for k, j in np.argwhere(angles == 0.0):
+        L0 = _at_rest(A[k], B[k], C[k])
+        if L0 is not None and L0 < 0.0:
+            rows[k, FIRST_PHASE + 2 * j + 1], distance[k] = -1.0 / L0, abs(1.0 + L0)
+    nearer = distance < rows[:, MODULUS]
     rows[nearer, MODULUS], rows[nearer, MODULUS_X] = distance[nearer], 0.0
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_lti.margins.factors_on_axis import Factored
+from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.level_crossings import shifted, unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import SortedPoles, eigenvalues
@@ -185,8 +185,11 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     apart = np.hypot(off - off[k], np.angle(np.exp(1j * (turned - turned[k]))))
     if not (apart[seen] <= _SAME).all() or not np.isfinite(off[k]):
         raise Doubtful("the factors do not make up the loop")
-    slack = max(_LEAST_SLACK, 10.0 * float(apart[seen].max()))
-    return replace(factors, log_gain=float(off[k]), phase=float(turned[k]), slack=slack)
+    turn = half_turn(float(turned[k]))
+    if not abs(turn - turned[k]) <= _SAME:
+        raise Doubtful("the factors do not make up the loop")
+    slack = max(_LEAST_SLACK, 10.0 * float(apart[seen].max()), 10.0 * abs(turn - float(turned[k])))
+    return replace(factors, log_gain=float(off[k]), phase=turn, slack=slack)
 
 
 def _exact_zero(poles: SortedPoles, in_z: bool) -> Complex:

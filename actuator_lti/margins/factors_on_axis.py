@@ -67,7 +67,11 @@ class Factored:
             roots, weights = np.append(roots, 0.0), np.append(weights, -self.at_infinity)
         other = replace(self, roots=roots, weights=weights, log_gain=self.log_gain + constant, phase=0.0)
         one = np.ones(1)
-        return replace(other, phase=-float(self.log_value(one)[1][0] + other.log_value(one)[1][0]))
+        phase = -float(self.log_value(one)[1][0] + other.log_value(one)[1][0])
+        whole = bool(
+            (self.weights == np.round(self.weights)).all()
+        )  # behind part of a sample L is not real there
+        return replace(other, phase=half_turn(phase) if whole else phase)
 
     @cached_property
     def _off_axis(self) -> Real:
@@ -189,6 +193,11 @@ _NAMES = tuple(Intervals.__dataclass_fields__)
 def _joined(parts: list[Intervals]) -> Intervals:
     order = np.concatenate([part.low for part in parts]).argsort()
     return Intervals(*(np.concatenate([getattr(p, n) for p in parts], axis=-1)[..., order] for n in _NAMES))
+
+
+def half_turn(phase: float) -> float:
+    """The constant phase where L is real at w = 0: what its factors turn by cancels there."""
+    return float(np.pi * round(phase / np.pi))
 
 
 def parted(low: Real, high: Real) -> Real:

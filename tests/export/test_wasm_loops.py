@@ -267,6 +267,15 @@ def test_a_hidden_mode_at_rest_withholds_no_figures() -> None:
         assert many.quantity(name, "velocity")[0] == pytest.approx(value, rel=1e-8), name
 
 
+def test_a_gain_margin_at_nyquist_is_listed_once() -> None:
+    """Seed 1: L stays within rounding of the real axis next to its end there."""
+    design = replace(random_elastic_drive(np.random.default_rng(1)), instruments=Instruments())
+    loop = assemble_loops(design).present["position"].open_loop
+    found, truth = (stability_margins(loop, certify=certify) for certify in (False, True))
+    assert len(truth.gain_margins) == 1
+    assert [g.ratio for g in found.gain_margins] == pytest.approx([g.ratio for g in truth.gain_margins])
+
+
 def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path: Path) -> None:
     """Seed 51345: 153 states at the voltage, their poles on circles; the search for them gave up."""
     design = smooth(random_drive(np.random.default_rng(51345)))

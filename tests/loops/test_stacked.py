@@ -68,14 +68,17 @@ DRIVES = {
 
 
 def scattered(design: Design, count: int) -> dict[str, Any]:
-    """Every number that is not 0, over four decades in all (those of the clock over one)."""
-    rng = np.random.default_rng(3)
+    """Every number that is not 0, over four decades in all (those of the clock over one).
+
+    Each draws by its own name: a number that is new leaves the others as they are.
+    """
     values = {}
     for path in variable_paths(design):
         nominal = parameter_value(design, path)
         if nominal == 0.0 or not np.isfinite(nominal) or path.endswith(("filter_time", "computing_delay")):
             continue
         decades = 0.5 if path == "control.period" else 2.0
+        rng = np.random.default_rng([3, *path.encode()])
         values[path] = nominal * 10 ** rng.uniform(-decades, decades, count)
     if design.command.filter_time_s:
         values["control.period"] = np.minimum(values["control.period"], 3e-4)
@@ -148,18 +151,20 @@ def pushed(base: str, slope: float) -> Design:
 @pytest.mark.parametrize(
     ("design", "k", "loop", "told"),
     [
-        (DRIVES["speed drive"], 6, "current", False),  # a crossover at 2e-5 rad/s, 5e8 samples a turn
-        (load_design("fin"), 6, "velocity", True),  # nearest to -1 at zero frequency itself
-        (pushed("ilr33-amber", 3000.0), 4, "velocity", True),  # L(0) from two slow poles
+        (DRIVES["speed drive"], 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
+        (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
+        (pushed("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
+        (pushed("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
     ],
 )
 def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
     design: Design, k: int, loop: str, told: bool
 ) -> None:
-    values = scattered(design, 12)
+    count = k + 1
+    values = scattered(design, count)
     ticks = design.controller.computing_delay_s / design.controller.period_s
     values["control.computing_delay"] = ticks * values["control.period"]
-    figures = linear_figures(Population(design, values, 12), time_figures=False)
+    figures = linear_figures(Population(design, values, count), time_figures=False)
     alone = stacked(design, {path: float(array[k]) for path, array in values.items()})
     truth = stability_margins(assemble_loops(alone).present[loop].open_loop, certify=True)
     assert truth.evidence == "certified"

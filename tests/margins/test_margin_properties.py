@@ -124,10 +124,11 @@ def test_scaling_gain_moves_gain_margins_and_leaves_their_frequencies(
     except InputError:
         return
     assume(a.stable is not None and b.stable is not None)
-    assert [g.ratio for g in b.gain_margins] == pytest.approx([g.ratio / k for g in a.gain_margins], rel=1e-6)
-    assert [g.frequency_rad_s for g in b.gain_margins] == pytest.approx(
-        [g.frequency_rad_s for g in a.gain_margins], rel=1e-6
-    )
+    farthest = 10.0**9.9 * min(1.0, 1.0 / k)  # ratios above 200 dB of either are not listed
+    before = [g for g in a.gain_margins if g.ratio / k < farthest]
+    after = [g for g in b.gain_margins if g.ratio < farthest]
+    assert [g.ratio for g in after] == pytest.approx([g.ratio / k for g in before], rel=1e-6)
+    assert [g.frequency_rad_s for g in after] == pytest.approx([g.frequency_rad_s for g in before], rel=1e-6)
 
 
 @settings(max_examples=40, deadline=None)
@@ -164,4 +165,5 @@ def test_delays_below_the_margin_keep_stability_and_above_it_end_it(
     outside = stability_margins(loop, delay_s=1.01 * quoted.seconds)
     assert inside.stable
     assert outside.stable is False
-    assert outside.agreement.unstable_poles == outside.agreement.unstable_nyquist == 2
+    counted = {outside.agreement.unstable_poles, outside.agreement.unstable_nyquist}
+    assert counted - ({None} if outside.evidence == "certified" else set()) == {2}
