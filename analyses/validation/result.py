@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import degrees
 from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design
 from actuator_lti.verdict import Tally, Verdict
 from analyses.loop_figures import LoopFigures
+from analyses.settling import Settling, largest_swing, words
 from analyses.validation.at_rest import RestSweep
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.by_amplitude import AmplitudeMargin
@@ -42,6 +44,8 @@ class Validation:
     sweeps : mapping of str to BenchSweep
     amplitude_margins, conditional, rest_sweep, rest_steps, counts, large_signals, friction, specification :
         Findings: what large signals, friction and counts do.
+    settlings : tuple of Settling
+        What steps of the drive as it is end in.
     held_by_friction : tuple of str
         Loops that are stable with the friction that is left out where the drive is tested, and only with it.
     notes : tuple of str
@@ -59,6 +63,7 @@ class Validation:
     rest_sweep: RestSweep | None = None
     rest_steps: RestSteps | None = None
     counts: tuple[Counts, ...] = ()
+    settlings: tuple[Settling, ...] = ()
     large_signals: LargeSignals | None = None
     friction: FrictionEffects | None = None
     specification: Specification | None = None
@@ -90,22 +95,29 @@ class Validation:
         return tuple(name for name, own in self.figures.items() if own.margins.stable is None)
 
     @property
-    def hunting(self) -> bool:
-        """Whether the drive does not come to rest after a step, by dry friction.
+    def hunting(self) -> Settling | None:
+        """The largest motion that a step of the drive as it is ends in; None: it comes to rest.
 
-        A swing of less than `NOTICED` of full deflection is listed with what friction does, it fails nothing.
+        By its one judge (`analyses.settling`), whatever keeps it going: counts, play, friction, load. A swing
+        of less than `NOTICED` of full deflection is listed, it fails nothing.
         """
         points = () if self.friction is None else self.friction.points
-        swings = [point.cycles.hunting for point in points]
+        swings = [*self.settlings, *(one for point in points for one in point.cycles.settlings)]
         least = NOTICED * self.design.validation.full_deflection_rad
-        return any(one is not None and one.swing_rad >= least for one in swings)
+        return largest_swing(one for one in swings if one.swing_rad >= least)
 
     @property
     def failures(self) -> tuple[str, ...]:
         """What the drive does that it must not, beside rows that are not met; a sentence each."""
         found = [f"the {name} loop is {self.figures[name].margins.verdict}" for name in self.unstable]
-        if self.hunting:
-            found.append("the drive does not come to rest after a step: dry friction sustains a limit cycle")
+        swing = self.hunting
+        if swing is not None and swing.rest.verdict != "still moving":
+            scale, unit = (1e3, "mm") if self.design.axis == "linear" else (degrees(1.0), "deg")
+            load = f" under {swing.load_Nm:g} N{'' if self.design.axis == 'linear' else ' m'}" * bool(
+                swing.load_Nm
+            )
+            step = f"a step of {scale * swing.amplitude_rad:.3g} {unit}{load}"
+            found.append(f"the drive does not come to rest after {step}: {words(swing.rest, scale, unit)}")
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
@@ -121,7 +133,7 @@ class Validation:
         """``not met`` where a row is, or the drive fails by itself; then ``not proven``; else ``met``."""
         if self.not_met or self.failures:
             return Verdict.NOT_MET
-        if self.undecided or not self.rows:
+        if self.undecided or self.hunting or not self.rows:
             return Verdict.NOT_PROVEN
         return self.tally.verdict
 
@@ -133,4 +145,6 @@ class Validation:
     def __str__(self) -> str:
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
+        if self.hunting is not None and self.hunting.rest.verdict == "still moving":
+            said.append(f"a step was still moving after {self.hunting.rest.after_s:.3g} s")
         return f"{self.design.name}: {'; '.join(said)}"

@@ -15,6 +15,7 @@ from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.verdict import Verdict
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, loop_figures
+from analyses.settling import Settling, settle
 from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.by_amplitude import margins_by_amplitude
@@ -95,7 +96,7 @@ class _Work:
 
     def run(self) -> Validation:
         """Checks first, then what is large."""
-        self.total = len(self.bench.names) + 8
+        self.total = len(self.bench.names) + 9
         rows, places = self._small_signals()
         stable = [name for name, own in self.bench.figures.items() if own.stable]
         whole = len(stable) == len(self.bench.figures) and self.design.controller.position is not None
@@ -128,6 +129,9 @@ class _Work:
             conditional=self._asked(large, "conditional stability", self._conditional, None),
             rest_sweep=rest_sweep,
             rest_steps=rest_steps,
+            settlings=self._asked(
+                large and not asked.friction_effects, "rest after a step", self._settlings, ()
+            ),
             counts=self._asked(large, "counts of the encoders", self._counts, ()),
             large_signals=self._asked(asked.large_signals and whole, "large signals", self._large, None),
             friction=self._asked(asked.friction_effects and whole, "friction effects", self._friction, None),
@@ -230,6 +234,13 @@ class _Work:
         return sweep, steps_from_rest(
             design, self._settle(400_000), self._settle(EVER_TICKS) / TIME_CONSTANTS
         )
+
+    def _settlings(self) -> tuple[Settling, ...]:
+        """What steps of the drive as it is end in; else the friction effects ask it, at every named load."""
+        asked, full = self.design.validation, self.design.validation.full_deflection_rad
+        loads = dict.fromkeys((0.0, max(asked.loads_Nm, key=abs, default=0.0)))
+        sizes = [part * full for part in asked.amplitude_fractions]
+        return tuple(settle(self.design, load, size) for load in loads for size in sizes)
 
     def _conditional(self) -> Conditional:
         return conditional_stability(self.design, self._loops, self._settle(400_000))

@@ -620,7 +620,7 @@ def validate_one(design: Design, settings: Settings, tried: Tried) -> None:
     tried.not_proven += tally.not_proven
     tried.tracebacks += len(missing)
     tried.large_commands += found.conditional is not None and found.conditional.diverges
-    tried.hunting += found.hunting
+    tried.hunting += found.hunting is not None
     tried.unstable += bool(found.unstable)
     for item in missing:
         print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
