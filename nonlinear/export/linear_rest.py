@@ -207,16 +207,20 @@ def level_at_rest(n, a, b, c, work, state, sizes, v, a_less, b_less, c_less):
 @emitted
 def corrected_at_rest(n, a, b, c, row, work, state, sizes, v, a_less, b_less, c_less):
     """Correct the gain margin that ``row`` lists at zero frequency, and the distance |1 + L(0)|."""
+    closed = row[DC_GAIN]
+    if math.isnan(closed) and row[FINAL] == 0.0:  # a gain that is nothing beside the peak: L(0) is zero
+        closed = 0.0
+    distance = row[MODULUS]
+    if closed != 1.0 and not math.isnan(closed):
+        distance = 1.0 / abs(1.0 - closed)
     for k in range(LISTED):
         if row[FIRST_PHASE + 2 * k] == 0.0:
             level = level_at_rest(n, a, b, c, work, state, sizes, v, a_less, b_less, c_less)
             if math.isfinite(level) and level < 0.0:
                 row[FIRST_PHASE + 2 * k + 1] = -1.0 / level
-    closed = row[DC_GAIN]
-    if math.isnan(closed) and row[FINAL] == 0.0:  # a gain that is nothing beside the peak: L(0) is zero
-        closed = 0.0
-    if closed != 1.0 and 1.0 / abs(1.0 - closed) < row[MODULUS]:
-        row[MODULUS], row[MODULUS_X] = 1.0 / abs(1.0 - closed), 0.0
+                distance = abs(1.0 + level)
+    if distance < row[MODULUS]:
+        row[MODULUS], row[MODULUS_X] = distance, 0.0
 
 
 @emitted
