@@ -84,11 +84,6 @@ class LoopSetup:
         """Name of the signal in front of the instrument."""
         return f"probe_{self.point}_before"
 
-    @property
-    def after(self) -> str:
-        """Name of the signal behind the instrument."""
-        return f"probe_{self.point}_after"
-
     @cached_property
     def hold_ticks(self) -> int:
         """Ticks between two updates at the point."""

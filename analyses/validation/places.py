@@ -132,7 +132,7 @@ class Bench:
         own = loops.break_points[name]
         return Place(
             name=name, condition=setup.condition, tangent=found, predicted=loop.closed, poles=loop.modes(),
-            exact=exact_margins(loops, name), critical=loop.modes,
+            exact=exact_margins(loops, name) if own.periodic or name == "u" else None, critical=loop.modes,
             figures=None if own.periodic else loop_figures(own, bandwidth=False, step=False),
             delayed=(lambda delay_s: self._delayed(delay_s)) if name == "u" else None,
         )  # fmt: skip
