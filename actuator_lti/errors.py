@@ -35,5 +35,9 @@ class NumericalError(ArithmeticError):
     """A calculation that could not be finished to its stated accuracy; the message says what to try."""
 
 
+class OutOfTime(Exception):
+    """The stated time of a command is over: it ends the command, whatever a part does about refusals."""
+
+
 class TooManyTicks(NumericalError):
     """Runs that would take longer than anybody waits for; nothing has been computed."""

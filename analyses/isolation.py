@@ -13,10 +13,11 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import TypeVar
 
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, OutOfTime
 
 T = TypeVar("T")
 U = TypeVar("U")
+FORESEEN = NumericalError | OutOfTime
 
 
 @dataclass(frozen=True)
@@ -103,11 +104,11 @@ def reason(error: BaseException) -> str:
     """What went wrong in one line."""
     words = " ".join(str(error).split())[:400]
     words = "".join(c if c.isprintable() else "?" for c in words)
-    if isinstance(error, NumericalError):
+    if isinstance(error, FORESEEN):
         return f"numerical failure: {words}"
     return f"unforeseen {type(error).__name__}: {words}" if words else f"unforeseen {type(error).__name__}"
 
 
 def traceback_of(error: BaseException) -> str:
     """Where it happened; empty for what was foreseen."""
-    return "" if isinstance(error, NumericalError) else "".join(traceback.format_exception(error))
+    return "" if isinstance(error, FORESEEN) else "".join(traceback.format_exception(error))

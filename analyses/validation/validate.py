@@ -120,7 +120,8 @@ class _Work:
             sweeps={
                 name: sweep
                 for name in (stable if asked.sweep else ())
-                if (sweep := self._shown("injected sweep", lambda b, n: bench_sweep(b, places[n]), name))
+                if name in places
+                and (sweep := self._shown("injected sweep", lambda b, n: bench_sweep(b, places[n]), name))
             },
             amplitude_margins=self._asked(
                 asked.amplitude_margins and bool(stable), "margins by amplitude",

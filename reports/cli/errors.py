@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 import typer
 
-from actuator_lti.errors import InputError, NumericalError, UnstableError
+from actuator_lti.errors import InputError, NumericalError, OutOfTime, UnstableError
 from reports.cli import time_limit
 from reports.cli.crash import write_crash_file
 
@@ -75,7 +75,7 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
         return _say(str(error), VERDICT_FAILED)
     except InputError as error:
         return _say(_by_option(error, options), BAD_INPUT)
-    except NumericalError as error:
+    except (NumericalError, OutOfTime) as error:
         return _say(f"numerical failure: {error}", NO_RESULT)
     except BrokenPipeError:
         return _quiet_pipe()

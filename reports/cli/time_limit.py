@@ -8,7 +8,7 @@ import sys
 import threading
 
 from actuator_lti.bounds import COMMAND_SECONDS, STUDY_SECONDS
-from actuator_lti.errors import NumericalError
+from actuator_lti.errors import OutOfTime
 
 STUDIES = ("compare", "montecarlo", "nightly", "tune")
 HARD_FACTOR, HARD_EXTRA_S = 1.25, 30.0  # the rest of a report is written between the two
@@ -48,7 +48,7 @@ def stop() -> None:
 
 
 def _refuse(seconds: float) -> None:
-    raise NumericalError(_words(seconds))
+    raise OutOfTime(_words(seconds))
 
 
 def _end(seconds: float) -> None:
