@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import date
-from math import inf, isfinite, log
+from math import inf, log
 
 import numpy as np
 
@@ -33,20 +33,7 @@ def check_design(design: Design, where: str) -> None:
     InputError
         One line: key, value and what is allowed.
     """
-    checks = (
-        check_place,
-        _motor,
-        _cascade,
-        _sampling,
-        _most,
-        check_control,
-        check_elastic,
-        _limits,
-        _requirements,
-        _waivers,
-        _correlations,
-    )
-    for check in checks:
+    for check in (*RELATIONS, _requirements, _waivers, _correlations):
         check(design, where)
 
 
@@ -137,7 +124,7 @@ def _sampling(design: Design, where: str) -> None:
 def _limits(design: Design, where: str) -> None:
     limits = design.limits
     top = no_load_speed(design)
-    if isfinite(limits.speed_rad_s) and limits.speed_rad_s > top:
+    if top < limits.speed_rad_s < inf:
         unit = "m/s" if design.axis == "linear" else "rad/s"
         raise _refuse(
             where,
@@ -145,13 +132,19 @@ def _limits(design: Design, where: str) -> None:
             f"{limits.speed_rad_s:.4g} {unit}",
             f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}",
         )
-    if limits.continuous_current_A > limits.peak_current_A and isfinite(limits.continuous_current_A):
+    if limits.peak_current_A < limits.continuous_current_A < inf:
         raise _refuse(
             where,
             "limits.continuous_current",
             f"{limits.continuous_current_A:g} A",
             f"allowed: at most limits.peak_current = {limits.peak_current_A:g} A",
         )
+
+
+# between the numbers of a drive; the exported one checks them again when they are changed
+RELATIONS = (
+    check_place, _motor, _cascade, _sampling, _most, check_control, check_elastic, _limits,
+)  # fmt: skip
 
 
 def _requirements(design: Design, where: str) -> None:

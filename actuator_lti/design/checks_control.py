@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import degrees, isfinite, pi
+from math import inf, pi
 
 from actuator_lti.design.control import stable_pair
 from actuator_lti.design.model import FILTER_KEYS, Design, Filter
@@ -128,7 +128,7 @@ def _overload(design: Design, refuse: Refuse) -> None:
     shown = f"{limits.peak_time_s:g} s"
     if design.controller.current is None:
         raise refuse("limits.peak_time", shown, "needs a current loop, [control.current]")
-    if not isfinite(limits.peak_current_A) or not isfinite(limits.continuous_current_A):
+    if not (limits.peak_current_A < inf and limits.continuous_current_A < inf):
         raise refuse("limits.peak_time", shown, "needs limits.peak_current and limits.continuous_current")
     if limits.peak_current_A <= limits.continuous_current_A:
         raise refuse("limits.peak_time", shown, "allowed: with peak_current above continuous_current")
@@ -177,7 +177,7 @@ def _command(design: Design, refuse: Refuse) -> None:
         "acceleration": command.acceleration_rad_s2,
         "jerk": command.jerk_rad_s3,
     }
-    given = {key: value for key, value in profile.items() if isfinite(value)}
+    given = {key: value for key, value in profile.items() if value < inf}
     if given and design.controller.position is None:
         key, value = next(iter(given.items()))
         raise refuse(f"command.{key}", _written(design, key, value), "allowed with a position loop")
@@ -189,7 +189,7 @@ def _command(design: Design, refuse: Refuse) -> None:
             name = {"rate": "speed", "acceleration": "acceleration"}[key]
             most = f"{limit / ratio:.6g} {_unit(design, key)}"
             if design.axis == "rotary":
-                most += f" ({degrees(limit / ratio):.6g} {_unit(design, key).replace('rad', 'deg')})"
+                most += f" ({limit / ratio * (180.0 / pi):.6g} {_unit(design, key).replace('rad', 'deg')})"
             words = f"faster than limits.{name}; allowed: at most {most} at the output"
             raise refuse(f"command.{key}", _written(design, key, given[key]), words)
 
@@ -226,7 +226,7 @@ def _friction_map(design: Design, refuse: Refuse) -> None:
         speeds = [point.speed_rad_s for point in friction.map(direction)]
         if not speeds or speeds[0] != 0.0:
             raise refuse("friction.point", f"{name}", "allowed: the first point at speed 0")
-        if len(set(speeds)) != len(speeds):
+        if any(speed in speeds[:k] for k, speed in enumerate(speeds)):
             raise refuse("friction.point", f"{name}", "allowed: each speed once")
         if len(speeds) > MAX_MAP_POINTS:
             raise refuse("friction.point", f"{len(speeds)} points", f"allowed: at most {MAX_MAP_POINTS}")

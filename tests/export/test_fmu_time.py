@@ -6,8 +6,6 @@ voltages that the plain run has recorded.
 
 from __future__ import annotations
 
-import os
-import sys
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -15,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmu_host import hosted
+from fmu_host import hosted, needs_compiler
 from random_drives import random_drive, random_elastic_drive
 from scipy.optimize import brentq
 
@@ -23,13 +21,9 @@ from actuator_lti import load_design
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
 from nonlinear.export import fmu_bytes
-from nonlinear.export.build import system_compiler
 from nonlinear.rows import Rows
 
-pytestmark = pytest.mark.skipif(
-    system_compiler() is None or not sys.platform.startswith("linux") or os.uname().machine != "x86_64",
-    reason="no C compiler for this machine's FMU binaries",
-)
+pytestmark = needs_compiler
 FINE = 10  # parts of a tick, of which every host step below is a multiple
 NAMES = ("output.angle", "motor.angle", "motor.speed", "motor.current")
 SHIPPED = ("emps", "ilr33-amber", "ilr33-amber-multirate", "fin", "joint", "ballscrew")
