@@ -251,10 +251,12 @@ def used_statements(lines: list[str]) -> tuple[str, ...]:
     kept: list[str] = []
     wanted: set[str] = set()
     for line in reversed(lines):
-        made = re.match(r"const double (v\d+) = ", line)
+        made = re.match(r"\s*const double (v\d+) = ", line)
         if made and made[1] not in wanted:
             continue
-        wanted |= set(re.findall(r"\bv\d+\b", line))
+        if made:  # of this name there may be another in another branch
+            wanted.remove(made[1])
+        wanted |= set(re.findall(r"\bv\d+\b", line[made.end() :] if made else line))
         kept.append(line)
     return tuple(reversed(kept))
 
