@@ -16,8 +16,8 @@ from nonlinear.emit.kinds import c_float
 from nonlinear.export.build import compile_files
 from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
-from nonlinear.export.program import template
-from nonlinear.export.relations import c_text, relation_functions
+from nonlinear.export.program import c_text, template
+from nonlinear.export.relations import relation_functions
 from nonlinear.export.trace import KeyTrace, trace_keys
 from nonlinear.export.variables import (
     FIRST_CONSTANT,
@@ -39,7 +39,7 @@ _FOLDERS = {
 }
 _SUFFIX = {"linux64": "so", "win64": "dll"}
 _SHARED = {
-    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden"),
+    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden", "-s"),
     "win64": ("-shared", "-fvisibility=hidden"),
 }
 

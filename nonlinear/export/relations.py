@@ -16,6 +16,7 @@ from actuator_lti.design.checks import RELATIONS
 from actuator_lti.design.model import Design
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
+from nonlinear.export.program import c_text
 from nonlinear.export.trace import Key, Tape, Traced, used_statements
 
 MOST_TURNS = 2  # branches beside the design's own that are followed; beyond: another structure
@@ -92,11 +93,3 @@ def _refusal(text: str) -> list[str]:
     )
     arguments = "".join(f", {name}" for _, name in _SHOWN.findall(text))
     return [f"(void)snprintf(why, size, {c_text(named)}{arguments});", "return 0;"]
-
-
-def c_text(text: str) -> str:
-    """A C string in ASCII; other characters as octal escapes of their UTF-8."""
-    plain = "".join(
-        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode()
-    )
-    return f'"{plain}"'
