@@ -17,7 +17,7 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+.PHONY: page differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -66,7 +66,13 @@ machines: $(ALL)
 	@set -e; for seed in $(PROCESSORS); do \
 	  echo "OTHER_PROCESSOR=$$seed"; OTHER_PROCESSOR=$$seed $(AS_MACHINE); done
 
-check: $(ALL)
+# The page's scripts: types, rules, and their pure parts by node's own runner.
+page:
+	@if command -v npm >/dev/null 2>&1; then npm ci --silent --no-audit --no-fund && \
+	  npx tsc -p jsconfig.json && npx eslint && node --test tests/page/; \
+	else echo "no npm here: the page's scripts are not checked"; fi
+
+check: $(ALL) page
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

@@ -21,6 +21,7 @@ from actuator_lti.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.numbers import MISSING, show, significant
+from reports.scripts import asset, bundled
 from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import visible
 
@@ -119,16 +120,9 @@ def _seen(value: Any) -> Any:
 
 
 @cache
-def asset(name: str) -> str:
-    """Give the text of a style sheet or script that stands beside the templates."""
-    source, _, _ = PackageLoader("reports").get_source(Environment(autoescape=True), name)
-    return source
-
-
-@cache
 def script(*, live: bool = False) -> str:
     """Give the one script of a page: folds and printing, the live figures, and sliders where it has any."""
-    return asset("page.js") + asset("live.js") + (asset("hands_map.js") + asset("hands.js") if live else "")
+    return bundled("folds", "figures", "hands") if live else bundled("folds", "figures")
 
 
 def security_policy(*scripts: str, wasm: bool = False) -> str:

@@ -8,7 +8,7 @@ from typing import Any, TypedDict
 
 from markupsafe import Markup
 
-from reports.html import asset, environment, security_policy, show_signed
+from reports.html import environment, security_policy, show_signed
 from reports.nightly.course import Course, course_of
 from reports.nightly.figures import Figure
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
@@ -19,6 +19,7 @@ from reports.nightly.text import csv_text, one_line
 from reports.nightly.trend import ChangePoint
 from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
 from reports.numbers import MISSING, significant
+from reports.scripts import asset, bundled
 from reports.visible import visible
 
 MAX_NIGHTS = 400
@@ -80,7 +81,7 @@ def figures_csv(design: DesignView, history: History) -> str:
 
 
 def _render(template: str, **context: Any) -> str:
-    script = asset("nightly/nightly.js") + asset("live.js")
+    script = asset("nightly/nightly.js") + bundled("figures")
     counter = itertools.count(1)
     return (
         environment()

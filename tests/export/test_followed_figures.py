@@ -16,16 +16,17 @@ from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design, FrictionPoint, Supply
 from actuator_lti.drive_figure import drive_figure
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
+from nonlinear.export.statement import Statement
 
 NAMES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_motion")
 
 
-def run(lines: Sequence[str], keys: Sequence[float]) -> float | None:
+def run(statements: Sequence[Statement], keys: Sequence[float]) -> float | None:
     """Run statements in C as Python; None where a condition ends them."""
     known = {"INFINITY": math.inf, "NAN": math.nan, "fabs": abs, "pow": math.pow, "k": list(keys)}
     known |= {name: getattr(math, name) for name in ("sin", "cos", "sqrt", "exp", "log", "tan")}
     known["where"] = lambda condition, yes, no: yes if condition else no
-    for line in lines:
+    for line in (statement.c for statement in statements):
         text = line.replace("&&", "and").replace("||", "or")
         if made := re.fullmatch(r"const double (v\d+) = (.*);", text):
             known[made[1]] = float(eval(made[2], {}, known))
