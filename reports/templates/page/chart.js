@@ -1,9 +1,12 @@
 // A figure that lives: curves on and off, zoom and pan of linked panels, curves redrawn, crossings shown.
 // The SVG is the data: a panel says its axes (data-x, data-y: kind, ends, pixels), a curve is its path.
+import { holdCurve, putMarks } from "./grips.js";
 import { Panel } from "./panel.js";
 import { key, listen, wheel } from "./pointer.js";
 import { make } from "./svg.js";
 import { html } from "./words.js";
+
+const closest = (list, value) => list.reduce((best, one, k) => (Math.abs(one - value) < Math.abs(list[best] - value) ? k : best), 0);
 
 export class Chart {
   constructor(root) {
@@ -34,6 +37,9 @@ export class Chart {
     this.plots.addEventListener("blur", () => this.hide());
     root.addEventListener("chart:redraw", (event) => this.redraw(event.detail));
     root.addEventListener("chart:cells", (event) => this.cells(event.detail));
+    root.addEventListener("chart:hold", (event) => holdCurve(this, event.detail));
+    root.addEventListener("chart:marks", (event) => putMarks(this, event.detail));
+    root.addEventListener("chart:show", (event) => this.show(event.detail.hertz));
     root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
   }
   legend() {
@@ -113,6 +119,16 @@ export class Chart {
     this.readout.hidden = true;
     for (const p of this.panels) p.clear();
   }
+  // shows a frequency that is pointed at in another figure; null: no more
+  show(hertz) {
+    if (this.pinned) return;
+    for (const p of this.panels) {
+      p.clear();
+      if (hertz === null) continue;
+      if (p.x.log && p.x.unit === "Hz") p.cursor(p.x.px(hertz), "cursor");
+      else for (const curve of p.seen(this)) if (curve.parameter) p.dot(curve.points[closest(curve.parameter, hertz)]);
+    }
+  }
   // shows a crossing: a frequency in every panel that has one
   mark(hertz) {
     const first = this.panels.find((p) => p.x.log && p.x.unit === "Hz");
@@ -171,6 +187,7 @@ export class Chart {
       pen = there;
     }
     known.node.setAttribute("d", d);
+    known.grab?.setAttribute("d", d);
     known.points = points;
     if (parameter) known.parameter = parameter.filter((_, k) => Number.isFinite(x[k]) && Number.isFinite(y[k]));
     this.hide();

@@ -2,7 +2,8 @@
 import { fillBehind, watchMap } from "./behind.js";
 import { border, borderStart, drawBorder } from "./border.js";
 import { curvesOf, designed, draw, frame, kept } from "./curves.js";
-import { LOOP_NAMES, data, desk, find, root } from "./desk.js";
+import { LOOP_NAMES, chart, data, desk, find, root, tell } from "./desk.js";
+import { holdCurves, marginMarks, stepGain } from "./drag.js";
 import { changedText, copy, save, sheet } from "./file.js";
 import { fragment, fromFragment, keys, past, redo, reset, start, undo } from "./history.js";
 import { borderOf, compute, load, slow, stepOf } from "./module.js";
@@ -19,6 +20,14 @@ const unfit = (wanted) => { // why values do not go together; empty where they d
   for (const [path, of] of data.multiples) if (at(path) % at(of) > 0) return `${path} = ${at(path)} is no multiple of ${of} = ${at(of)}: nothing follows until it is one.`;
   return "";
 };
+const drawLoop = (name) => {
+  const own = desk.now.loops[name], seen = kept[name];
+  if (!own.figures || !seen) return;
+  const count = Math.min(Math.ceil(seen.count * desk.before.loops[name].period / own.period), 3000);
+  const curves = curvesOf(name, seen.hertz);
+  draw("as changed", { curves, step: stepOf(name, count) }, name);
+  if (curves) marginMarks(seen.hertz, curves);
+};
 const update = () => {
   const began = performance.now();
   let refused = "";
@@ -30,7 +39,7 @@ const update = () => {
   show();
   table();
   state(refused);
-  if (desk.now.loops[desk.shown].figures && kept[desk.shown]) draw("as changed", { curves: curvesOf(desk.shown, kept[desk.shown].hertz), step: stepOf(desk.shown, Math.min(Math.ceil(kept[desk.shown].count * desk.before.loops[desk.shown].period / desk.now.loops[desk.shown].period), 3000)) }, desk.shown);
+  drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   const part = tried(desk.now.row);
   drawRun("as changed", part, unitOf()[0]);
@@ -68,6 +77,16 @@ const begin = () => {
     find(".tabs").append(button);
   }
   watchMap();
+  holdCurves();
+  chart("bode").addEventListener("keydown", (/** @type {any} */ event) => {
+    const by = { PageUp: 0.5, PageDown: -0.5 }[event.key];
+    if (!by || !event.target.matches(".plots")) return;
+    event.preventDefault();
+    stepGain(by);
+  });
+  for (const name of ["bode", "nyquist", "sensitivity"]) chart(name).addEventListener("chart:at", (/** @type {any} */ event) => {
+    for (const other of ["bode", "nyquist", "sensitivity"]) if (other !== name) tell(other, "chart:show", event.detail);
+  });
   runKeys();
   runStart();
   borderStart();

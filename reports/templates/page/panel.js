@@ -7,6 +7,10 @@ export class Panel {
   /** @type {any} */
   drawn = null; // ends of the axes as the SVG has them, once they are others
   scaled = false;
+  /** @type {any} */
+  again = null; // what is to be done once the view has changed
+  /** @type {any} */
+  live = null; // marks that are drawn anew with the curves
   constructor(group, index) {
     this.group = group;
     this.index = index;
@@ -57,6 +61,7 @@ export class Panel {
     }
     this.ticks();
     this.clear();
+    this.again?.();
   }
   // what is no curve goes to its place on axes with new ends
   follow() {
@@ -67,7 +72,7 @@ export class Panel {
     const [sx, tx] = map(this.x, this.drawn.x), [sy, ty] = map(this.y, this.drawn.y);
     const known = new Set(this.curves.map((curve) => curve.node));
     for (const node of this.world.children) {
-      if (known.has(node) || node.classList.contains("cells")) continue; // these are drawn anew
+      if (known.has(node) || node.classList.contains("cells") || node.classList.contains("grab")) continue; // these are drawn anew
       node.setAttribute("transform", `matrix(${sx} 0 0 ${sy} ${tx} ${ty})`);
       node.style.vectorEffect = "non-scaling-stroke";
     }

@@ -47,7 +47,11 @@ export const listen = (chart, picture) => {
     if (read(chart, picture, event) && !pinned) chart.pinned = true;
   };
   for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, release);
-  svg.addEventListener("pointerleave", () => { if (!chart.pinned) chart.hide(); });
+  svg.addEventListener("pointerleave", () => {
+    if (chart.pinned) return;
+    chart.hide();
+    chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz: null } }));
+  });
   svg.addEventListener("dblclick", (event) => {
     const found = placeOf(picture, event);
     if (found) chart.zoom(found.panel, found.x, found.y, 2);

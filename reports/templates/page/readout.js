@@ -12,6 +12,8 @@ export const readAt = (chart, picture, panel, px, py) => {
   const rows = panel.byPoint ? point(chart, panel, px, py) : level(chart, picture, panel, px);
   if (rows.length < 2) { chart.readout.hidden = true; return false; }
   fill(chart, rows);
+  const hertz = hertzAt(chart, panel, px, py);
+  if (hertz) chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz } }));
   const box = picture.svg.getBoundingClientRect(), own = chart.root.getBoundingClientRect();
   const scale = box.width / picture.svg.viewBox.baseVal.width;
   const x = box.left - own.left + px * scale, y = box.top - own.top + py * scale;
@@ -19,6 +21,11 @@ export const readAt = (chart, picture, panel, px, py) => {
   chart.readout.style.left = `${Math.max(0, x + 14 + width > own.width ? x - width - 14 : x + 14)}px`;
   chart.readout.style.top = `${Math.max(0, y - chart.readout.offsetHeight - 10)}px`;
   return true;
+};
+// the frequency that is pointed at, along an axis or along a curve
+const hertzAt = (chart, panel, px, py) => {
+  if (panel.byPoint) { const best = panel.nearest(chart, px, py); return best?.curve.parameter?.[best.k]; }
+  return panel.x.unit === "Hz" ? panel.x.value(panel.back(px, 0)[0]) : undefined;
 };
 const level = (chart, picture, panel, px) => {
   const [origin] = panel.back(px, 0);
