@@ -46,7 +46,7 @@ from actuator_lti.design.control import (
     Supply,
     VelocityLoop,
 )
-from actuator_lti.design.field import Axis, choice, text
+from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.plant import (
     Coupling,
@@ -123,7 +123,7 @@ __all__ = [
 class Design:
     """A drive: plant, controller, limits, requirements, and where each value came from."""
 
-    name: Annotated[str, text("short name, used in file names")]
+    name: Annotated[str, label("short name, used in file names")]
     title: Annotated[str, text("one line for the title page")] = ""
     motor: Motor
     controller: Controller
