@@ -184,6 +184,32 @@ class Design:
 
         return with_overrides(self, with_units(self, values))
 
+    def add_filter(self, stage: str, **keys: Any) -> "Design":
+        """A copy with one more filter, the last of its place.
+
+        Parameters
+        ----------
+        stage : {"velocity"}
+            The stage whose filter it is.
+        **keys
+            ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
+
+        Raises
+        ------
+        InputError
+            As `with_values`, and for a stage that has no filters.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
+        >>> load_design("ilr33-amber").add_filter("velocity", **notch).controller.velocity.filters[0].kind
+        'notch'
+        """
+        from actuator_lti.design.writing import with_filter
+
+        return with_filter(self, stage, keys)
+
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         from actuator_lti.notebook import design_html

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import date
+from math import pi, sqrt
 from typing import Any
 
 from actuator_lti.design import model
@@ -30,6 +31,10 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
+_CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
+_AMPERE = re.compile(r"\bA\b")
+_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
+_UPSIDE_DOWN = {"motor.back_emf_constant": (1.0, "{angle}/(V*s)"), "control.period": (2.0 * pi, "rad/s")}
 
 
 def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
@@ -72,6 +77,8 @@ class Reader:
         self.structure = Structure(
             axis if axis == "linear" else "rotary", "velocity" in control, "current" in control
         )
+        motor = tree.get("motor")
+        self.constants: Any = motor.get("constants", "dc") if isinstance(motor, dict) else "dc"
         self.travel_m_rad: float | None = None
         self.travel_m_rad = self._travel(tree.get("screw"))
 
@@ -194,9 +201,13 @@ class Reader:
     def quantity(self, text: Any, field: Field) -> float:
         """The SI value of a text; behind a screw also from the units of a rotary axis.
 
-        A speed constant is read as the back-EMF constant that it is upside down.
+        A speed constant is read as the back-EMF constant that it is upside down, a sampling rate as its
+        period, amperes rms or peak as those of the motor that the model has.
         """
         unit, power = field.unit(self.structure), field.travel_power()
+        if isinstance(text, str) and (convention := _CONVENTION.search(text)):
+            plain = _CONVENTION.sub("", text)
+            return self.quantity(plain, field) * self._amperes(field, unit, convention[1].lower())
         rotary = field.unit(replace(self.structure, axis="rotary"))
         factors = {unit: 1.0}
         if self.travel_m_rad is not None and power and rotary != unit and isinstance(text, str):
@@ -207,9 +218,20 @@ class Reader:
                 return parse_quantity(text, one) * factor
             except InputError as error:
                 refused.append(error)
-            if field.path == "motor.back_emf_constant" and (turned := _turned(text, one)) is not None:
+            if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
                 return turned * factor
         raise refused[-1]
+
+    def _amperes(self, field: Field, unit: str, convention: str) -> float:
+        """From amperes rms or peak to those of the model: i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak."""
+        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
+        if self.constants == "dc" or (field.section == "motor" and self.constants != given):
+            raise InputError(f'allowed: with motor.constants = "{given}"')
+        above, _, below = unit.partition("/")
+        power = len(_AMPERE.findall(above)) - len(_AMPERE.findall(below))
+        if field.section != "motor" and not power:
+            raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
+        return 1.0 if field.section == "motor" else float(_DC_PER[given] ** power)
 
     def limit(self, quantity: Any, raw: Any, path: str) -> float | None:
         """A limit in the unit in which its quantity is reported."""
@@ -329,10 +351,11 @@ def _written(value: object, unit: str) -> str:
     return value if isinstance(value, str) else f"{value!r}" + ("" if unit == "1" else f" {unit}")
 
 
-def _turned(text: Any, unit: str) -> float | None:
-    """The back-EMF constant of a speed constant, as many data sheets have it: ``"83.4 rpm/V"``."""
+def _turned(path: str, text: Any, unit: str) -> float | None:
+    """A value that data sheets state upside down: ``"83.4 rpm/V"``, ``"16 kHz"``."""
+    one, turned = _UPSIDE_DOWN[path]
     try:
-        value = parse_quantity(text, f"{unit.rpartition('/')[2]}/(V*s)")
+        value = parse_quantity(text, turned.format(angle=unit.rpartition("/")[2]))
     except InputError:
         return None
-    return float(repr(1.0 / value)) if value > 0.0 else None
+    return one / value if value > 0.0 else None

@@ -27,6 +27,7 @@ from actuator_lti.design.model import (
 from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
 
 # what a design has that its file does not mention: a section absent here must be written even when empty
@@ -158,6 +159,18 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     for path, value in overrides.items():
         _override(tree, path, value, design)
     return design_from_tree(tree, design.origin or design.name)
+
+
+def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
+    """A copy of a design with one more filter of the velocity loop, see `Design.add_filter`."""
+    if stage != "velocity" or design.controller.velocity is None:
+        known = '"velocity"' if design.controller.velocity is not None else "none: no velocity loop"
+        raise InputError(f"stage = {shown(stage)}: has no filters; allowed: {known}")
+    path = "control.velocity.filter"
+    there = design_tree(design)["control"]["velocity"].get("filter", [])
+    units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
+    new = {at.rpartition(".")[2]: value for at, value in units.items()}
+    return with_overrides(design, {path: [*there, new]})
 
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
