@@ -141,7 +141,7 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
     ],
 )
 def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value: float) -> None:
-    """i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak (model.md section 1); those of the motor are as its sheet says."""
+    """i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak (model.md section 1); the motor as its sheet says."""
     design = with_overrides(read_design_text(SERVO, "servo"), {path: text})
     assert parameter_value(design, path) == pytest.approx(value, rel=1e-14)
     assert not any(line.startswith(path) for line in warnings_of(design))
