@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-Kind = Literal["plain", "output", "load"]
+Kind = Literal["plain", "output", "load", "command"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
@@ -26,8 +26,9 @@ class Option:
         What stands for the value in the help.
     flag : str
         The option, without dashes; the field's name without its unit where empty.
-    kind : {"plain", "output", "load"}
-        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without.
+    kind : {"plain", "output", "load", "command"}
+        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
+        ``"command"``: of the command of the outermost loop, with or without.
     argument : bool
         Whether it stands by its place, without a flag, and has to be given.
     """

@@ -4,75 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
 
-def check_place(design: Design, where: str) -> None:
-    """Refuse a coupling after a gear that is none; whatever asks for an inertia needs its place.
-
-    Raises
-    ------
-    InputError
-    """
+def check_place(design: Design) -> Iterator[Refusal]:
+    """Refuse a coupling after a gear that is none; whatever asks for an inertia needs its place."""
     after = None if design.coupling is None else design.coupling.after
     names = [gear.name for gear in design.gears]
     if after is not None and after not in names:
         known = ", ".join(names) or "none, as there are no gears; leave it out"
-        raise InputError(f"coupling.after = {shown(after)}: is no gear; allowed: {known}", where=where)
+        yield "coupling.after", shown(after), f"is no gear; allowed: {known}"
 
 
-def check_elastic(design: Design, where: str) -> None:
+def check_elastic(design: Design) -> Iterator[Refusal]:
     """Refuse a drive train that the event-driven plant cannot be.
 
-    Raises
-    ------
-    InputError
-        One line: a coupling or play without an inertia behind it, with the tanh law, or before the
-        self-locking stage; a self-locking stage whose friction would give energy; friction of a load that
-        has no coupling before it; a breakaway ratio below 1.
+    A coupling or play without an inertia behind it, with the tanh law, or before the self-locking stage; a
+    self-locking stage whose friction would give energy; friction of a load that has no coupling before it.
     """
-
-    def refuse(key: str, value: object, allowed: str) -> InputError:
-        return InputError(f"{key} = {value}: {allowed}", where=where)
-
     coupling, friction = design.coupling, design.load.friction
-    if friction is not None and friction.breakaway_ratio < 1.0:
-        raise refuse("load.friction.breakaway_ratio", f"{friction.breakaway_ratio:g}", "allowed: at least 1")
+    if friction is not None and coupling is None:
+        yield "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
     if coupling is None:
-        if friction is not None:
-            raise refuse(
-                "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
-            )
         return
     if design.load_side_inertia_kgm2 <= 0.0:
-        raise refuse(
-            "coupling.stiffness",
-            f"{coupling.stiffness_Nm_rad:g}",
-            "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
-        )
+        allowed = "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing"
+        yield "coupling.stiffness", f"{coupling.stiffness_Nm_rad:g}", allowed
     if design.friction.law == "tanh":
-        raise refuse("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"')
-    if design.load.path == "self-locking":
-        _self_locking(design, where)
-
-
-def _self_locking(design: Design, where: str) -> None:
-    """The self-locking stage is the last gear; the coupling comes behind it."""
+        yield "friction.law", '"tanh"', 'allowed with a coupling: "coulomb"'
+    if design.load.path != "self-locking":
+        return
+    least, coefficient = 1.0 / design.ratio_to_coupling, design.friction.load_coefficient
     if design.ratio_behind_coupling != 1.0 or design.gears_before_coupling < len(design.gears):
-        raise InputError(
-            f'coupling.after = "{design.coupling.after if design.coupling else ""}": lies before the '
-            "self-locking stage; allowed: the last gear, or load.path = back-drivable",
-            where=where,
-        )
-    least = 1.0 / design.ratio_to_coupling
-    if design.friction.load_coefficient < least * (1 - 1e-12):
-        raise InputError(
-            f"friction.load_coefficient = {design.friction.load_coefficient:g}: a self-locking stage "
-            f"with less than 1/N_c gives energy; allowed: at least {least:g}",
-            where=where,
-        )
+        allowed = "lies before the self-locking stage; allowed: the last gear, or load.path = back-drivable"
+        yield "coupling.after", f'"{coupling.after or ""}"', allowed
+    elif coefficient < least * (1 - 1e-12):
+        allowed = f"a self-locking stage with less than 1/N_c gives energy; allowed: at least {least:g}"
+        yield "friction.load_coefficient", f"{coefficient:g}", allowed
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:

@@ -11,10 +11,12 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
 Axis = Literal["rotary", "linear"]
-Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text"]
+Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text", "label", "day", "limit"]
 
 BIG = 1e12
 SMALL = 1e-18
+MANY = 12  # choices, from which on they are not listed
+_WORDS = {"flag": "true or false", "text": "text", "label": "a text", "day": "a day, YYYY-MM-DD"}
 _AXES: dict[str, dict[str, str]] = {
     "rotary": {"angle": "rad", "torque": "N*m", "inertia": "kg*m^2"},
     "linear": {"angle": "m", "torque": "N", "inertia": "kg"},
@@ -95,8 +97,10 @@ class Field:
 
     def allowed(self, unit: str) -> str:
         """The allowed range in words."""
-        if self.kind == "flag":
-            return "true or false"
+        if self.kind in _WORDS:
+            return _WORDS[self.kind]
+        if len(self.choices) > MANY:
+            return f"one of {len(self.choices)}, see Requirement quantities in the documentation"
         if self.choices:
             return " or ".join(f'"{choice}"' for choice in self.choices)
         shown = "" if unit == "1" else f" {unit}"
@@ -163,3 +167,18 @@ def flag(key: str, words: str) -> Field:
 def text(words: str) -> Field:
     """Any text; the key is the attribute's name."""
     return Field(path="", kind="text", description=words)
+
+
+def label(words: str) -> Field:
+    """A text that is not empty."""
+    return Field(path="", kind="label", description=words)
+
+
+def day(words: str) -> Field:
+    """A date."""
+    return Field(path="", kind="day", description=words)
+
+
+def limit(words: str) -> Field:
+    """A limit of a requirement, in the unit of its quantity."""
+    return Field(path="", kind="limit", description=words)

@@ -47,7 +47,7 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 
 def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:
-    unit = "1" if field.kind in ("text", "choice", "flag") else field.unit(structure)
+    unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
     return KeyEntry(
         path=field.path,
         section=field.section,
@@ -78,7 +78,7 @@ def _default(field: Field, kind: type | None, unit: str) -> str:
 
 
 def _allowed(field: Field, unit: str) -> str:
-    if field.kind == "text":
+    if field.kind in ("text", "label"):
         return ""
     if field.kind in ("quantity", "quantities") and field.low == -BIG and field.high == BIG:
         return ""

@@ -46,7 +46,7 @@ from actuator_lti.design.control import (
     Supply,
     VelocityLoop,
 )
-from actuator_lti.design.field import Axis, choice, text
+from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.plant import (
     Coupling,
@@ -123,7 +123,7 @@ __all__ = [
 class Design:
     """A drive: plant, controller, limits, requirements, and where each value came from."""
 
-    name: Annotated[str, text("short name, used in file names")]
+    name: Annotated[str, label("short name, used in file names")]
     title: Annotated[str, text("one line for the title page")] = ""
     motor: Motor
     controller: Controller
@@ -183,6 +183,32 @@ class Design:
         from actuator_lti.design.writing import with_overrides, with_units
 
         return with_overrides(self, with_units(self, values))
+
+    def add_filter(self, stage: str, **keys: Any) -> "Design":
+        """A copy with one more filter, the last of its place.
+
+        Parameters
+        ----------
+        stage : {"velocity"}
+            The stage whose filter it is.
+        **keys
+            ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
+
+        Raises
+        ------
+        InputError
+            As `with_values`, and for a stage that has no filters.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
+        >>> load_design("ilr33-amber").add_filter("velocity", **notch).controller.velocity.filters[0].kind
+        'notch'
+        """
+        from actuator_lti.design.writing import with_filter
+
+        return with_filter(self, stage, keys)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from actuator_lti.design.model import ControllerObject, ControllerObjects
+from actuator_lti.design.model import ControllerObject, ControllerObjects, ObjectFamily
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.settings_checks import checked_objects
 from actuator_lti.design.settings_xml import read_settings_xml
@@ -66,6 +67,23 @@ def object_entry(item: ControllerObject) -> Any:
     """The entry of one object in TOML."""
     more = {key: getattr(item, key) for key in ("name", "data_type") if getattr(item, key)}
     return {"value": item.value, **more} if more else item.value
+
+
+def objects_from(raw: Any, where: str) -> ControllerObjects:
+    """The settings in a design file, ``[objects]``."""
+    known = ("velocity_gain_factor", "family", "values")
+    table = raw if isinstance(raw, dict) else {"": raw}
+    for key in table:
+        if key not in known:
+            raise InputError(f"{shown(key)}: unknown key; allowed: {', '.join(known)}", where=where)
+    values, family = table.get("values", {}), table.get("family", "")
+    if not isinstance(values, dict):
+        raise InputError(f"values = {shown(values)}: allowed: a table", where=where)
+    if family not in get_args(ObjectFamily):
+        allowed = " or ".join(f'"{one}"' for one in get_args(ObjectFamily))
+        raise InputError(f"family = {shown(family)}: allowed: {allowed}", where=where)
+    read = tuple(object_from(label, entry, where) for label, entry in values.items())
+    return replace(checked_objects(read, table.get("velocity_gain_factor", 1.0), where), family=family)
 
 
 def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from math import isfinite, pi
 
 from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.model import Design
 
+_BARE_AMPERE = re.compile(r"[0-9 /](?:[kmuµ]?A)\b(?![ _]?(?:rms|eff|peak|pk|dc)\b)", re.IGNORECASE)
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
 
@@ -177,10 +179,14 @@ def _ac_motor(design: Design) -> Iterator[str]:
     rms = {"rms-line": 1.5**0.5, "peak-phase": 3**0.5 / 2}.get(design.motor.constants)
     if rms is None:
         return
-    unit = "A rms" if design.motor.constants == "rms-line" else "A peak of a phase"
-    for key, value in (
-        ("peak_current", design.limits.peak_current_A),
-        ("continuous_current", design.limits.continuous_current_A),
-    ):
-        if isfinite(value):
-            yield f"limits.{key}: {value:g} A of the equivalent DC motor, that is {value / rms:.4g} {unit}"
+    unit = "A rms" if design.motor.constants == "rms-line" else "A peak"
+    for path, item in design.parameters.items():
+        si = item.unit
+        if not path.startswith(("limits.", "control.")) or not _BARE_AMPERE.search(item.text):
+            continue
+        factor = rms if "A" in si.partition("/")[2] else 1.0 / rms
+        other = si.replace("A", unit)
+        yield (
+            f"{path}: {item.value:g} {si} of the equivalent DC motor, that is {item.value * factor:.4g} "
+            f"{other}; say which it is: A rms, A peak or A dc"
+        )

@@ -20,15 +20,14 @@ from actuator_lti.design.model import (
     Limits,
     Motor,
     Parameter,
-    Requirement,
     Tolerance,
     Validation,
     default_deflection,
 )
-from actuator_lti.design.quantities import write_limit
-from actuator_lti.design.sections import SECTIONS, at_place, parts_of
+from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
 
 # what a design has that its file does not mention: a section absent here must be written even when empty
@@ -71,10 +70,9 @@ def design_tree(design: Design) -> Tree:
             here.setdefault(section.key, []).append({**named, **table})
         elif table or section.required or at_place(_BARE, section.place) is None:
             here[section.key] = table
-    tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
-    tree["waiver"] = [asdict(item) for item in design.waivers]
-    tree["correlation"] = [asdict(item) for item in design.correlations]
-    tree["fact"] = [asdict(item) for item in design.facts]
+    for record in RECORDS:
+        items = getattr(design, record.attribute)
+        tree[record.key] = [_section(design, item, "", record.template, structure) for item in items]
     if design.objects != ControllerObjects():
         tree["objects"] = {
             "velocity_gain_factor": design.objects.velocity_gain_factor,
@@ -93,16 +91,18 @@ def _section(design: Design, part: Any, name: str, template: str, structure: Str
         if known is not None and known.value == value:
             section[field.key] = _entry(known)
         elif value is not None and value != inf and value != defaults[field.attribute]:
-            section[field.key] = _bare(field, value, field.unit(structure))
+            section[field.key] = _bare(field, value, part, structure)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
     if unsaid and len(section) == 1 and part.full_deflection_rad == default_deflection(design.axis):
         return {}
     return section
 
 
-def _bare(field: Field, value: Any, unit: str) -> Any:
+def _bare(field: Field, value: Any, part: Any, structure: Structure) -> Any:
+    """A value without a pedigree."""
     if isinstance(value, tuple):
-        return [_bare(field, item, unit) for item in value]
+        return [_bare(field, item, part, structure) for item in value]
+    unit = part.unit if field.kind == "limit" else field.unit(structure)
     return value if isinstance(value, str | bool) or unit == "1" else f"{value!r} {unit}"
 
 
@@ -139,18 +139,6 @@ def _si(value: float | None, unit: str) -> Any:
     return value if unit == "1" else f"{value!r} {unit}"
 
 
-def _requirement(item: Requirement, structure: Structure) -> Tree:
-    tree: Tree = {"id": item.id, "quantity": item.quantity}
-    tree |= {key: value for key in ("loop", *_WHICH) if (value := getattr(item, key)) is not None}
-    for key in ("minimum", "maximum"):
-        value = getattr(item, key)
-        if value is not None:
-            tree[key] = write_limit(value, item.unit)
-    if item.load_Nm is not None:
-        tree["load"] = f"{item.load_Nm!r} {'N' if structure.axis == 'linear' else 'N*m'}"
-    return tree | {key: getattr(item, key) for key in ("source", "note") if getattr(item, key)}
-
-
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     """A copy of a design with keys changed as a design file would write them.
 
@@ -171,6 +159,18 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     for path, value in overrides.items():
         _override(tree, path, value, design)
     return design_from_tree(tree, design.origin or design.name)
+
+
+def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
+    """A copy of a design with one more filter of the velocity loop, see `Design.add_filter`."""
+    if stage != "velocity" or design.controller.velocity is None:
+        known = '"velocity"' if design.controller.velocity is not None else "none: no velocity loop"
+        raise InputError(f"stage = {shown(stage)}: has no filters; allowed: {known}")
+    path = "control.velocity.filter"
+    there = design_tree(design)["control"]["velocity"].get("filter", [])
+    units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
+    new = {at.rpartition(".")[2]: value for at, value in units.items()}
+    return with_overrides(design, {path: [*there, new]})
 
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
@@ -197,7 +197,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
-    lists = ("requirement", "waiver", *(section.path for section in SECTIONS if section.many))
+    lists = [section.path for section in (*SECTIONS, *RECORDS) if section.many]
     for depth, part in enumerate(parts[:-1]):
         if isinstance(here, list):
             here = next((item for k, item in enumerate(here, 1) if _label(item, k) == part), None)

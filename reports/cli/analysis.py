@@ -11,7 +11,7 @@ import typer
 
 from analyses.request import Option, flag, options
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, load_drive, output_quantity
+from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
 from reports.cli.targets import folder_for_results
 
@@ -89,7 +89,7 @@ def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = {"plain": kind, "output": str, "load": float}[option.kind]
+    text = {"plain": kind, "load": float}.get(option.kind, str)
     more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
     if option.argument:
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], Parameter.empty
@@ -101,6 +101,8 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
     """The value of an option in SI, once the drive is known."""
+    if option.kind == "command":
+        return command_quantity(f"--{option.flag or flag(name)}", value, drive)
     if option.kind == "output":
         return output_quantity(f"--{option.flag or flag(name)}", value, drive)
     return on_axis(value, drive) if option.kind == "load" and value is not None else value

@@ -64,6 +64,32 @@ def output_quantity(option: str, words: str | None, drive: Design) -> float | No
         raise InputError(f'{option} {words!r}: {reason}; allowed: a value such as "{example}"') from None
 
 
+def command_quantity(option: str, words: str | None, drive: Design) -> float | None:
+    """An amount of the outermost loop's command in its usual unit: a plain number, or one with its unit.
+
+    Raises
+    ------
+    InputError
+        For no number, or a unit of something else.
+    """
+    from actuator_lti.design.units import parse_quantity
+    from actuator_lti.errors import InputError
+    from nonlinear.trajectory import COMMAND_UNITS
+
+    if words is None:
+        return None
+    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+    try:
+        return float(words)
+    except ValueError:
+        pass
+    try:
+        return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
+    except InputError as error:
+        reason = error.message.partition("; allowed")[0]
+        raise InputError(f'{option} {words!r}: {reason}; allowed: "5 {unit}", or 5 in {unit}') from None
+
+
 def read_changes(changes: Sequence[str]) -> Tree:
     """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
 

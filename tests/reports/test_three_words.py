@@ -75,7 +75,10 @@ def test_a_waiver_is_read_written_and_hashed_where_there_is_one() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"requirement": "cold"}, "waiver.requirement = .*cold.*: allowed: each once: a requirement's id"),
+        (
+            {"requirement": "cold"},
+            "waiver.cold.requirement = .*cold.*: allowed: each once: a requirement's id",
+        ),
         ({"reason": " "}, "waiver.hot.reason"),
         ({"date": "yesterday"}, "waiver.hot.date = .*yesterday.*: allowed: a day, YYYY-MM-DD"),
     ],
