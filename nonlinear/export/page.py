@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import Limiter
@@ -12,7 +13,6 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.limiters import limiter_places
 from nonlinear._kernels import layout as at
-from nonlinear.emit.kinds import c_float
 from nonlinear.export.linear_limiters import SIGNALS as SEEN
 from nonlinear.export.trace import Tape, Traced, used_statements
 from nonlinear.parameters import design_row
