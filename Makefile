@@ -42,7 +42,8 @@ $(CORE): pyproject.toml requirements.lock
 	@echo "3/4 toolkit: actuator-lti, from here"
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@echo "4/4 simulator: compiled"
-	@$(BIN)/python -m nonlinear.native
+	@$(BIN)/python -m nonlinear.native || \
+	  { $(PIP) install --constraint constraints.txt ziglang && $(BIN)/python -m nonlinear.native; }
 	@touch $@
 
 $(ALL): $(CORE) requirements-all.lock

@@ -23,7 +23,7 @@ from actuator_lti.reading import decode, read_bytes
 from actuator_lti.tree import Tree
 from analyses.engine import code_version
 
-LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy")
 
 
 @dataclass(frozen=True)

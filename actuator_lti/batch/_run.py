@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from actuator_lti.compiled.kernel import kernel
 
-from ._compiled import kernel
 from ._figures import (
+    COLUMNS,
     DC_GAIN,
     FINAL,
     GAIN_CROSSOVERS,
@@ -204,20 +204,39 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
 
 
 @kernel
-def many_loops(A, B, C, poles, lead, time_figures, out):
-    """Fill out[k] for every open loop A[k], B[k], C[k] by `one_loop`; each by itself."""
-    n = A.shape[1]
-    points, stack = np.empty(POINTS), np.empty(DEEPEST)
-    xs, rs, ss = np.empty(CAPACITY), np.empty(2 * CAPACITY), np.empty(2 * CAPACITY)
-    work, state, exchanged = np.zeros(2 * n * n + 2 * n), np.zeros(2 * n), np.zeros(n)
-    for k in range(A.shape[0]):
-        if np.isnan(poles[k, 0, 0]):
+def _copied(count, source, first, to):
+    """Copy some numbers of a row to the beginning of another."""
+    for i in range(count):
+        to[i] = source[first + i]
+
+
+@kernel
+def many_loops(
+    count, n, A, B, C, poles, leads, time_figures, out,
+    a, b, c, own, row, points, stack, xs, rs, ss, work, state, exchanged,
+):  # fmt: skip
+    """Fill the k-th row of ``out`` for every open loop by `one_loop`, each by itself.
+
+    The loops lie in A, B, C and poles one after the other; those whose first pole is NaN are left as they
+    are. The rows behind ``out`` lend their space, see `room`.
+    """
+    for k in range(count):
+        if math.isnan(poles[4 * n * k]):
             continue
-        a, b, c = np.empty(n * n), B[k].copy(), C[k].copy()
-        for i in range(n):
-            for j in range(n):
-                a[i * n + j] = A[k, i, j]
+        _copied(n * n, A, n * n * k, a)
+        _copied(n, B, n * k, b)
+        _copied(n, C, n * k, c)
+        _copied(4 * n, poles, 4 * n * k, own)
+        _copied(COLUMNS, out, COLUMNS * k, row)
         one_loop(
-            n, a, b, c, poles[k].copy().reshape(-1), lead[k], time_figures, out[k],
+            n, a, b, c, own, leads[k], time_figures > 0, row,
             points, stack, xs, rs, ss, work, state, exchanged,
         )  # fmt: skip
+        for j in range(COLUMNS):
+            out[COLUMNS * k + j] = row[j]
+
+
+def room(n):
+    """Lengths of the rows that `many_loops` works in, from ``a`` on."""
+    loop = (n * n, n, n, 4 * n, COLUMNS)
+    return (*loop, POINTS, DEEPEST, CAPACITY, 2 * CAPACITY, 2 * CAPACITY, 2 * n * n + 2 * n, 2 * n, n)

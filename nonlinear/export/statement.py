@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from nonlinear.emit.kinds import c_float
+from actuator_lti.compiled.kinds import c_float
 
 Term = str | float  # a key "k[3]", an earlier value "v7", or a number
 SIGNS = frozenset({"+", "-", "*", "/", "<", "<=", ">", ">=", "==", "!=", "&&", "||"})

@@ -18,7 +18,7 @@ from emit_samples import (
     two_types,
 )  # fmt: skip
 
-from nonlinear.emit import EmitError, emit_c
+from actuator_lti.compiled import EmitError, emit_c
 
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]

@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 TELL = (
     "import importlib.metadata as m, platform;"
     "print('Python', platform.python_version(), *(f'{n} {m.version(n)}' for n in "
-    "('control', 'numpy', 'scipy', 'numba', 'pydantic', 'typer', 'rich')))"
+    "('control', 'numpy', 'scipy', 'pydantic', 'typer', 'rich')))"
 )
 RUN = (
     "from nonlinear import commands, simulate;"

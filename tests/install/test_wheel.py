@@ -89,6 +89,6 @@ def test_the_core_is_light(built: tuple[set[str], set[str], str]) -> None:
         if line.startswith("Requires-Dist") and "extra ==" not in line
     }
     assert core == {
-        "control", "numpy", "scipy", "numba", "pydantic", "typer", "rich", "jinja2", "tomli-w",
+        "control", "numpy", "scipy", "pydantic", "typer", "rich", "jinja2", "tomli-w",
         "defusedxml", "python-flint",
     }  # fmt: skip

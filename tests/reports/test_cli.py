@@ -62,7 +62,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_starting_up_imports_nothing_heavy() -> None:
     code = (
         "import sys, typer.main; from reports.cli.app import build; typer.main.get_command(build());"
-        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'numba', 'pydantic', 'pandas'};"
+        "heavy = {'numpy', 'scipy', 'control', 'matplotlib', 'pydantic', 'pandas'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -73,7 +73,7 @@ def test_starting_up_imports_nothing_heavy() -> None:
 def test_linear_figures_wait_for_no_plotting_library(words: list[str]) -> None:
     code = (
         f"import sys; from reports.cli.main import main; main({words!r});"
-        "heavy = {'control', 'matplotlib', 'scipy.signal', 'scipy.stats', 'numba', 'pandas', 'dask'};"
+        "heavy = {'control', 'matplotlib', 'scipy.signal', 'scipy.stats', 'pandas', 'dask'};"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

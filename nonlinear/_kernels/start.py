@@ -1,11 +1,8 @@
-"""Functions that are emitted only: what a caller outside of Python wants in one call, for every drive."""
+"""What comes before the first tick, for every drive: lengths, derived parameters, the state at t_0."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
-from actuator_lti.compiled_late import CompiledLate
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
@@ -14,18 +11,7 @@ from nonlinear._kernels.smooth import prepare_tanh
 from nonlinear._kernels.tick import init_elastic, init_run, retune_elastic, retune_rigid
 
 
-def emitted(function: Callable[..., Any]) -> CompiledLate:
-    """Declare a function that is emitted; compiled by numba in tests alone."""
-    return CompiledLate(function, _declared)
-
-
-def _declared(function: Callable[..., Any]) -> Any:
-    import numba
-
-    return numba.njit(error_model="numpy")(function)
-
-
-@emitted
+@kernel
 def prepare_sizes(p):  # type: ignore[no-untyped-def]
     """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
     prepare_run_sizes(p)
@@ -33,7 +19,7 @@ def prepare_sizes(p):  # type: ignore[no-untyped-def]
         prepare_elastic_sizes(p)
 
 
-@emitted
+@kernel
 def derive(p, s):  # type: ignore[no-untyped-def]
     """Fill all derived parameters; ``s`` lends its work space."""
     prepare(p, s)
@@ -45,7 +31,7 @@ def derive(p, s):  # type: ignore[no-untyped-def]
         prepare_elastic(p, s)
 
 
-@emitted
+@kernel
 def init(p, s):  # type: ignore[no-untyped-def]
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     init_run(p, s)
@@ -53,7 +39,7 @@ def init(p, s):  # type: ignore[no-untyped-def]
         init_elastic(p, s)
 
 
-@emitted
+@kernel
 def retune(p, s):  # type: ignore[no-untyped-def]
     """Fit the state to parameters that were changed between two ticks, after `derive`."""
     retune_rigid(p, s)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from nonlinear.emit.expressions import Calls, Constant, Expressions, bare, widened
-from nonlinear.emit.kinds import C_TYPES, Function, Kind, c_name
+from actuator_lti.compiled.expressions import Calls, Constant, Expressions, bare, widened
+from actuator_lti.compiled.kinds import C_TYPES, Function, Kind, c_name
 
 INDENT = "    "
 

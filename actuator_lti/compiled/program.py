@@ -11,9 +11,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nonlinear.emit.expressions import Constant
-from nonlinear.emit.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
-from nonlinear.emit.statements import INDENT, Statements, result_type
+from actuator_lti.compiled.expressions import Constant
+from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
+from actuator_lti.compiled.statements import INDENT, Statements, result_type
+
+_INCLUDES = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
+_BYTES = "typedef struct { unsigned short *at; int length; } @bytes;"
+_MINMAX = {
+    "min": "static inline double @min(double a, double b) { return (b < a) ? b : a; }",
+    "max": "static inline double @max(double a, double b) { return (b > a) ? b : a; }",
+    "min_int": "static inline int @min_int(int a, int b) { return (b < a) ? b : a; }",
+    "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
+}
 
 __all__ = ["EmitError", "Program", "emit_c"]
 
@@ -32,12 +41,27 @@ class Program:
         Definitions, callees first; entries have external linkage, all others are static.
     declarations : mapping of str to str
         Prototype of each entry function.
+    prefix : str
+        In front of every function and type name.
     """
 
     constants: Mapping[str, Constant]
     types: str
     functions: str
     declarations: Mapping[str, str]
+    prefix: str
+
+    @property
+    def helpers(self) -> list[str]:
+        """Minimum and maximum as Python has them, those that are called."""
+        known = {name: text.replace("@", self.prefix) for name, text in _MINMAX.items()}
+        return [text for name, text in known.items() if f"{self.prefix}{name}(" in self.functions]
+
+    @property
+    def source(self) -> str:
+        """All of it as one file."""
+        parts = [_INCLUDES, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
+        return "\n".join([*parts, self.types, *self.declarations.values(), self.functions])
 
     def constants_text(self, notes: Mapping[str, str] | None = None) -> str:
         """The constants as C, whole numbers as one enum; ``notes`` says what each is."""
@@ -75,9 +99,7 @@ def emit_c(entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_") -> Pro
         At the first construct outside the subset, with its file and line.
     """
     collector = _Collector(prefix)
-    names = [
-        collector.call(dispatcher, list(kinds), None, None).name for dispatcher, kinds in entries.items()
-    ]
+    names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
     texts, types, declarations = [], [], {}
     for function, lines in collector.done.values():
         head = collector.head(function)
@@ -87,7 +109,7 @@ def emit_c(entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_") -> Pro
         if function.returns is not None and len(function.returns) > 1:
             types.append(_structure(prefix, function))
         texts.append(_definition(function, ("" if public else "static ") + head, lines))
-    return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations)
+    return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix)
 
 
 class _Collector:
@@ -97,11 +119,8 @@ class _Collector:
         self.done: dict[str, tuple[Function, list[str]]] = {}
         self.open: list[str] = []
 
-    def call(
-        self, dispatcher: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None
-    ) -> Function:
-        """The function behind a dispatcher, analysed for these kinds of arguments."""
-        python = dispatcher.py_func
+    def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
+        """A function analysed for these kinds of arguments."""
         name = python.__name__
         if name in self.done:
             known = self.done[name][0]

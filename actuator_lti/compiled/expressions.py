@@ -8,7 +8,8 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from nonlinear.emit.kinds import FUNCTIONS, Function, Kind, c_float, c_name
+from actuator_lti.compiled.kernel import is_kernel
+from actuator_lti.compiled.kinds import FUNCTIONS, Function, Kind, c_float, c_name
 
 Text = tuple[str, Kind]
 Constant = int | float | tuple[float, ...] | tuple[int, ...]
@@ -190,8 +191,6 @@ class Expressions:
         return "(" + sign.join(f"({self.condition(value)})" for value in node.values) + ")", "bool"
 
     def _Compare(self, node: ast.Compare) -> Text:
-        if isinstance(node.ops[0], ast.Is | ast.IsNot):
-            return self._present(node)
         values = [node.left, *node.comparators]
         if len(values) > 2 and any(
             not isinstance(v, ast.Name | ast.Constant | ast.Attribute) for v in values[1:-1]
@@ -203,14 +202,6 @@ class Expressions:
                 raise self.function.error(node, f"the comparison {type(op).__name__} is not in the subset")
             parts.append(self._compared(left, _COMPARE[type(op)], right))
         return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
-
-    def _present(self, node: ast.Compare) -> Text:
-        """``x is None``: an argument that is there is a number, so this is known here."""
-        other = node.comparators[0]
-        if len(node.ops) > 1 or not (isinstance(other, ast.Constant) and other.value is None):
-            raise self.function.error(node, "an identity other than that with None")
-        self.emit(node.left)
-        return ("true" if isinstance(node.ops[0], ast.IsNot) else "false"), "bool"
 
     def _compared(self, left: ast.expr, sign: str, right: ast.expr) -> str:
         (a, first), (b, second) = self.emit(left), self.emit(right)
@@ -243,7 +234,7 @@ class Expressions:
         value = scope.get(target.id) if isinstance(target, ast.Name) else None
         if isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
             value = getattr(scope.get(target.value.id), target.attr, None)
-        if not hasattr(value, "py_func"):
+        if not is_kernel(value):
             raise self.function.error(node, f"{ast.unparse(target)} is no compiled function")
         emitted = [self.emit(argument) for argument in node.args]
         callee = self.call(value, [kind for _, kind in emitted], node, self.function)

@@ -1,21 +1,45 @@
-"""A C compiler for the exported files: gcc or clang of the machine, or the one that comes with ziglang."""
+"""A C compiler for emitted code: gcc or clang of the machine, or the one that comes with ziglang."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import platform
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from actuator_lti.compiled.portable_executable import without_time
 from actuator_lti.errors import InputError
-from nonlinear.export.portable_executable import without_time
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
+# values do not depend on these: nobody reads errno or the flags of exceptions
+LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math")
 ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A kind of machine that a library can be compiled for anywhere: names for zig and for a wheel."""
+
+    zig: str
+    wheel: str
+    suffix: str
+    flags: tuple[str, ...]
+
+
+TARGETS = {
+    "linux-x86_64": Target("x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64", ".so", ("-shared", "-fPIC")),
+    "linux-aarch64": Target("aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64", ".so", ("-shared", "-fPIC")),
+    "win32-AMD64": Target("x86_64-windows-gnu", "win_amd64", ".dll", ("-shared",)),
+    "darwin-x86_64": Target("x86_64-macos.11.0", "macosx_11_0_x86_64", ".dylib", ("-shared", "-fPIC")),
+    "darwin-arm64": Target("aarch64-macos.11.0", "macosx_11_0_arm64", ".dylib", ("-shared", "-fPIC")),
+}
+HERE = f"{sys.platform}-{platform.machine()}"
 
 
 def system_compiler() -> str | None:
@@ -40,15 +64,42 @@ def compiler_for(target: str) -> list[str]:
     InputError
         Where this machine has none; says which package brings one.
     """
-    native = sys.platform == "linux" and os.uname().machine == "x86_64"
     compiler = system_compiler()
-    if target == "linux64" and native and compiler:
+    if target == "linux64" and HERE == "linux-x86_64" and compiler:
         return [compiler]
     zig = zig_command()
     if zig is None:
         wanted = "gcc or clang, or " if target == "linux64" else ""
         raise InputError(f"no C compiler for {target}; allowed: {wanted}pip install 'actuator-lti[export]'")
     return [*zig, "-target", ZIG_TARGETS[target]]
+
+
+def compile_library(text: str, output: str, target: str, *, portable: bool = False) -> bytes:
+    """Compile one C file to a shared library for `HERE` or another of `TARGETS`.
+
+    Parameters
+    ----------
+    text : str
+    output : str
+        Its file name.
+    target : str
+    portable : bool
+        For every machine of the target, as in a wheel: by zig, with an old C library.
+
+    Raises
+    ------
+    InputError
+        Where there is no compiler, or it fails.
+    """
+    compiler, zig = system_compiler(), zig_command()
+    if target == HERE and compiler and not portable:
+        command = [compiler]
+    elif zig is None:
+        raise InputError(f"no C compiler for {target}; allowed: gcc, clang, or pip install ziglang")
+    else:
+        command = [*zig, *(["-target", TARGETS[target].zig] if target in TARGETS else [])]
+    own = TARGETS[target].flags if target in TARGETS else ("-shared", "-fPIC")
+    return compile_files({"kernels.c": text}, output, target, (*LIBRARY_FLAGS, *own), command=command)
 
 
 def compile_files(
