@@ -18,7 +18,7 @@ from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
 from actuator_lti.margins.nearest import nearest
 from actuator_lti.margins.nyquist import angle_about, angle_between
-from actuator_lti.margins.poles import SortedPoles, sorted_poles
+from actuator_lti.margins.poles import SortedPoles, polynomial_roots, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
 
@@ -176,7 +176,7 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
         raise Doubtful("rounding of the coefficients moves a closed-loop pole over the border")
     size = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
     if loop.numerator is not None:
-        size = np.concatenate((size, np.abs(np.roots(loop.numerator))))
+        size = np.concatenate((size, np.abs(polynomial_roots(loop.numerator))))
     size = size[size > 0.0]
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful("poles and zeros over too many decades")

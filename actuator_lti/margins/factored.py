@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.level_crossings import shifted, unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
-from actuator_lti.margins.poles import SortedPoles, eigenvalues
+from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
 
 _LEAST_SLACK = 1e-8
@@ -210,7 +210,7 @@ def _in_s(loop: RationalLoop, points: Complex) -> Complex:
 def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     """Zeros in the s-plane; those of a state space that lie at infinity come out far away."""
     if loop.numerator is not None:
-        return _in_s(loop, np.roots(np.trim_zeros(loop.numerator, "f")).astype(complex))
+        return _in_s(loop, polynomial_roots(loop.numerator))
     size = np.abs(poles[poles != 0.0])
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
     system = shifted(loop, shift)

@@ -72,8 +72,7 @@ def given_of(system: Any) -> Given:
         )
     period_s = _period(system.dt)
     if hasattr(system, "num"):
-        num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
-        den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
+        num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         given = Given(period_s, num, den)
         _refuse_coefficients(num, den)
     else:
@@ -84,6 +83,11 @@ def given_of(system: Any) -> Given:
     if not all(np.isfinite(part).all() for part in parts if part is not None):
         raise InputError("the loop holds a value that is not finite")
     return given
+
+
+def _trimmed(coefficients: Any) -> Real:
+    p = np.asarray(coefficients, dtype=float)
+    return p[p.nonzero()[0][0] :] if p.any() else p[:0]
 
 
 def _refuse_coefficients(num: Real, den: Real) -> None:

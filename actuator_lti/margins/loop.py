@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -86,12 +87,9 @@ class RationalLoop:
         p = self._variable(x)
         turn = 1j * self.point(x) if self.in_z else 1j
         if self.numerator is not None and self.denominator is not None:
-            num, den = self.numerator, self.denominator
-            below = np.polyval(den, p)
-            L = np.polyval(num, p) / below
-            d_num = np.polyval(num[:-1] * np.arange(num.size - 1, 0, -1), p)
-            d_den = np.polyval(den[:-1] * np.arange(den.size - 1, 0, -1), p)
-            return L, turn * (d_num / below - L * (d_den / below))
+            above, below, d_above, d_below = horner(self._with_slopes, p)
+            L = above / below
+            return L, turn * (d_above / below - L * (d_below / below))
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
         matrix: Complex = self._resolvent(p)
@@ -148,6 +146,15 @@ class RationalLoop:
         b[:n], b[n], c[-1] = self.b, self.d, 1.0
         return from_matrices(A, b, c, 0.0, self.period_s)
 
+    @cached_property
+    def _with_slopes(self) -> Real:
+        """Numerator, denominator and their derivatives."""
+        assert self.numerator is not None
+        rows = np.zeros((4, self.numerator.size))
+        rows[0], rows[1] = self.numerator, self.denominator
+        rows[2:, 1:] = rows[:2, :-1] * np.arange(rows.shape[1] - 1, 0, -1)
+        return rows
+
     def _variable(self, x: Real) -> Complex:
         """The number that stands on the diagonal: s, or z - 1, exact near z = 1."""
         return np.expm1(1j * x) if self._about_one else self.point(x)
@@ -162,7 +169,8 @@ class RationalLoop:
     def _values(self, p: Any) -> Any:
         if self.numerator is not None and self.denominator is not None:
             with np.errstate(all="ignore"):
-                return np.polyval(self.numerator, p) / np.polyval(self.denominator, p)
+                above, below = horner(self._with_slopes[:2], p)
+                return above / below
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=p.dtype)
         return self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c
@@ -174,6 +182,14 @@ class RationalLoop:
         index = np.arange(n)
         matrix[:, index, index] += p[:, None]
         return matrix
+
+
+def horner(rows: Real, p: Any) -> Any:
+    """Values of polynomials (k, n + 1), highest power first, at points; shape (k, points)."""
+    value = rows[:, :1] + 0.0 * p
+    for k in range(1, rows.shape[1]):
+        value = value * p + rows[:, k : k + 1]
+    return value
 
 
 def rational_loop(system: Any) -> RationalLoop:
