@@ -23,7 +23,7 @@ from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN
 from nonlinear import Tangent, tangent
-from nonlinear.derivative import RETURNED
+from nonlinear.differences import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
 

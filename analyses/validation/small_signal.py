@@ -28,7 +28,7 @@ from actuator_lti.verdict import Verdict
 from analyses.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.derivative import GRID, relative
+from nonlinear.lifted import GRID, relative
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
