@@ -139,12 +139,13 @@ class Bench:
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
-        from actuator_lti.loops import periodic_loop
+        from actuator_lti.drive.wiring import wire
+        from actuator_lti.loops import periodic_loop_of
 
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
-        return tangent(longer.drive, "u", setup=longer.setup("u")), periodic_loop(
-            longer.loops("u"), "u"
-        ).modes()
+        setup = longer.setup("u")
+        predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
+        return tangent(longer.drive, "u", setup=setup), predicted.modes()
 
 
 def _later(design: Design, more_s: float) -> Design:
