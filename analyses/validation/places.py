@@ -47,6 +47,7 @@ class Bench:
     design: Design
     model: Design
     _assembled: dict[Operating, Loops] = field(default_factory=dict, init=False, repr=False)
+    _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def drive(self) -> Design:
@@ -60,7 +61,10 @@ class Bench:
 
     def setup(self, name: str) -> LoopSetup:
         """How a place is tested; without limits."""
-        return loop_setup(self.drive, name, limits_on=False, held=name == "current")
+        if name not in self._setups:
+            held = name == "current"
+            self._setups[name] = loop_setup(self.drive, name, limits_on=False, held=held)
+        return self._setups[name]
 
     def loops(self, name: str) -> Loops:
         """The linear loops on the motion of a place."""
