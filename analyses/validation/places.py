@@ -47,6 +47,7 @@ class Bench:
     design: Design
     model: Design
     _assembled: dict[Operating, Loops] = field(default_factory=dict, init=False, repr=False)
+    _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def drive(self) -> Design:
@@ -60,7 +61,10 @@ class Bench:
 
     def setup(self, name: str) -> LoopSetup:
         """How a place is tested; without limits."""
-        return loop_setup(self.drive, name, limits_on=False, held=name == "current")
+        if name not in self._setups:
+            held = name == "current"
+            self._setups[name] = loop_setup(self.drive, name, limits_on=False, held=held)
+        return self._setups[name]
 
     def loops(self, name: str) -> Loops:
         """The linear loops on the motion of a place."""
@@ -139,12 +143,13 @@ class Bench:
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
-        from actuator_lti.loops import periodic_loop
+        from actuator_lti.drive.wiring import wire
+        from actuator_lti.loops import periodic_loop_of
 
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
-        return tangent(longer.drive, "u", setup=longer.setup("u")), periodic_loop(
-            longer.loops("u"), "u"
-        ).modes()
+        setup = longer.setup("u")
+        predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
+        return tangent(longer.drive, "u", setup=setup), predicted.modes()
 
 
 def _later(design: Design, more_s: float) -> Design:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from math import degrees, pi
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ from actuator_lti.verdict import Verdict
 from analyses.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.derivative import GRID, relative
+from nonlinear.lifted import GRID, relative
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
@@ -192,19 +193,19 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
     return float(np.exp(log_gain)), angle
 
 
-def _followed(t: Tangent, gain: float, point: complex) -> complex:
-    """The closed-loop pole at a gain nearest to a point, by Newton's method."""
+def pole_near(equation: Callable[[complex], complex], point: complex) -> complex:
+    """The zero of an equation of poles nearest to a point, by Newton's method."""
     for _ in range(NEWTON_STEPS):
         step = 1e-7 * abs(point)
-        value = _pole_equation(t, gain, point)
-        slope = (_pole_equation(t, gain, point + step) - value) / step
+        value = equation(point)
+        slope = (equation(point + step) - value) / step
         if slope == 0.0 or not np.isfinite(slope):
             break
         move = value / slope
         point -= move
         if abs(move) < 1e-15 * abs(point):
             break
-    return point
+    return complex(point)
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
@@ -218,7 +219,10 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     if found is None:
         return place.judged(name, ratio, None, allowed * ratio, "1", "no closed-loop pole crosses there")
     gain, turned = found
-    sides = [abs(_followed(t, ratio * x, np.exp(1j * turned))) - 1.0 for x in (1.0 - BESIDE, 1.0 + BESIDE)]
+    sides = [
+        abs(pole_near(partial(_pole_equation, t, ratio * x), np.exp(1j * turned))) - 1.0
+        for x in (1.0 - BESIDE, 1.0 + BESIDE)
+    ]
     hertz = turned / (2.0 * pi * t.period_s)
     words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
     row = place.judged(name, ratio, gain, allowed * ratio, "1", words)

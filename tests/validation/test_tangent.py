@@ -13,7 +13,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops, periodic_loop
 from nonlinear import tangent
-from nonlinear.derivative import GRID, Tangent, relative
+from nonlinear.derivative import Tangent
+from nonlinear.lifted import GRID, relative
 from nonlinear.loop_setup import points_of, stages_of
 from nonlinear.on_the_bench import on_the_bench
 from nonlinear.operating_motion import on_its_stand, operating_motion
