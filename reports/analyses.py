@@ -17,12 +17,18 @@ from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
+from analyses.margins.asked import Asked as MarginsAsked
+from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
+from analyses.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
+from analyses.validation.asked import Asked as ValidationAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.study import Study
     from reports.document_schema import Section
+    from reports.terminal import Brief
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +38,7 @@ class Analysis:
     Attributes
     ----------
     name : str
-        Of the command and of the section's module in `reports.sections`, whose ``section(result)`` shows it.
+        Of the command, and of the section's module where that has no name of its own.
     group : str
         Panel of the help in which the command stands.
     words : str
@@ -42,10 +48,18 @@ class Analysis:
     function : str
         ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
         result says ``passed``, that is the exit status.
+    shown : str
+        The section's module in `reports.sections`, whose ``section(result)`` shows the result.
     also : bool
         Whether a report has the section where it is asked for (``--also``).
     doing : str
         What the bar says while the function works, which then takes ``progress``.
+    study : bool
+        Whether it is asked of a study (a file, or a design with variants), not of a design.
+    keeps : bool
+        Whether the function takes ``out`` as well, the folder, and keeps there what it finds.
+    warns : bool
+        Whether what is suspicious about the design is said first.
     stem : str
         Name of the page's files; that of the command where empty.
     out : str
@@ -57,12 +71,16 @@ class Analysis:
     words: str
     request: type | None = None
     function: str = ""
+    shown: str = ""
     also: bool = False
     doing: str = ""
+    study: bool = False
+    keeps: bool = False
+    warns: bool = False
     stem: str = ""
     out: str = ""
 
-    def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
+    def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
         if self.request is None:
             return ()
@@ -70,7 +88,7 @@ class Analysis:
         values = {name: value for name, value in chosen.items() if value is not None}
         return (made(design, **values) if made else self.request(**values),)
 
-    def run(self, design: Design, *asked: Any, **more: Any) -> Any:
+    def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
         """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
         return getattr(import_module(package), name)(design, *asked, **more)
@@ -79,6 +97,16 @@ class Analysis:
         """Show: ``section(result)`` of the section's module, one or several."""
         made = self._shown.section(result)
         return made if isinstance(made, list) else [made]
+
+    def text(self, result: Any) -> str | None:
+        """The result where it is nothing but a text to print (``text`` of the section's module)."""
+        made: str | None = getattr(self._shown, "text", lambda _result: None)(result)
+        return made
+
+    def brief(self, result: Any) -> Brief | None:
+        """What the terminal prints where the sections are too long (``brief`` of their module)."""
+        made: Brief | None = getattr(self._shown, "brief", lambda _result: None)(result)
+        return made
 
     def data(self, result: Any) -> Any:
         """The result as plain data: what the section's module says (``data``), else by its names."""
@@ -93,10 +121,21 @@ class Analysis:
 
     @property
     def _shown(self) -> ModuleType:
-        return import_module(f"reports.sections.{self.name}")
+        return import_module(f"reports.sections.{self.shown or self.name}")
 
 
 ANALYSES = (
+    Analysis(
+        name="margins",
+        group="Linear loops",
+        request=MarginsAsked,
+        warns=True,
+        words="""
+        Print margins, bandwidths and verdicts of every loop; the margins are certified.
+
+        Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
+        """,
+    ),
     Analysis(
         name="stiffness",
         group="Linear loops",
@@ -169,6 +208,22 @@ ANALYSES = (
         """,
     ),
     Analysis(
+        name="validate",
+        group="Nonlinear checks",
+        request=ValidationAsked,
+        function="analyses.validation.validate",
+        shown="validation",
+        doing="validating",
+        stem="validation",
+        words="""
+        Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
+
+        Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived,
+        if the drive does not come to rest, or if a command within full deflection makes it diverge. What is
+        large, starts from rest, or is shaken by counts is shown with figures.
+        """,
+    ),
+    Analysis(
         name="correlate",
         group="Bench records",
         request=CorrelationAsked,
@@ -203,6 +258,36 @@ ANALYSES = (
         With --predict the records are steps of a motor on a voltage (ODrive
         recorder): gain and time constant are fitted to them and predict the speed
         over a chirp.
+        """,
+    ),
+    Analysis(
+        name="compare",
+        group="Variants and history",
+        request=StudyAsked,
+        function="analyses.study_asked.compared",
+        doing="comparing",
+        study=True,
+        keeps=True,
+        out="out/compare",
+        words="""
+        Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
+
+        What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+        """,
+    ),
+    Analysis(
+        name="montecarlo",
+        group="Variants and history",
+        request=MonteCarloAsked,
+        function="analyses.monte_carlo.asked.study",
+        shown="monte_carlo",
+        doing="sampling",
+        keeps=True,
+        out="out/montecarlo",
+        words="""
+        Sample the tolerances: distributions, odds of every requirement, worst cases.
+
+        Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
         """,
     ),
     Analysis(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ def as_json(value: Any) -> Any:
         return _named(value)
     if isinstance(value, complex | np.complexfloating):
         return plain({"size": abs(value), "phase_deg": degrees(np.angle(value))})
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, Mapping):
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray) and not np.iscomplexobj(value):

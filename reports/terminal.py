@@ -32,6 +32,15 @@ class SideBySide:
     blocks: Sequence[Mapping[str, Any]]
 
 
+@dataclass(frozen=True)
+class Brief:
+    """What the terminal prints of an analysis whose sections are too long for it."""
+
+    words: str
+    blocks: Sequence[Mapping[str, Any] | SideBySide]
+    notes: Sequence[str] = ()
+
+
 def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
     """Print the tables and verdicts among the blocks; figures are for pages."""
     out = console()

@@ -18,6 +18,7 @@ from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.extras import need
 from actuator_lti.quantities import QUANTITIES
+from actuator_lti.verdict import Verdict
 from analyses.engine import Engine
 from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
@@ -27,6 +28,7 @@ from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
 from analyses.sampling import Table, sampler_of
+from analyses.verdicts import RequirementVerdict
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
@@ -140,7 +142,7 @@ def monte_carlo(
     return MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
         column_statistics(blocks, task.units), tuple(odds), worst, Path(folder),
-        {name: float(values[0]) for name, values in nominal.items()}, _notes(task),
+        {name: float(values[0]) for name, values in nominal.items()}, _left_out(design), notes=_notes(task),
     )  # fmt: skip
 
 
@@ -214,7 +216,16 @@ def _notes(task: SampleTask) -> tuple[str, ...]:
         notes.append(
             "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together."
         )
-    left_out = [r.id for r in task.design.requirements if not in_populations(r, task.design)]
-    if left_out:
-        notes.append(f"Not sampled, as each takes a computation of one design: {', '.join(left_out)}.")
     return tuple(notes)
+
+
+def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
+    """The requirements that figures of many designs do not tell: not proven."""
+    return tuple(
+        RequirementVerdict(
+            id=r.id, requirement=r, loop=None, value=None, distance=None, verdict=Verdict.NOT_PROVEN,
+            reason="not sampled, it takes a computation of one design", waiver=design.waiver_of(r.id),
+        )
+        for r in design.requirements
+        if not in_populations(r, design)
+    )  # fmt: skip

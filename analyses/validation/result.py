@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import degrees
 from typing import TYPE_CHECKING
 
+from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
 from actuator_lti.verdict import Tally, Verdict
 from analyses.loop_figures import LoopFigures
@@ -73,7 +74,12 @@ class Validation:
     @property
     def tally(self) -> Tally:
         """The rows counted."""
-        return Tally.of(row.verdict for row in self.rows)
+        waived = [self.waived(f"{row.loop}/{row.name}") for row in self.rows]
+        return Tally.of((row.verdict for row in self.rows), waived)
+
+    def waived(self, what: str) -> bool:
+        """Whether the design waives a check not proven: of a loop, or one row of it (``loop/name``)."""
+        return self.design.waiver_of(f"{CHECKS}-{what}") is not None
 
     @property
     def not_met(self) -> tuple[Row, ...]:
@@ -133,7 +139,8 @@ class Validation:
         """``not met`` where a row is, or the drive fails by itself; then ``not proven``; else ``met``."""
         if self.not_met or self.failures:
             return Verdict.NOT_MET
-        if self.undecided or self.hunting or not self.rows:
+        doubts = {**{f"stable-{name}": True for name in self.undecided}, "rest": self.hunting is not None}
+        if not self.rows or any(there and not self.waived(what) for what, there in doubts.items()):
             return Verdict.NOT_PROVEN
         return self.tally.verdict
 
@@ -142,9 +149,14 @@ class Validation:
         """Whether every prediction was judged and met, and the drive comes to rest where it is sent."""
         return self.verdict is Verdict.MET
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """The verdict in words: rows counted, and what the drive does that it must not."""
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
         if self.hunting is not None and self.hunting.rest.verdict == "still moving":
             said.append(f"a step was still moving after {self.hunting.rest.after_s:.3g} s")
-        return f"{self.design.name}: {'; '.join(said)}"
+        return "; ".join(said)
+
+    def __str__(self) -> str:
+        return f"{self.design.name}: {self.words}"

@@ -2,40 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from inspect import Parameter, Signature, cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from actuator_lti.verdict import Verdict
 from analyses.request import Option, flag, options
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity
+from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity, read_changes
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.study import Study
+    from reports.document_schema import Section
 
 FolderOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", callback=folder_for_results, help="Write page and JSON there."),
 ]
 
+StudyArgument = Annotated[
+    str | None, typer.Argument(metavar="STUDY", help="Study file (--example prints one), or a design.")
+]
+VariantOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help='A variant more: "gear.worm.ratio=50"; repeatable.'),
+]
+
 
 def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
-    def run(
-        design: str, changes: list[str] | None, out: Path | None, as_json: bool, quiet: bool, **chosen: Any
-    ) -> None:
-        answer(one, load_drive(design, changes), chosen, out, as_json, quiet)
+    def run(design: str | None, changes: list[str] | None, **given: Any) -> None:
+        answer(one, _study(design, changes) if one.study else load_drive(str(design), changes), **given)
 
     needed = any(option.argument for _, option in _options(one).values())  # then a design is, too
+    subject: tuple[Any, Any] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
     parameters = [
-        _parameter("design", DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN),
-        _parameter("changes", SetOption, None),
+        _parameter("design", *((StudyArgument, None) if one.study else subject)),
+        _parameter("changes", VariantOption if one.study else SetOption, None),
         *(
             _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
             for name, each in _options(one).items()
@@ -51,36 +61,86 @@ def command(one: Analysis) -> Callable[..., None]:
 
 
 def answer(
-    one: Analysis, drive: Design, chosen: dict[str, Any], out: Path | None, as_json: bool, quiet: bool
+    one: Analysis,
+    subject: Design | Study | None,
+    *,
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **chosen: Any,
 ) -> None:
     """Ask, then print the section or the result, and leave with the verdict."""
+    from analyses.isolation import isolated
+    from reports import document as doc
+    from reports.build import notices
     from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line
+    from reports.cli.output import print_json, print_line, print_warning
     from reports.cli.progress import progress
-    from reports.study_pages import study_document, write_pages
-    from reports.terminal import print_section
 
+    drive: Any = getattr(getattr(subject, "base", None), "design", subject)
+    for warning in _warnings(drive) if one.warns else ():
+        print_warning(f"{drive.name}: {warning}")
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
-    with progress(f"{one.doing} {drive.name}", quiet=quiet) as doing:
-        more = {"progress": doing} if one.doing else {}
-        result = one.run(drive, *one.asked(drive, values), **more)
-    first, *others = parts = one.sections(result)
+    with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
+        more: dict[str, Any] = {"progress": doing} if one.doing else {}
+        more |= {"out": out} if one.keeps else {}
+        result = one.run(subject, *one.asked(subject, values), **more)
+    if (text := one.text(result)) is not None:
+        print_line(text)
+        return
+    parts = [*notices(missing, one.name), *one.sections(result)]
+    doc.waived(parts, drive)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
     files = one.write(result, out)
     if out is not None:
-        title = f"{drive.title or drive.name}: {first['title']}"
-        made = study_document(drive, parts, title=title, subtitle=first["result"], kind=one.name)
-        with progress("drawing figures", quiet=quiet) as drawing:
-            files += map(str, write_pages(made, out, one.stem or one.name, progress=drawing))
+        files += _pages(one, drive, parts, out, quiet)
     if as_json:
         print_json(one.data(result))
     else:
-        print_section(first, passed, name=drive.name)
-        for part in others:
-            print_section(part, None)
+        _print(one, drive.name, result, parts, passed)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
+
+
+def _warnings(drive: Design) -> tuple[str, ...]:
+    from actuator_lti.design import warnings_of
+
+    return warnings_of(drive)
+
+
+def _study(path: str | None, changes: list[str] | None) -> Study | None:
+    from analyses.study_asked import study_with
+
+    return (
+        None if path is None else study_with(path, {words: read_changes([words]) for words in changes or ()})
+    )
+
+
+def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
+    """Write page and JSON."""
+    from reports.cli.progress import progress
+    from reports.study_pages import study_document, write_pages
+
+    title = f"{drive.title or drive.name}: {parts[0]['title']}"
+    made = study_document(drive, parts, title=title, subtitle=parts[0]["result"], kind=one.name)
+    with progress("drawing figures", quiet=quiet) as drawing:
+        return [str(path) for path in write_pages(made, out, one.stem or one.name, progress=drawing)]
+
+
+def _print(
+    one: Analysis, name: str, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
+) -> None:
+    """Print the sections, or in brief what they say."""
+    from reports.terminal import print_blocks, print_section, print_verdict
+
+    brief = one.brief(result)
+    if brief is not None:
+        print_verdict(passed or False, f"{name}: {brief.words}")
+        print_blocks(brief.blocks, brief.notes)
+        return
+    for k, part in enumerate(parts):
+        print_section(part, None if k else passed, name="" if k else name)
 
 
 def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypedDict, cast
+from typing import TYPE_CHECKING, TypedDict, cast
 
 from actuator_lti.quantities import Quantity
 from actuator_lti.verdict import Verdict
@@ -15,7 +15,12 @@ from analyses.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Mark, Row, Section, State, Status
 from reports.numbers import short, to_minus
-from reports.sections.names import LOOPS, figure_column, hertz, loop_words
+from reports.sections import requirements
+from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
+from reports.terminal import Brief, side_by_side
+
+if TYPE_CHECKING:
+    from analyses.margins import Margins
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -65,14 +70,66 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
+def section(result: Margins) -> list[Section]:
+    """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
+    asked, judged = result.asked, requirements.section(result.requirements, load_unit(result.design))
+    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+    made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
+    made["blocks"] += [doc.text(note) for note in _notes(result, known)]
+    return [{**made, "result": f"{_stability(known)}. {judged['result']}"}, judged]
+
+
+def brief(result: Margins) -> Brief:
+    """The tables as one, a column a loop."""
+    first, judged = section(result)
+    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+    every, own = with_held(known), with_own_margins(with_held(known))
+    head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
+    tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
+    counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
+    crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
+    notes = [*by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
+    return Brief(first["result"], [side_by_side(head, tables), *crossings, *judged["blocks"]], notes)
+
+
+def _where(result: Margins) -> str:
+    return f"{result.asked.operating_point}, load {result.asked.load_Nm:g} {load_unit(result.design)}"
+
+
+def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
+    own = [note for one in named.values() for note in (*one.margins.notes, *one.notes)]
+    return list(
+        dict.fromkeys([*own, *(f"{name}: broken at the command of the drive" for name in result.around)])
+    )
+
+
+def _stability(named: Mapping[str, LoopFigures]) -> str:
+    """Say which loops are not stable; or that all are, and which only with the rotor or load held."""
+    unstable = [name for name, one in named.items() if one.sound is False]
+    unknown = [name for name, one in named.items() if one.sound is None]
+    if unstable or unknown:
+        words = f"not stable: {', '.join(unstable)}" if unstable else ""
+        return words or f"stability not known: {', '.join(unknown)}"
+    held = [
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, the load drives it away)"
+        for label, one in named.items()
+        if one.held is not None
+    ]
+    return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
+
+
+def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
     """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
-    loops = named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
-    notes = by_itself_notes(named)
-    named = with_held(named)
+    how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
+    made = _loops({LOOPS[name]: one for name, one in figures.items()}, points, how)
+    return {**made, "result": result(figures)}
+
+
+def _loops(loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures], how: str) -> Section:
+    named = with_held(loops)
     own = with_own_margins(named)
     blocks = [
-        *(doc.text(note) for note in notes),
+        *(doc.text(note) for note in by_itself_notes(loops)),
         margin_table(own),
         *([spread_table(points, loops)] if points else ()),
         response_table(named),
@@ -81,11 +138,11 @@ def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointF
     ]
     intro = (
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
-        "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
-    ) + evidence_meaning(named)
-    status = worst_status([loop_figures.sound for loop_figures in figures.values()])
+        f"{how}{evidence_meaning(named)}"
+    )
+    status = worst_status([one.sound for one in loops.values()])
     return doc.section(
-        "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status,
+        "margins", "Margins and bandwidths", blocks, intro=intro, status=status,
         verdict=Verdict.NOT_PROVEN if status == "warn" else None,
     )  # fmt: skip
 

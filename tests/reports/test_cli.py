@@ -101,7 +101,7 @@ def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) ->
     assert captured.err == ""
     assert result["passed"] is True
     assert result["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
-    assert len(result["verdicts"]) == 12
+    assert len(result["requirements"]) == 12
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
@@ -253,4 +253,4 @@ def test_margins_say_what_is_suspicious_on_standard_error(capsys: pytest.Capture
     assert main(["margins", "emps", "--json"]) in (0, 1)
     printed = capsys.readouterr()
     assert printed.err.startswith("warning: emps: control.position.gain:")
-    assert json.loads(printed.out)["design"] == "emps"
+    assert json.loads(printed.out)["design"]["name"] == "emps"

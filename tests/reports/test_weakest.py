@@ -110,7 +110,7 @@ def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
 def test_margins_shows_the_spread_and_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["margins", "fin", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert data["operating_points"]["position"]["gain_margin"]["where"] == "motor driven by the load"
+    assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
     assert main(["margins", "--help"]) == 0
     said = capsys.readouterr().out
     for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):
