@@ -1,18 +1,15 @@
-"""`actuator-lti identify`: friction from a campaign, inertia and friction from records, a virtual bench."""
+"""`actuator-lti identify`: friction from a campaign, inertia and friction from records."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from reports.cli.drive import SetOption, load_drive
+from reports.cli.drive import SetOption
 from reports.cli.options import JsonOption, QuietOption
-from reports.cli.targets import folder_for_results, refuse_existing
-
-if TYPE_CHECKING:
-    from actuator_lti.design import Design
+from reports.cli.targets import folder_for_results
 
 FilesArgument = Annotated[
     list[Path] | None,
@@ -76,16 +73,6 @@ PeriodOption = Annotated[
     float | None,
     typer.Option("--period", metavar="s", help="Period of the excitation (default: found from the command)."),
 ]
-BenchOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--virtual-bench",
-        metavar="DIR",
-        help="Write the files of a simulated campaign there instead; with --frequency-response those of a "
-        "compliant drive's multisine and reversal.",
-    ),
-]
-SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of the virtual bench.")]
 DesignOption = Annotated[
     str | None,
     typer.Option(
@@ -135,9 +122,6 @@ FolderOption = Annotated[
         help="Write page, JSON and, where all checks pass, the identified design file there.",
     ),
 ]
-ForceOption = Annotated[
-    bool, typer.Option("--force", help="With --virtual-bench: overwrite a campaign that is there.")
-]
 ExampleOption = Annotated[
     bool, typer.Option("--example", help="Print a campaign file to start from, and stop.")
 ]
@@ -147,7 +131,6 @@ def identify(
     files: FilesArgument = None,
     dynamic: DynamicOption = None,
     validate: ValidateOption = None,
-    virtual_bench: BenchOption = None,
     frequency_response: FrequencyOption = False,
     play: PlayOption = None,
     period: PeriodOption = None,
@@ -157,8 +140,6 @@ def identify(
     accept: AcceptOption = False,
     residual_limit: LimitOption = 20.0,
     inertia_to: InertiaOption = "motor.rotor_inertia",
-    seed: SeedOption = 0,
-    force: ForceOption = False,
     friction: FrictionOption = "symmetric",
     gravity: GravityOption = False,
     electrical: ElectricalOption = False,
@@ -175,7 +156,7 @@ def identify(
     """Identify a drive from bench records, and write the result as a design with
     tolerances.
 
-    Four ways to call it:
+    Three ways to call it:
 
     identify campaign.toml --out result: C0, Cv and CM from the steady parts
     of many runs. A bad run is set aside and named, the others go on.
@@ -187,11 +168,6 @@ def identify(
 
     identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
     inertias, stiffness, damping and play of a two-mass drive.
-
-    identify --virtual-bench folder --seed 1: simulate a campaign of 54 runs,
-    and write logs and campaign.toml as a bench would. Try the first way on
-    it. With --frequency-response --design joint: the sweep and the reversal
-    of a compliant drive, for the third way.
 
     Every column of every file is accounted for. Each record is held against
     itself and against the design's limits, and the written design against the
@@ -217,14 +193,8 @@ def identify(
         raise InputError(f"--friction {friction}: symmetric, per-direction or map")
     if example:
         _print_example()
-    elif bool(given) == (virtual_bench is not None):
-        raise InputError("give one of: a campaign file, records, --virtual-bench DIR")
-    elif virtual_bench is not None:
-        drive = load_drive(design or "ilr33-amber", changes)
-        if frequency_response:
-            identify_frequency.bench(virtual_bench, design or "ilr33-amber", drive, seed, force, as_json)
-            return
-        _bench(virtual_bench, design or "ilr33-amber", drive, seed, force, as_json, quiet)
+    elif not given:
+        raise InputError("give a campaign file or records; --example prints a campaign file")
     elif frequency_response:
         identify_frequency.run(given, play, period, common)
     elif identify_campaign.is_campaign(given):
@@ -252,27 +222,3 @@ def _print_example() -> None:
 
     text = (campaign_file.__doc__ or "").split("::", 1)[1]
     print_line(textwrap.dedent(text).strip())
-
-
-def _bench(
-    folder: Path, name: str, drive: Design, seed: int, force: bool, as_json: bool, quiet: bool
-) -> None:
-    from analyses.virtual_bench import simulate_bench
-    from analyses.virtual_bench_files import write_bench
-    from analyses.virtual_bench_instruments import measure_bench
-    from reports.cli.output import print_json, print_line
-    from reports.cli.progress import progress
-
-    refuse_existing(folder / "campaign.toml", force)
-    with progress("simulating the runs", quiet=quiet) as bar:
-        runs = simulate_bench(drive, seed=seed, progress=bar)
-    logs, errors = measure_bench(runs, seed)
-    written = Path(name).resolve() if name.endswith(".toml") else name
-    with progress("writing the logs", quiet=quiet) as bar:
-        path = write_bench(folder, logs, design=str(written), seed=seed, progress=bar)
-    if as_json:
-        from dataclasses import asdict
-
-        print_json({"campaign": str(path), "runs": len(logs), "seed": seed, "true_errors": asdict(errors)})
-    else:
-        print_line(f"{len(logs)} runs written; next: actuator-lti identify {path}")

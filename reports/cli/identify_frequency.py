@@ -12,7 +12,6 @@ from reports.cli.drive import load_drive
 from reports.cli.identify_common import Common, finish, fixed_values, say
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.identification.frequency_bench import FrequencyResult
 
 
@@ -42,35 +41,6 @@ def run(paths: Sequence[Path], play: Path | None, period_s: float | None, common
     else:
         say(made, written, result.items)
     leave_with(result.passed)
-
-
-def bench(folder: Path, name: str, drive: Design, seed: int, force: bool, as_json: bool) -> None:
-    """Write the records of a simulated bench of a compliant drive, and say what to do with them."""
-
-    from analyses.virtual_bench_files import write_record
-    from analyses.virtual_bench_plan import plan_for
-    from analyses.virtual_bench_two_mass import reversal_record, sweep_record
-    from reports.cli.output import print_json, print_line
-    from reports.cli.targets import refuse_existing
-
-    plan = plan_for(drive)
-    paths = {"sweep": folder / "sweep.csv"}
-    refuse_existing(paths["sweep"], force)
-    write_record(paths["sweep"], sweep_record(drive, plan, seed=seed))
-    assert drive.coupling is not None
-    if drive.coupling.play_rad > 0.0:
-        paths["reversal"] = folder / "reversal.csv"
-        write_record(paths["reversal"], reversal_record(drive, plan, seed=seed))
-    if as_json:
-        files = {key: str(path) for key, path in paths.items()}
-        print_json({"files": files, "seed": seed, "plan": asdict(plan)})
-        return
-    play = f" --play {paths['reversal']}" if "reversal" in paths else ""
-    print_line(
-        f"{len(paths)} records written: lines every {1.0 / plan.period_s:.3g} Hz to {plan.highest_hz:.4g} Hz "
-        f"at {plan.speed_rad_s:.3g} rad/s against {plan.moment_Nm:.3g} N m; next: actuator-lti identify "
-        f"--frequency-response {paths['sweep']}{play} --design {name}"
-    )
 
 
 def as_data(result: FrequencyResult, written: Path | None) -> Tree:

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from actuator_lti.design import load_design
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
+from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
+from examples.virtual_bench.__main__ import main as bench
 from reports.cli.main import main
 from reports.document import load as load_document
 
@@ -111,17 +110,30 @@ def test_the_chirp_on_the_command_line(
 def test_the_virtual_bench_writes_54_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from analyses import virtual_bench as module
-
     short = BenchPlan(duration_s=2.2)
-    monkeypatch.setattr(module, "BenchPlan", lambda: short)
-    status, out, _ = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "3")
-    assert status == 0
-    assert "54 runs written" in out
+    monkeypatch.setattr("examples.virtual_bench.campaign.BenchPlan", lambda: short)
+    bench([str(tmp_path), "--seed", "3"])
+    assert "54 runs written" in capsys.readouterr().out
     assert len(list(tmp_path.glob("run*_drive.csv"))) == len(list(tmp_path.glob("run*_torque.csv"))) == 54
-    status, _, err = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "4")
-    assert (status, "--force" in err) == (2, True)
     assert "seed 3" in (tmp_path / "campaign.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ((), "--force"),
+        (("--force", "--design", "emps"), "rotary drive"),
+        (("--sweep", "--design", "fin"), "current loop and a coupling"),
+        (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
+    ],
+)
+def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
+    arguments: tuple[str, ...], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "campaign.toml").touch()
+    with pytest.raises(SystemExit, match="2"):
+        bench([str(tmp_path), *arguments])
+    assert reason in capsys.readouterr().err
 
 
 def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,11 +148,10 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("identify",), "give one of"),
+        (("identify",), "give a campaign file or records"),
         (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
         (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
 )

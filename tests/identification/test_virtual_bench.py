@@ -18,9 +18,16 @@ from analyses.identification.to_design import design_with_estimate, surface_esti
 from analyses.records import import_campaign, load_campaign
 from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
-from analyses.virtual_bench import BenchPlan, TrueRun, simulate_bench
-from analyses.virtual_bench_files import DRIVE_SPEC, SENSOR_SPEC, write_bench
-from analyses.virtual_bench_instruments import BenchInstruments, RunLogs, measure_bench
+from examples.virtual_bench import (
+    BenchInstruments,
+    BenchPlan,
+    RunLogs,
+    TrueRun,
+    measure_bench,
+    simulate_bench,
+    write_bench,
+)
+from examples.virtual_bench.files import DRIVE_SPEC, SENSOR_SPEC
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 INSTRUMENTS = BenchInstruments()

@@ -13,9 +13,7 @@ import pytest
 from actuator_lti.design import load_design, parameter_value
 from actuator_lti.errors import InputError
 from analyses.identification.to_design import inertia_share
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
+from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
 from reports.cli.main import main
 from tests.identification.bench_records import Columns, columns_of, motion, write
 
