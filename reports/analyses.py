@@ -17,6 +17,7 @@ from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
+from analyses.identification.asked import Asked as IdentificationAsked
 from analyses.motion.asked import Asked as MotionAsked
 from analyses.tuning.asked import Asked as TuningAsked
 
@@ -50,6 +51,8 @@ class Analysis:
         Name of the page's files; that of the command where empty.
     out : str
         Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
+    example : str
+        Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Analysis:
     doing: str = ""
     stem: str = ""
     out: str = ""
+    example: str = ""
 
     def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
@@ -166,6 +170,38 @@ ANALYSES = (
         Each is foreseen by describing function in the exact sampled loop, then the simulator is
         started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
         waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+    Analysis(
+        name="identify",
+        group="Bench records",
+        request=IdentificationAsked,
+        function="analyses.identification.run.identify",
+        doing="identifying",
+        stem="identification",
+        example="analyses.records.campaign_file",
+        words="""
+        Identify a drive from bench records, and write the result as a design with
+        tolerances.
+
+        Three ways to call it:
+
+        identify campaign.toml --out result: C0, Cv and CM from the steady parts
+        of many runs. A bad run is set aside and named, the others go on.
+        --example prints a campaign file.
+
+        identify A.csv B.csv --validate C.csv --design my.toml: inertia, friction
+        and offset from records of a motion together, by the inverse dynamic
+        model; --refine simulates the drive as well. The EMPS benchmark's file is
+        known as it is.
+
+        identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
+        inertias, stiffness, damping and play of a two-mass drive.
+
+        Every column of every file is accounted for. Each record is held against
+        itself and against the design's limits, and the written design against the
+        record that it came from. Where a check fails the status is 1, and no
+        design is written without --accept; with --out, page and JSON are.
         """,
     ),
     Analysis(

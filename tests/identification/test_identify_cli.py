@@ -35,12 +35,13 @@ def test_a_campaign_as_json(campaign: Path, capsys: pytest.CaptureFixture[str]) 
     status, out, _ = _run(capsys, "identify", str(campaign), "--json", "--suggest", "2")
     result = json.loads(out)
     assert status == 0
-    assert result["runs_listed"] == result["runs_used"] + len(result["set_aside"]) == 9
-    assert result["set_aside"][0]["id"] == "05"
-    assert result["rows_in"] >= result["rows_out"] > 0
-    low, high = result["coefficients"]["CM"]["interval_95"]
+    found = result["result"]
+    assert found["runs_listed"] == len(found["fit"]["points"]) + len(found["set_aside"]) == 9
+    assert found["set_aside"][0]["id"] == "05"
+    assert found["rows_in"] >= found["rows_out"] > 0
+    low, high = found["fit"]["parameters"]["CM"]["interval_95"]
     assert low < 1.34e-3 < high
-    assert [term["name"] for term in result["contributions"]["terms"]] == ["C0", "Cv", "CM"]
+    assert [term["name"] for term in result["shares"]] == ["C0", "Cv", "CM"]
     assert len(result["suggestion"]["runs"]) == 2
 
 
@@ -74,12 +75,14 @@ def test_the_identified_design_goes_on_into_margins(
 def test_emps_on_the_command_line(
     emps_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, out, _ = _run(capsys, "identify", "--dynamic", str(emps_file), "--json", "--refine")
+    status, out, _ = _run(capsys, "identify", str(emps_file), "--json", "--refine")
     result = json.loads(out)
     assert status == 0
-    assert round(result["parameters"]["inertia"]["value"], 4) == 95.1089
-    assert result["rows_in"] == 24841
-    assert result["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
+    assert round(result["model"]["parameters"]["inertia"]["value"], 4) == 95.1089
+    assert result["model"]["rows_in"] == 24841
+    assert result["refined"]["parameters"]["motor.rotor_inertia"]["value"] == pytest.approx(
+        95.1089, rel=0.005
+    )
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
     signals = json.loads(out)["records"][0]["signals"]
     assert status == 0
@@ -148,9 +151,9 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("identify",), "give a campaign file or records"),
+        (("identify",), "Missing argument 'FILE...'"),
         (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
-        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (("identify", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],

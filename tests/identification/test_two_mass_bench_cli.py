@@ -37,18 +37,18 @@ def test_a_robot_joint_from_its_simulated_bench(tmp_path: Path, capsys: pytest.C
     ]
     status = main([*read, "--design", "joint", *_set(*WRONG), "--out", str(out), "--json"])
     result = json.loads(capsys.readouterr().out)
-    assert not status, result["checks"]
+    assert not status, result["items"]
     design = load_design("joint")
     assert design.coupling is not None
     truth = {
-        "Inertia before the coupling, at the motor": design.motor_side_inertia_kgm2,
-        "Inertia behind it, at its own shaft": design.load_side_inertia_kgm2,
-        "Stiffness": design.coupling.stiffness_Nm_rad,
-        "Damping": design.coupling.damping_Nms_rad,
-        "Play, total": 2e-3,
+        "motor_inertia": design.motor_side_inertia_kgm2,
+        "load_inertia": design.load_side_inertia_kgm2,
+        "stiffness": design.coupling.stiffness_Nm_rad,
+        "damping": design.coupling.damping_Nms_rad,
+        "play": 2e-3,
     }
     for label, value in truth.items():
-        found = result["values"][label]
+        found = result["found"]["parameters"][label]
         assert found["value"] == pytest.approx(value, abs=3.0 * found["standard_error"]), label
         assert found["standard_error"] < 0.03 * value, label
     written = load_design(next(out.glob("*.toml")))

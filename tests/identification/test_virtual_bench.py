@@ -14,7 +14,7 @@ from analyses.identification.campaign import CampaignResult, identify_campaign
 from analyses.identification.contributions import contributions
 from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
-from analyses.identification.to_design import design_with_estimate, surface_estimate
+from analyses.identification.to_design import design_with_fit
 from analyses.records import import_campaign, load_campaign
 from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
@@ -208,7 +208,7 @@ def test_the_shared_errors_are_in_the_interval(from_files: CampaignResult) -> No
 
 
 def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
-    identified = design_with_estimate(design, surface_estimate(from_files.fit, "a bench"))
+    identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
     back = read_design_text(write_design(identified))
     for k, path in enumerate(PATHS):
         tolerance = back.parameters[path].tolerance
