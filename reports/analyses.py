@@ -17,6 +17,7 @@ from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
+from analyses.identification.asked import Asked as IdentificationAsked
 from analyses.margins.asked import Asked as MarginsAsked
 from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
@@ -64,6 +65,8 @@ class Analysis:
         Name of the page's files; that of the command where empty.
     out : str
         Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
+    example : str
+        Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it.
     """
 
     name: str
@@ -79,6 +82,7 @@ class Analysis:
     warns: bool = False
     stem: str = ""
     out: str = ""
+    example: str = ""
 
     def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
@@ -221,6 +225,38 @@ ANALYSES = (
         Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived,
         if the drive does not come to rest, or if a command within full deflection makes it diverge. What is
         large, starts from rest, or is shaken by counts is shown with figures.
+        """,
+    ),
+    Analysis(
+        name="identify",
+        group="Bench records",
+        request=IdentificationAsked,
+        function="analyses.identification.run.identify",
+        doing="identifying",
+        stem="identification",
+        example="analyses.records.campaign_file",
+        words="""
+        Identify a drive from bench records, and write the result as a design with
+        tolerances.
+
+        Three ways to call it:
+
+        identify campaign.toml --out result: C0, Cv and CM from the steady parts
+        of many runs. A bad run is set aside and named, the others go on.
+        --example prints a campaign file.
+
+        identify A.csv B.csv --validate C.csv --design my.toml: inertia, friction
+        and offset from records of a motion together, by the inverse dynamic
+        model; --refine simulates the drive as well. The EMPS benchmark's file is
+        known as it is.
+
+        identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
+        inertias, stiffness, damping and play of a two-mass drive.
+
+        Every column of every file is accounted for. Each record is held against
+        itself and against the design's limits, and the written design against the
+        record that it came from. Where a check fails the status is 1, and no
+        design is written without --accept; with --out, page and JSON are.
         """,
     ),
     Analysis(

@@ -43,12 +43,13 @@ def as_json(value: Any) -> Any:
 
 
 def _named(value: Any) -> Any:
-    """A result by its names; of a loop the figures, not its systems."""
+    """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
     from analyses.loop_figures import LoopFigures
     from reports.loop_json import loop_json
 
     if isinstance(value, LoopFigures):
         return plain(loop_json(value))
-    names = [each.name for each in fields(value)]
-    names += [name for name, one in vars(type(value)).items() if isinstance(one, property)]
-    return {name: as_json(getattr(value, name)) for name in names}
+    names = [each.name for each in fields(value) if each.repr]
+    for kind in type(value).__mro__:
+        names += [name for name, one in vars(kind).items() if isinstance(one, property)]
+    return {name: as_json(getattr(value, name)) for name in dict.fromkeys(names)}

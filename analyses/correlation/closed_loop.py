@@ -22,8 +22,9 @@ from analyses.correlation.driving import (
     needed_command,
     supply_of,
 )
-from analyses.identification.differentiation import filtered_motion
 from analyses.records.consistency import Finding, check_record
+from analyses.records.differentiation import filtered_motion
+from analyses.records.inputs import InputUse, account
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
@@ -70,6 +71,11 @@ class CorrelationResult:
     source: Record
     used: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def inputs(self) -> tuple[InputUse, ...]:
+        """The record's columns, and what each was used for."""
+        return account(self.source, self.used)
 
     def __getitem__(self, name: str) -> SignalComparison:
         for signal in self.signals:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-from analyses.identification.differentiation import Motion
+from analyses.records.differentiation import Motion
 
 FloatArray = NDArray[np.float64]
 FrictionForm = Literal["symmetric", "per-direction"]

@@ -9,33 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
+from analyses.estimation.fit import Fit
 from analyses.identification.dynamic import FrictionForm, Recipe
 
 FloatArray = NDArray[np.float64]
-
-KEYS = {
-    "viscous": "friction.viscous",
-    "dry": "friction.dry_torque",
-    "offset": "friction.offset_torque",
-    "viscous_forward": "friction.viscous",
-    "dry_forward": "friction.dry_torque",
-    "viscous_reverse": "friction.viscous_reverse",
-    "dry_reverse": "friction.dry_torque_reverse",
-    "load_coefficient": "friction.load_coefficient",
-}
-"""The design's key of each parameter of an inverse model; the inertia has a choice."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fixed:
-    """A parameter that was not fitted: its value (SI, at the motor) and why.
-
-    ``moves``: by how much each fitted one is too large where the value is too small by one.
-    """
-
-    value: float
-    reason: str
-    moves: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +29,7 @@ class RecordFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointModel:
+class JointModel(Fit):
     """The inverse dynamic model of all records together.
 
     ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
@@ -61,9 +38,7 @@ class JointModel:
 
     Attributes
     ----------
-    names, values
-        What was fitted. ``fixed`` holds the rest with the reason.
-    standard_errors : array
+    white_errors : array
         As if the residual were white, as published for EMPS.
     covariance : array
         With the correlation of the residual in time, and with the scatter between records where there are
@@ -77,14 +52,10 @@ class JointModel:
     """
 
     form: FrictionForm
-    names: tuple[str, ...]
-    values: FloatArray
-    standard_errors: FloatArray
-    covariance: FloatArray
+    white_errors: FloatArray
     between: Mapping[str, float]
-    fixed: Mapping[str, Fixed]
     relative_residual: float
-    residual: FloatArray
+    residual: FloatArray = field(repr=False)
     records: tuple[RecordFit, ...]
     recipe: Recipe
     condition: float
@@ -93,11 +64,6 @@ class JointModel:
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
-
-    def __getitem__(self, name: str) -> float:
-        if name in self.names:
-            return float(self.values[self.names.index(name)])
-        return self.fixed[name].value
 
     @property
     def rows_in(self) -> int:

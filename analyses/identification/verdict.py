@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,6 +32,21 @@ class Item:
     value: float | None = None
     limit: float | None = None
     reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identified:
+    """The design that an identification comes to, its file, and whether it may be written."""
+
+    design: Design
+    text: str = field(repr=False)
+    items: tuple[Item, ...]
+    accepted: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all(item.passed is not False for item in self.items)
 
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
@@ -166,8 +181,3 @@ def _common(ratios: Mapping[str, float], more: Mapping[float, str]) -> tuple[flo
             product *= ratio
         return product ** (1.0 / len(ratios)), names.pop()
     return None
-
-
-def passed(items: Sequence[Item]) -> bool:
-    """Whether nothing failed."""
-    return all(item.passed is not False for item in items)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError
-from analyses.identification.means import correlation_time
+from analyses.estimation.means import correlation_time
 from analyses.records.record import FloatArray
 
 GRID = 4000

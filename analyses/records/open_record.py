@@ -16,6 +16,8 @@ from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
 from analyses.records.mat5 import MatContent
 from analyses.records.mat_reader import columns_of, load_mat, names_in
+from analyses.records.parquet_reader import parquet_columns
+from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.toml_tables import Table, read_toml
@@ -87,14 +89,10 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     if suffix == ".mat":
         return _spec_of_mat(path)
     if suffix in (".parquet", ".pq"):
-        from analyses.records.parquet_reader import parquet_columns
-
         spec, why = spec_of_names(tuple(parquet_columns(path)))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):
-            from analyses.correlation.voltage_motor import ODRIVE_SPEC
-
             return ODRIVE_SPEC, {}
         columns, layout = _columns_of_csv(head)
         spec, why = spec_of_names(columns, layout)
@@ -112,8 +110,6 @@ def _told(message: str, why: Mapping[str, str]) -> str:
 def _spec_of_mat(path: Path) -> tuple[RecordSpec, Mapping[str, str]]:
     content, _ = load_mat(path)
     if set(content.arrays) >= EMPS_COLUMNS:
-        from analyses.identification.emps import EMPS_SPEC
-
         return EMPS_SPEC, {}
     why: Mapping[str, str] = {}
     for layout in _layouts(content):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from inspect import Parameter, Signature, cleandoc
 from pathlib import Path
+from textwrap import dedent
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -21,6 +23,12 @@ if TYPE_CHECKING:
     from analyses.study import Study
     from reports.document_schema import Section
 
+DesignOption = Annotated[
+    str | None,
+    typer.Option(
+        "--design", metavar="DESIGN", help="Design by name or path (default: what the files name, or emps)."
+    ),
+]
 FolderOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", callback=folder_for_results, help="Write page and JSON there."),
@@ -39,12 +47,16 @@ def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
     def run(design: str | None, changes: list[str] | None, **given: Any) -> None:
-        answer(one, _study(design, changes) if one.study else load_drive(str(design), changes), **given)
+        name = design or (usual(given) if usual else DEFAULT_DESIGN)
+        answer(one, _study(design, changes) if one.study else load_drive(name, changes), **given)
 
+    usual = getattr(one.request, "design_of", None)  # then the design is an option
     needed = any(option.argument for _, option in _options(one).values())  # then a design is, too
     subject: tuple[Any, Any] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
     parameters = [
-        _parameter("design", *((StudyArgument, None) if one.study else subject)),
+        _parameter("design", DesignOption, None)
+        if usual
+        else _parameter("design", *((StudyArgument, None) if one.study else subject)),
         _parameter("changes", VariantOption if one.study else SetOption, None),
         *(
             _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
@@ -53,11 +65,25 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("out", FolderOption, Path(one.out) if one.out else None),
         _parameter("as_json", JsonOption, False),
         _parameter("quiet", QuietOption, False),
+        *([_parameter("example", _example(one), False)] if one.example else []),
     ]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     run.__doc__ = cleandoc(one.words) + (f" In the report: --also {one.name}." if one.also else "")
     return run
+
+
+def _example(one: Analysis) -> Any:
+    """An option that prints a file to start from: what stands in a module's docstring behind ``::``."""
+
+    def show(wanted: bool) -> None:
+        if wanted:
+            text = (import_module(one.example).__doc__ or "").split("::", 1)[1]
+            typer.echo(dedent(text).strip())
+            raise typer.Exit
+
+    words = "Print a file to start from, and stop."
+    return Annotated[bool, typer.Option("--example", is_eager=True, callback=show, help=words)]
 
 
 def answer(

@@ -22,7 +22,7 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
     "Linear loops": (*_declared("Linear loops"), "report", "pdf"),
     "Nonlinear checks": _declared("Nonlinear checks"),
-    "Bench records": ("identify", *_declared("Bench records")),
+    "Bench records": _declared("Bench records"),
     "Out of Python": ("export",),
     "Variants and history": (*_declared("Variants and history"), "nightly"),
 }

@@ -7,8 +7,8 @@ from dataclasses import asdict
 from actuator_lti.tree import Tree
 from analyses.correlation import CorrelationResult, summarise, worst_of
 from analyses.correlation.run import Correlation, Prediction
+from reports.as_json import as_json
 from reports.document_schema import Section
-from reports.identification_json import inputs_json
 from reports.sections import chirp, correlation
 
 KEYS = (
@@ -57,7 +57,7 @@ def _record(result: CorrelationResult) -> Tree:
         "rows": result.counts,
         "limits": result.limits,
         "notes": result.notes,
-        "inputs": inputs_json(result.source, result.used),
+        "inputs": as_json(result.inputs),
         "findings": [asdict(finding) for finding in result.findings],
         "signals": {s.name: {key: getattr(s, key) for key in KEYS} for s in result.signals},
     }

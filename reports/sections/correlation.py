@@ -11,7 +11,7 @@ from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import show
-from reports.sections.identification_inputs import finding_table, result_input_table
+from reports.sections.record_tables import finding_table, input_table
 from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
     blocks = [
         comparison_table(result),
         *figures,
-        result_input_table(result),
+        input_table(f"Inputs: {result.record}", result.inputs),
         finding_table(result.record, result.findings),
         *[doc.remark(note) for note in result.notes],
     ]

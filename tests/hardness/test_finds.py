@@ -13,8 +13,8 @@ from targets import Target, history_file, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
-from analyses.identification.differentiation import filtered_motion
-from analyses.identification.least_squares import solve
+from analyses.estimation.least_squares import solve
+from analyses.records.differentiation import filtered_motion
 
 BY_NAME = {target.name: target for target in targets()}
 

@@ -31,9 +31,9 @@ def test_what_was_identified_is_what_the_studies_draw(
     result = json.loads(capsys.readouterr().out)
     assert not status
     design = load_design(tmp_path / "ilr33-amber-identified.toml")
-    fitted = list(result["parameters"])
+    fitted = result["model"]["names"]
     assert fitted == ["inertia", "viscous", "dry", "offset"]
-    wanted = np.array(result["covariance"])[1:, 1:]
+    wanted = np.array(result["model"]["covariance"])[1:, 1:]
     sampler = sampler_of(design)
     paths = [NAMES[name] for name in fitted[1:]]
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]

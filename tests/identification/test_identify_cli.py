@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from actuator_lti.design import load_design
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
+from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
+from examples.virtual_bench.__main__ import main as bench
 from reports.cli.main import main
 from reports.document import load as load_document
 
@@ -36,12 +35,13 @@ def test_a_campaign_as_json(campaign: Path, capsys: pytest.CaptureFixture[str]) 
     status, out, _ = _run(capsys, "identify", str(campaign), "--json", "--suggest", "2")
     result = json.loads(out)
     assert status == 0
-    assert result["runs_listed"] == result["runs_used"] + len(result["set_aside"]) == 9
-    assert result["set_aside"][0]["id"] == "05"
-    assert result["rows_in"] >= result["rows_out"] > 0
-    low, high = result["coefficients"]["CM"]["interval_95"]
+    found = result["result"]
+    assert found["runs_listed"] == len(found["fit"]["points"]) + len(found["set_aside"]) == 9
+    assert found["set_aside"][0]["id"] == "05"
+    assert found["rows_in"] >= found["rows_out"] > 0
+    low, high = found["fit"]["parameters"]["CM"]["interval_95"]
     assert low < 1.34e-3 < high
-    assert [term["name"] for term in result["contributions"]["terms"]] == ["C0", "Cv", "CM"]
+    assert [term["name"] for term in result["shares"]] == ["C0", "Cv", "CM"]
     assert len(result["suggestion"]["runs"]) == 2
 
 
@@ -75,12 +75,14 @@ def test_the_identified_design_goes_on_into_margins(
 def test_emps_on_the_command_line(
     emps_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status, out, _ = _run(capsys, "identify", "--dynamic", str(emps_file), "--json", "--refine")
+    status, out, _ = _run(capsys, "identify", str(emps_file), "--json", "--refine")
     result = json.loads(out)
     assert status == 0
-    assert round(result["parameters"]["inertia"]["value"], 4) == 95.1089
-    assert result["rows_in"] == 24841
-    assert result["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
+    assert round(result["model"]["parameters"]["inertia"]["value"], 4) == 95.1089
+    assert result["model"]["rows_in"] == 24841
+    assert result["refined"]["parameters"]["motor.rotor_inertia"]["value"] == pytest.approx(
+        95.1089, rel=0.005
+    )
     status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
     signals = json.loads(out)["records"][0]["signals"]
     assert status == 0
@@ -111,17 +113,30 @@ def test_the_chirp_on_the_command_line(
 def test_the_virtual_bench_writes_54_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from analyses import virtual_bench as module
-
     short = BenchPlan(duration_s=2.2)
-    monkeypatch.setattr(module, "BenchPlan", lambda: short)
-    status, out, _ = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "3")
-    assert status == 0
-    assert "54 runs written" in out
+    monkeypatch.setattr("examples.virtual_bench.campaign.BenchPlan", lambda: short)
+    bench([str(tmp_path), "--seed", "3"])
+    assert "54 runs written" in capsys.readouterr().out
     assert len(list(tmp_path.glob("run*_drive.csv"))) == len(list(tmp_path.glob("run*_torque.csv"))) == 54
-    status, _, err = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "4")
-    assert (status, "--force" in err) == (2, True)
     assert "seed 3" in (tmp_path / "campaign.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ((), "--force"),
+        (("--force", "--design", "emps"), "rotary drive"),
+        (("--sweep", "--design", "fin"), "current loop and a coupling"),
+        (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
+    ],
+)
+def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
+    arguments: tuple[str, ...], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "campaign.toml").touch()
+    with pytest.raises(SystemExit, match="2"):
+        bench([str(tmp_path), *arguments])
+    assert reason in capsys.readouterr().err
 
 
 def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,11 +151,10 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("identify",), "give one of"),
+        (("identify",), "Missing argument 'FILE...'"),
         (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
-        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (("identify", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
 )

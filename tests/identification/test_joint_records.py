@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
 from analyses.correlation.voltage_motor import fit_step
-from analyses.identification.least_squares import between_records, correlated_covariance, solve
+from analyses.estimation.least_squares import between_records, correlated_covariance, solve
 from analyses.records import open_record
 from reports.cli.main import main
 from tests.identification.bench_records import columns_of, motion, staircase, write
@@ -46,11 +46,13 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
         capsys, *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
     )
     result = json.loads(out)
-    checks = {check["id"]: check for check in result["checks"]}
+    checks = {check["id"]: check for check in result["items"]}
     assert status == 0
     assert checks["held-out-unseen.csv"]["passed"]
-    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(1.5 * result["relative_residual"] + 0.02)
-    assert {one["record"] for one in result["written_design_against"]} == {
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
+        1.5 * result["model"]["relative_residual"] + 0.02
+    )
+    assert {one["record"] for one in result["resimulated"]} == {
         "a.csv",
         "b.csv",
         "loaded.csv",
@@ -60,11 +62,11 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
-    for path, value in result["refined"].items():
+    for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
-        assert written.parameters[path].value == pytest.approx(value, rel=1e-6)
+        assert written.parameters[path].value == pytest.approx(refined["value"], rel=1e-6)
         assert tolerance is not None
-        assert tolerance.std == pytest.approx(result["refined_standard_errors"][path], rel=1e-5)
+        assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
 def test_a_held_out_record_of_another_drive_fails(
@@ -77,7 +79,7 @@ def test_a_held_out_record_of_another_drive_fails(
     status, out, _ = _run(
         capsys, "identify", files["a"], "--validate", path, "--design", "ilr33-amber", "--json"
     )
-    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+    checks = {check["id"]: check for check in json.loads(out)["items"]}
     assert status == 1
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
@@ -88,8 +90,12 @@ def test_a_value_can_be_held(files: dict[str, str], capsys: pytest.CaptureFixtur
     status, out, _ = _run(capsys, *common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
     result = json.loads(out)
     assert status == 0
-    assert result["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}}
-    assert result["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
+    assert result["model"]["fixed"]["load_coefficient"] == {
+        "value": 1.34e-3,
+        "reason": "fixed as asked",
+        "moves": {},
+    }
+    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
     for wrong, reason in (
         ("friction.load_coefficient", "KEY=VALUE is wanted"),
         ("friction.banana=1", "unknown parameter"),
@@ -107,9 +113,9 @@ def test_one_direction_says_what_it_cannot_tell_apart(
     result = json.loads(out)
     assert status == 0
     told = "cannot be told from dry: the design's value kept; an error of it moves dry by -1 times it"
-    assert result["fixed"]["offset"]["reason"] == told
+    assert result["model"]["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        value, std = (result["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        value, std = (result["model"]["parameters"][name][key] for key in ("value", "standard_error"))
         assert value == pytest.approx(truth, rel=0.03)
         assert abs(value - truth) < 3.0 * std
 
@@ -119,9 +125,9 @@ def test_one_speed_has_errors_that_hold_the_truth(
 ) -> None:
     """Dry and viscous friction are told by the run-up alone: poorly, and their errors say so."""
     _, out, _ = _run(capsys, "identify", files["one speed"], "--design", "ilr33-amber", "--json")
-    result = json.loads(out)["parameters"]
+    result = json.loads(out)["model"]["parameters"]
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error_correlated"]
+        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error"]
 
 
 def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
@@ -172,10 +178,11 @@ def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.Cap
         for k, c in enumerate(true)
     ]  # fmt: skip
     _, out, _ = _run(capsys, "identify", *paths, "--design", "ilr33-amber", "--json")
-    dry = json.loads(out)["parameters"]["dry"]
+    dry = json.loads(out)["model"]["parameters"]["dry"]
     assert dry["value"] == pytest.approx(true.mean(), rel=0.03)
-    assert dry["standard_error_correlated"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
-    assert dry["standard_error"] < 0.3 * dry["standard_error_correlated"]
+    assert dry["standard_error"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
+    white = json.loads(out)["model"]["white_errors"][2]
+    assert white < 0.3 * dry["standard_error"]
 
 
 def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:

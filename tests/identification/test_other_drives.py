@@ -149,9 +149,9 @@ def test_a_drive_is_found_from_its_record(
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
     status = main(["identify", record, "--design", str(tmp_path / "wrong.toml"), "--out", out, "--json"])
     result = json.loads(capsys.readouterr().out)
-    assert not status, [check for check in result["checks"] if check["passed"] is False]
+    assert not status, [check for check in result["items"] if check["passed"] is False]
     for name, near in case.near.items():
-        value, std = (result["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        value, std = (result["model"]["parameters"][name][key] for key in ("value", "standard_error"))
         assert value == pytest.approx(_truth(design, name), rel=near), name
         assert abs(value - _truth(design, name)) < 2.5 * std, name
     errors = {}
@@ -182,7 +182,7 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     out = tmp_path / "o"
     arguments = ["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--out", str(out)]
     assert main([*arguments, "--json"]) == 1
-    checks = {one["id"]: one for one in json.loads(capsys.readouterr().out)["checks"]}
+    checks = {one["id"]: one for one in json.loads(capsys.readouterr().out)["items"]}
     assert f"a clock about {100.0 * (clock - 1.0):+.1g}"[:15] in checks["following-r.csv"]["reason"]
     assert not list(out.glob("*.toml"))
 
@@ -212,7 +212,7 @@ def test_a_fault_on_a_linear_axis_is_named(
     arguments = ["identify", str(tmp_path / "r.csv"), "--design", "ballscrew", "--out", str(tmp_path / "o")]
     assert main([*arguments, "--json"]) == status
     out, err = capsys.readouterr()
-    assert reason in (err if status == 2 else json.dumps(json.loads(out)["checks"]))
+    assert reason in (err if status == 2 else json.dumps(json.loads(out)["items"]))
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
@@ -230,7 +230,7 @@ def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.Ca
     (tmp_path / "d.toml").write_text(write_design(design))
     status = main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--json"])
     failed = [
-        check["reason"] for check in json.loads(capsys.readouterr().out)["checks"] if not check["passed"]
+        check["reason"] for check in json.loads(capsys.readouterr().out)["items"] if not check["passed"]
     ]
     assert status == 1
     assert any("sampled too slowly" in reason for reason in failed)
@@ -293,9 +293,11 @@ def test_signals_at_several_rates(tmp_path: Path, capsys: pytest.CaptureFixture[
     for name in ("r.csv", "r.toml"):
         main(["identify", str(tmp_path / name), "--design", str(tmp_path / "d.toml"), "--json"])
         result = json.loads(capsys.readouterr().out)
-        used[name] = result["records"][0]["rows_in"]
+        used[name] = result["model"]["records"][0]["rows_in"]
         near = 0.01 if name == "r.toml" else 0.05
-        assert result["parameters"]["inertia"]["value"] == pytest.approx(design.inertia_kgm2, rel=near)
+        assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
+            design.inertia_kgm2, rel=near
+        )
     assert used == {"r.csv": 800, "r.toml": 4000}
     main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml")])
     assert 'missing = "interpolate"' in " ".join(capsys.readouterr().out.split())

@@ -122,7 +122,7 @@ def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
     ]
     status = main(arguments)
     result = json.loads(capsys.readouterr().out)
-    assert status in (0, None), [check for check in result["checks"] if check["passed"] is False]
+    assert status in (0, None), [check for check in result["items"] if check["passed"] is False]
     written = tmp_path / "joint-identified.toml"
     gravity = load_design(written).load.gravity
     assert gravity is not None

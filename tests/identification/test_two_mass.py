@@ -212,8 +212,8 @@ def test_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     status = main([*arguments, "--json", "--out", str(tmp_path / "o")])
     result = json.loads(capsys.readouterr().out)
     assert status in (0, None)
-    assert result["values"]["Resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
-    checks = {check["id"]: check for check in result["checks"]}
+    assert result["found"]["parameters"]["resonance"]["value"] == pytest.approx(632.4555, rel=1e-3)
+    checks = {check["id"]: check for check in result["items"]}
     assert checks["written-sweep.csv"]["value"] < 0.05
     written = load_design(next((tmp_path / "o").glob("*.toml")))
     assert written.coupling is not None
@@ -244,13 +244,13 @@ def test_a_two_mass_model_of_something_else_is_refused(
                    "--out", str(tmp_path / "o")])  # fmt: skip
     result = json.loads(capsys.readouterr().out)
     assert status == 1
-    assert result["misfit"] > 3.0
+    assert result["fit"]["misfit"] > 3.0
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
 def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
     result = identify_frequency(_design(), _record(5), fixed={"coupling.damping": 0.02})
-    assert result.fit.fixed["damping"] == 0.02
+    assert result.fit["damping"] == 0.02 == result.fit.fixed["damping"].value
     assert read_design_text(result.text).coupling is not None
     with pytest.raises(InputError, match="can be fixed here"):
         identify_frequency(_design(), _record(5), fixed={"motor.resistance": 1.0})

@@ -22,7 +22,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
-from analyses.virtual_bench_two_mass import TwoMassPlan, reversal_record, sweep_record
+from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 
 TRUTH = {
     "motor_inertia": 2e-5,

@@ -14,13 +14,20 @@ from analyses.identification.campaign import CampaignResult, identify_campaign
 from analyses.identification.contributions import contributions
 from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
-from analyses.identification.to_design import design_with_estimate, surface_estimate
+from analyses.identification.to_design import design_with_fit
 from analyses.records import import_campaign, load_campaign
 from analyses.records.campaign_file import Campaign, Instruments, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
-from analyses.virtual_bench import BenchPlan, TrueRun, simulate_bench
-from analyses.virtual_bench_files import DRIVE_SPEC, SENSOR_SPEC, write_bench
-from analyses.virtual_bench_instruments import BenchInstruments, RunLogs, measure_bench
+from examples.virtual_bench import (
+    BenchInstruments,
+    BenchPlan,
+    RunLogs,
+    TrueRun,
+    measure_bench,
+    simulate_bench,
+    write_bench,
+)
+from examples.virtual_bench.files import DRIVE_SPEC, SENSOR_SPEC
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 INSTRUMENTS = BenchInstruments()
@@ -201,7 +208,7 @@ def test_the_shared_errors_are_in_the_interval(from_files: CampaignResult) -> No
 
 
 def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
-    identified = design_with_estimate(design, surface_estimate(from_files.fit, "a bench"))
+    identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
     back = read_design_text(write_design(identified))
     for k, path in enumerate(PATHS):
         tolerance = back.parameters[path].tolerance

@@ -13,9 +13,7 @@ import pytest
 from actuator_lti.design import load_design, parameter_value
 from actuator_lti.errors import InputError
 from analyses.identification.to_design import inertia_share
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
+from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
 from reports.cli.main import main
 from tests.identification.bench_records import Columns, columns_of, motion, write
 
@@ -72,8 +70,7 @@ def test_a_wrong_record_gives_no_design(
     result = json.loads(out)
     assert status == 1
     assert not result["passed"]
-    assert result["design"] is None
-    assert reason in " ".join(check["reason"] for check in result["checks"])
+    assert reason in " ".join(check["reason"] for check in result["items"])
 
 
 def test_the_right_record_gives_the_drive_that_made_it(
@@ -87,7 +84,7 @@ def test_the_right_record_gives_the_drive_that_made_it(
     assert result.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
     assert result.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
     assert result.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
-    again = json.loads(text)["written_design_against"][0]
+    again = json.loads(text)["resimulated"][0]
     assert again["relative_error"] < 0.03
     status, text, _ = _run(capsys, "correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
     assert status == 0
@@ -129,7 +126,7 @@ def test_every_column_is_accounted_for(
     more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
     record = str(write(tmp_path / "r.csv", more))
     _, out, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--json")
-    inputs = {row["column"]: row["use"] for row in json.loads(out)["records"][0]["inputs"]}
+    inputs = {row["column"]: row["use"] for row in json.loads(out)["inputs"]["r.csv"]}
     assert set(inputs) == set(more)
     assert inputs["current_A"].startswith("drive")
     assert inputs["temperature_C"] == "no: no name that is known"
@@ -247,10 +244,10 @@ def test_a_right_campaign_is_simulated_again_with_what_was_written(
     campaign: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     status, out, _ = _run(capsys, "identify", str(campaign / "campaign.toml"), "--suggest", "0", "--json")
-    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+    checks = {check["id"]: check for check in json.loads(out)["items"]}
     assert status == 0
     assert checks["written-the runs"]["value"] < 0.005
-    inputs = {(row["file"], row["column"]) for row in json.loads(out)["inputs"]}
+    inputs = {(row["file"], row["column"]) for row in json.loads(out)["result"]["inputs"]}
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
 
 
@@ -266,9 +263,12 @@ def test_unloaded_runs_say_what_they_do_not_tell(
     status, out, _ = _run(capsys, "identify", str(folder / "unloaded.toml"), "--json")
     result = json.loads(out)
     assert status == 0
-    assert result["held"] == {"CM": "no run is loaded: the design's value kept"}
-    assert result["coefficients"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
-    assert result["coefficients"]["CM"]["value"] == 1.34e-3
+    fit = result["result"]["fit"]
+    assert {name: one["reason"] for name, one in fit["fixed"].items()} == {
+        "CM": "no run is loaded: the design's value kept"
+    }
+    assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
+    assert fit["parameters"]["CM"]["value"] == 1.34e-3
 
 
 def test_a_coefficient_of_a_campaign_can_be_fixed(
@@ -278,7 +278,7 @@ def test_a_coefficient_of_a_campaign_can_be_fixed(
     status, out, _ = _run(capsys, *arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
     result = json.loads(out)
     assert status == 0
-    assert result["held"] == {"Cv": "fixed as asked"}
+    assert result["result"]["fit"]["fixed"]["Cv"]["reason"] == "fixed as asked"
     assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
     status, _, _ = _run(capsys, *arguments[:3], "--fix", "friction.load_coefficient=0")
     assert status == 1

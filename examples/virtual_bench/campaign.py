@@ -1,8 +1,8 @@
 """A test bench in the computer: the simulator driven through a campaign of constant speeds and clutch loads.
 
 What really happens in each run is simulated once (`simulate_bench`); what the instruments make of it, with
-their noise, their errors and clocks of their own, is drawn for each seed (`virtual_bench_instruments`), and
-written as the files of a real bench (`virtual_bench_files`).
+their noise, their errors and clocks of their own, is drawn for each seed (`instruments`), and written as the
+files of a real bench (`files`).
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.atomic import write_bytes
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.virtual_bench_instruments import BenchInstruments, RunLogs
+from examples.virtual_bench.instruments import BenchInstruments, RunLogs
 
 LOG_TICK_S = 1e-3
 DRIVE_SPEC = RecordSpec(

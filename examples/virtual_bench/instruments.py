@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from analyses.records.campaign_file import Instruments
 from analyses.records.record import Record, RowCounts
-from analyses.virtual_bench import TrueRun
+from examples.virtual_bench.campaign import TrueRun
 
 FloatArray = NDArray[np.float64]
 PAPER_BOUNDS = Instruments(

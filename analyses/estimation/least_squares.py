@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError
-from analyses.identification.means import correlation_time
+from analyses.estimation.fit import Fit
+from analyses.estimation.means import correlation_time
 
 FloatArray = NDArray[np.float64]
 
@@ -182,14 +183,12 @@ def scatter_of_joint(stds: Sequence[float], scatter: float) -> float:
     return float(scatter * np.sqrt(weight @ weight) / weight.sum())
 
 
-def by_record(
-    estimates: Sequence[Mapping[str, tuple[float, float]]], names: Sequence[str]
-) -> dict[str, tuple[float, float]]:
+def by_record(estimates: Sequence[Fit], names: Sequence[str]) -> dict[str, tuple[float, float]]:
     """For each parameter: the scatter between the records that tell it, and of their joint value."""
     out = {}
     for name in names:
-        own = [one[name] for one in estimates if name in one]
-        stds = [s for _, s in own]
-        scatter = between_records([v for v, _ in own], stds)
+        own = [one for one in estimates if name in one]
+        stds = [one.std(name) for one in own]
+        scatter = between_records([one[name] for one in own], stds)
         out[name] = (scatter, scatter_of_joint(stds, scatter) if scatter else 0.0)
     return out

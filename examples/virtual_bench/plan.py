@@ -12,7 +12,7 @@ from actuator_lti.drive.facts import circuit_resistance_ohm, resonance_rad_s
 from actuator_lti.drive.steady import motor_torque_Nm, no_load_speed_rad_s, steady_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
-from analyses.virtual_bench_two_mass import TwoMassPlan
+from examples.virtual_bench.two_mass import TwoMassPlan
 
 LOG_RATE = 20.0
 """Rows of the log in a cycle of the resonance."""
