@@ -80,9 +80,9 @@ class Columns:
         self.absolute, self.relative = np.array(pairs).reshape(-1, 2).T
         self.better = np.array([figure.better for figure in figures])
         self.verdict = np.array([figure.kind == "verdict" for figure in figures], dtype=bool)
-        names = np.array([figure.name for figure in figures])
+        self.names = [figure.name for figure in figures]
         self.order = np.empty(len(figures), dtype=int)
-        self.order[np.argsort(names, kind="stable")] = np.arange(len(figures))
+        self.order[np.argsort(np.array(self.names), kind="stable")] = np.arange(len(figures))
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first.

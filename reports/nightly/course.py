@@ -47,17 +47,15 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
 
     Requirements are always charted; margins and other figures with a better side only where they moved.
     """
-    good = [r for r in past if r.snapshot is not None]
+    good = [r for r in past if r.home is not None]
     if not good:
         return Course()
-    current = history.figures(good[-1].snapshot)
-    chosen = [(number, current[f.name]) for number, f in history.figure_table().items() if f.name in current]
-    values = history.matrix(past, [number for number, _ in chosen])
+    figures = list(history.figures(good[-1]).values())
+    values = history.matrix(past, [figure.name for figure in figures])
     writer = _Writer(night, design, past)
-    writer.course.moved = _moved(past, values, [figure for _, figure in chosen], night.tolerances)
-    order = sorted(range(len(chosen)), key=lambda j: chosen[j][1].kind != "requirement")
-    for column in order:
-        figure = chosen[column][1]
+    writer.course.moved = _moved(past, values, figures, night.tolerances)
+    for column in sorted(range(len(figures)), key=lambda j: figures[j].kind != "requirement"):
+        figure = figures[column]
         if figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure"):
             writer.add(figure, values[:, column])
     return writer.course
@@ -124,7 +122,7 @@ def _moved(
     past: Sequence[Result], values: np.ndarray, figures: Sequence[Figure], tolerances: Tolerances
 ) -> dict[int, int]:
     """How many figures moved beyond their tolerance in each night, against the last night with a result."""
-    rows = [i for i, r in enumerate(past) if r.snapshot is not None]
+    rows = [i for i, r in enumerate(past) if r.home is not None]
     if len(rows) < 2:
         return {}
     size = np.max(np.abs(np.nan_to_num(values)), axis=0)

@@ -75,7 +75,7 @@ def check(site: Path, now: Memory, state: Path) -> None:
         return
     knows = _words(before.nights, before.approvals)
     raise HistoryLost(
-        f"{state / 'history.sqlite'}: {what}, but the site knows of {knows}: "
+        f"{state / 'history.json'}: {what}, but the site knows of {knows}: "
         "regressions cannot be told. Restore the state folder from a copy, or begin anew on purpose "
         "with --accept-lost-history"
     )

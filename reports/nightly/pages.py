@@ -58,7 +58,7 @@ def of_night(night: Overview, history: History, available: set[str]) -> Iterator
 
 def design_page(night: Overview, design: DesignView, history: History, available: set[str]) -> str:
     """Make the page of one design."""
-    past = history.results(name=design.name)
+    past = history.results(design.name)
     course = course_of(night, design, history, past)
     return _render(
         "nightly/design.html",
@@ -75,7 +75,7 @@ def design_page(night: Overview, design: DesignView, history: History, available
 
 def figures_csv(design: DesignView, history: History) -> str:
     """Give every figure of tonight as a table for a spreadsheet."""
-    figures = history.figures(design.result.snapshot)
+    figures = history.figures(design.result)
     rows = ((f.name, f.value, f.unit, f.kind) for f in figures.values())
     return csv_text(("figure", "value", "unit", "kind"), rows)
 
