@@ -130,8 +130,8 @@ def count_events(s, events):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def motion(p, s, io):  # type: ignore[no-untyped-def]
-    """Advance the plant by one tick."""
+def hold(p, s, io):  # type: ignore[no-untyped-def]
+    """What acts on the plant over the tick that begins: the delay line and the load."""
     # the delay line holds u_k and the q + 1 before it, oldest first
     last = layout.S_QUEUE + int(p[layout.DELAY_LINE]) - 1
     for j in range(layout.S_QUEUE, last):
@@ -140,6 +140,12 @@ def motion(p, s, io):  # type: ignore[no-untyped-def]
     if p[layout.RARE_LOAD] > 0.0:
         io[layout.IO_MOMENT] = hinge_moment(p, s, io)
         put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
+
+
+@kernel
+def motion(p, s, io):  # type: ignore[no-untyped-def]
+    """Advance the plant by one tick."""
+    hold(p, s, io)
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:

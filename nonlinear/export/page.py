@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import Limiter

@@ -13,6 +13,7 @@ from nonlinear._kernels import layout as at
 from nonlinear._kernels.control import control_tick
 from nonlinear._kernels.start import derive, init, prepare_sizes, retune
 from nonlinear._kernels.tick import get, set_state, tick
+from nonlinear.export.part_of_tick import part_of_tick
 from nonlinear.export.rows import names_of, parameter_names, words
 
 _ROW: Kind = "row"
@@ -22,6 +23,7 @@ ENTRIES: dict[object, tuple[Kind, ...]] = {
     init: (_ROW, _ROW),
     tick: (_ROW, _ROW, _ROW),
     control_tick: (_ROW, _ROW, _ROW),
+    part_of_tick: (_ROW, _ROW, _ROW, _ROW, "float"),
     retune: (_ROW, _ROW),
     get: (_ROW, _ROW, _ROW),
     set_state: (_ROW, _ROW, _ROW),
@@ -38,6 +40,7 @@ _ABOUT = {
     "init": "State at the first tick, from the start values in p.",
     "tick": "Sense, control and move by one period; returns a status.  Inputs io[DRIVE_IN_...] are held.",
     "control_tick": "The controller alone, on measured current, speed and angle in io; returns the voltage.",
+    "part_of_tick": "The first tau seconds of a tick, on a copy of the state; writes over q, a copy of p.",
     "retune": "Fits the state to parameters changed between two ticks, after `derive`.",
     "get": "Copies the state out, p[DRIVE_STATE_SIZE] numbers.",
     "set_state": "Copies a state in.",

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.compiled.kinds import c_float as c_number
 from actuator_lti.design.access import located, parameter_value, paths_of, stacked
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design

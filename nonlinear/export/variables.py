@@ -68,7 +68,7 @@ def _inputs(design: Design) -> tuple[Variable, ...]:
     )
     return tuple(
         Variable(name=name, reference=COMMAND + n, causality="input", variability="continuous",
-                 description=f"{text}; held over a tick", unit=unit, start=start, low=low)
+                 description=f"{text}; taken at the beginning of each tick", unit=unit, start=start, low=low)
         for n, (name, text, unit, start, low) in enumerate(texts)
     )  # fmt: skip
 

@@ -29,7 +29,7 @@ typedef struct {
 } fmi2CallbackFunctions;
 
 typedef struct {
-    unit_state state;
+    unit_core core;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
     char *name;
@@ -91,7 +91,7 @@ UNIT_EXPORT fmi2Component fmi2Instantiate(
     (void)memcpy(m->name, named, strlen(named));
     m->logger = logger;
     m->environment = environment;
-    unit_reset(&m->state);
+    unit_reset(&m->core);
     return m;
 }
 
@@ -112,39 +112,37 @@ UNIT_EXPORT fmi2Status fmi2SetupExperiment(
     (void)tolerance;
     (void)ends;
     (void)stop;
-    return told(m, unit_set_start(&m->state, start));
+    return told(m, unit_set_start(&m->core, start));
 }
 
 UNIT_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    unit *m = (unit *)c;
+    return told(m, unit_enter_initialization(&m->core));
 }
 
 UNIT_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
     unit *m = (unit *)c;
-    const char *failed = unit_ready(&m->state);
-    m->state.phase = 1;
-    return told(m, failed);
+    return told(m, unit_exit_initialization(&m->core));
 }
 
 UNIT_EXPORT fmi2Status fmi2Terminate(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    unit *m = (unit *)c;
+    return told(m, unit_terminate(&m->core));
 }
 
 UNIT_EXPORT fmi2Status fmi2Reset(fmi2Component c)
 {
-    unit_reset(&((unit *)c)->state);
+    unit_reset(&((unit *)c)->core);
     return fmi2OK;
 }
 
 UNIT_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
 {
     unit *m = (unit *)c;
-    return told(m, unit_get_reals(&m->state, vr, n, value));
+    return told(m, unit_get_reals(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Boolean value[])
@@ -152,7 +150,7 @@ UNIT_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference 
     unit *m = (unit *)c;
     const char *failed = NULL;
     for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
-        failed = unit_get_boolean(&m->state, vr[j], &value[j]);
+        failed = unit_get_boolean(&m->core, vr[j], &value[j]);
     }
     return told(m, failed);
 }
@@ -166,13 +164,13 @@ UNIT_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference 
 
 UNIT_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
 {
-    return told((unit *)c, unit_get_strings(vr, n, value));
+    return told((unit *)c, unit_get_strings(&((unit *)c)->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
 {
     unit *m = (unit *)c;
-    return told(m, unit_set_reals(&m->state, vr, n, value));
+    return told(m, unit_set_reals(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
@@ -198,13 +196,13 @@ UNIT_EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference v
 
 UNIT_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
-    return told((unit *)c, unit_keep(&((unit *)c)->state, state));
+    return told((unit *)c, unit_keep(&((unit *)c)->core.state, state));
 }
 
 UNIT_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
-    ((unit *)c)->state = *(unit_state *)state;
-    return fmi2OK;
+    unit *m = (unit *)c;
+    return told(m, unit_restore(&m->core, state));
 }
 
 UNIT_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
@@ -269,7 +267,7 @@ UNIT_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real step, 
 {
     unit *m = (unit *)c;
     (void)final;
-    return told(m, unit_step(&m->state, now, step));
+    return told(m, unit_step(&m->core, now, step));
 }
 
 UNIT_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) { return say((unit *)c, fmi2Error, "no step is pending"); }
@@ -284,11 +282,11 @@ UNIT_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind,
 
 UNIT_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
-    const unit_state *m = &((unit *)c)->state;
+    const unit_state *m = &((unit *)c)->core.state;
     if (kind != fmi2LastSuccessfulTime) {
         return fmi2Discard;
     }
-    *value = m->start + ((double)m->ticks * m->p[DRIVE_PERIOD]);
+    *value = m->now;
     return fmi2OK;
 }
 
@@ -302,7 +300,7 @@ UNIT_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKin
 
 UNIT_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
-    *value = (((unit *)c)->state.status != DRIVE_OK) ? 1 : 0;
+    *value = (((unit *)c)->core.state.phase == UNIT_FAILED) ? 1 : 0;
     return (kind == fmi2Terminated) ? fmi2OK : fmi2Discard;
 }
 

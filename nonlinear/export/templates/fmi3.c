@@ -19,7 +19,7 @@ typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Stat
 typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment, fmi3Status, fmi3String, fmi3String);
 
 typedef struct {
-    unit_state state;
+    unit_core core;
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
 } unit;
@@ -74,7 +74,7 @@ UNIT_EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     if (m != NULL) {
         m->logger = logger;
         m->environment = environment;
-        unit_reset(&m->state);
+        unit_reset(&m->core);
     }
     return m;
 }
@@ -116,30 +116,29 @@ UNIT_EXPORT fmi3Status fmi3EnterInitializationMode(
     fmi3Instance c, fmi3Boolean tolerant, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean ends, fmi3Float64 stop)
 {
     unit *m = (unit *)c;
+    const char *failed = unit_set_start(&m->core, start);
     (void)tolerant;
     (void)tolerance;
     (void)ends;
     (void)stop;
-    return told(m, unit_set_start(&m->state, start));
+    return told(m, (failed == NULL) ? unit_enter_initialization(&m->core) : failed);
 }
 
 UNIT_EXPORT fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
     unit *m = (unit *)c;
-    const char *failed = unit_ready(&m->state);
-    m->state.phase = 1;
-    return told(m, failed);
+    return told(m, unit_exit_initialization(&m->core));
 }
 
 UNIT_EXPORT fmi3Status fmi3Terminate(fmi3Instance c)
 {
-    (void)c;
-    return fmi3OK;
+    unit *m = (unit *)c;
+    return told(m, unit_terminate(&m->core));
 }
 
 UNIT_EXPORT fmi3Status fmi3Reset(fmi3Instance c)
 {
-    unit_reset(&((unit *)c)->state);
+    unit_reset(&((unit *)c)->core);
     return fmi3OK;
 }
 
@@ -147,14 +146,14 @@ UNIT_EXPORT fmi3Status fmi3GetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t count)
 {
     unit *m = (unit *)c;
-    return told(m, (count < n) ? "fewer values than variables" : unit_get_reals(&m->state, vr, n, value));
+    return told(m, (count < n) ? "fewer values than variables" : unit_get_reals(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi3Status fmi3SetFloat64(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[], size_t count)
 {
     unit *m = (unit *)c;
-    return told(m, (count < n) ? "fewer values than variables" : unit_set_reals(&m->state, vr, n, value));
+    return told(m, (count < n) ? "fewer values than variables" : unit_set_reals(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi3Status fmi3GetBoolean(
@@ -164,7 +163,7 @@ UNIT_EXPORT fmi3Status fmi3GetBoolean(
     const char *failed = (count < n) ? "fewer values than variables" : NULL;
     for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
         int found = 0;
-        failed = unit_get_boolean(&m->state, vr[j], &found);
+        failed = unit_get_boolean(&m->core, vr[j], &found);
         value[j] = (found != 0);
     }
     return told(m, failed);
@@ -173,18 +172,18 @@ UNIT_EXPORT fmi3Status fmi3GetBoolean(
 UNIT_EXPORT fmi3Status fmi3GetString(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3String value[], size_t count)
 {
-    return told((unit *)c, (count < n) ? "fewer values than variables" : unit_get_strings(vr, n, value));
+    return told((unit *)c, (count < n) ? "fewer values than variables" : unit_get_strings(&((unit *)c)->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
-    return told((unit *)c, unit_keep(&((unit *)c)->state, state));
+    return told((unit *)c, unit_keep(&((unit *)c)->core.state, state));
 }
 
 UNIT_EXPORT fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
-    ((unit *)c)->state = *(unit_state *)state;
-    return fmi3OK;
+    unit *m = (unit *)c;
+    return told(m, unit_restore(&m->core, state));
 }
 
 UNIT_EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state)
@@ -223,7 +222,7 @@ UNIT_EXPORT fmi3Status fmi3DoStep(
     fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last)
 {
     unit *m = (unit *)c;
-    const char *failed = unit_step(&m->state, now, step);
+    const char *failed = unit_step(&m->core, now, step);
     (void)final;
     *event = false;
     *terminate = false;

@@ -1,110 +1,161 @@
 /*
- * One drive as a co-simulation unit.  Ticks are counted in whole numbers from the start time, so that
- * communication steps of any length neither drift nor fail.
+ * One drive as a co-simulation unit.  Its ticks lie at start + k Ts, counted in whole numbers, wherever the
+ * host's communication points lie: a tick begins with the inputs that hold at its time, and the outputs are
+ * the drive's at the communication point.
  */
 #include "fmu_core.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const double PART_OF_TICK = 1e-4; /* a communication point this close to a tick is at the tick */
 
-void unit_reset(unit_state *m)
+static const char FAILED[] = "the drive failed: too many events in a tick, or the speed is not finite";
+static const char STRUCTURE[] = "these parameters ask for another structure: export the changed design again";
+
+void unit_reset(unit_core *m)
 {
+    unit_state *o = &m->state;
+
     (void)memset(m, 0, sizeof(*m));
-    drive_load_design(m->p);
+    drive_load_design(o->p);
     for (size_t j = 0U; j < FMU_KEYS; j += 1U) {
-        m->keys[j] = fmu_keys[j].value;
+        o->keys[j] = fmu_keys[j].value;
     }
-    m->inputs[INPUT_SUPPLY] = FMU_SUPPLY_VOLTAGE;
+    o->inputs[INPUT_SUPPLY] = FMU_SUPPLY_VOLTAGE;
+    o->phase = UNIT_INSTANTIATED;
 }
 
-/* Writes the keys into p and derives what follows from them. */
-static int derive(unit_state *m)
+const char *unit_in(const unit_core *m, int phases)
 {
-    if ((m->touched != 0) && (fmu_set_keys(m->keys, m->p) == 0)) {
-        return UNIT_STRUCTURE;
+    if ((m->state.phase & phases) != 0) {
+        return NULL;
     }
-    drive_prepare_sizes(m->p);
-    if (!(m->p[DRIVE_STATE_SIZE] <= (double)(DRIVE_S_LENGTH + UNIT_SPARE)) ||
-        !(m->p[DRIVE_PARAMETER_SIZE] <= (double)(DRIVE_P_LENGTH + FMU_SPARE_P))) {
-        return UNIT_STRUCTURE;
+    switch (m->state.phase) {
+    case UNIT_INSTANTIATED: return "not allowed before the initialization mode";
+    case UNIT_INITIALIZING: return "not allowed in the initialization mode";
+    case UNIT_STEPPING: return "not allowed after the initialization mode";
+    case UNIT_TERMINATED: return "not allowed after termination";
+    default: return "not allowed after the drive has failed";
     }
-    drive_derive(m->p, m->s);
-    m->changed = 0;
-    return UNIT_OK;
 }
 
-static int begin(unit_state *m)
+/* Parameters p that follow from the keys, with their lengths; not yet what is derived from them. */
+static const char *follow(const unit_state *m, const double *keys, double *p)
 {
-    int result;
+    if ((m->touched != 0) && (fmu_set_keys(keys, p) == 0)) {
+        return STRUCTURE;
+    }
+    drive_prepare_sizes(p);
+    if (!(p[DRIVE_STATE_SIZE] <= (double)(DRIVE_S_LENGTH + UNIT_SPARE)) ||
+        !(p[DRIVE_PARAMETER_SIZE] <= (double)(DRIVE_P_LENGTH + FMU_SPARE_P))) {
+        return STRUCTURE;
+    }
+    return NULL;
+}
+
+/* What a host reads, of a state and of the tick that led to it. */
+static void show(unit_state *m, const double *s, const double *io)
+{
+    const double *p = m->p;
+    const int elastic = (p[DRIVE_ELASTIC_DRIVE] > 0.0) ? 1 : 0;
+    double *y = m->outputs;
+
+    y[0] = (elastic != 0) ? s[DRIVE_S_OUTPUT] : (s[DRIVE_S_ANGLE] / p[DRIVE_RATIO]);
+    y[1] = (elastic != 0) ? s[DRIVE_S_OUTPUT_SPEED] : (s[DRIVE_S_SPEED] / p[DRIVE_RATIO]);
+    y[2] = s[DRIVE_S_CURRENT];
+    y[3] = s[DRIVE_S_VOLTAGE];
+    y[4] = (p[DRIVE_TORQUE_CONSTANT] * s[DRIVE_S_CURRENT]) + (p[DRIVE_SOURCE_GAIN] * s[DRIVE_S_HELD]);
+    y[5] = s[DRIVE_S_ANGLE];
+    y[6] = s[DRIVE_S_SPEED];
+    y[7] = s[DRIVE_S_CURRENT_REFERENCE];
+    y[8] = s[DRIVE_S_SPEED_REFERENCE];
+    m->flags = (int32_t)io[DRIVE_IO_FLAGS];
+}
+
+/* The state at the start time. */
+static const char *begin(unit_state *m)
+{
+    const char *failed;
 
     m->p[DRIVE_SPEED_START] = 0.0;
-    result = derive(m);
-    if (result == UNIT_OK) {
+    failed = follow(m, m->keys, m->p);
+    if (failed == NULL) {
+        drive_derive(m->p, m->s);
         m->p[DRIVE_ANGLE_START] = m->initial_angle * m->p[DRIVE_RATIO];
         drive_init(m->p, m->s);
-        m->ticks = 0;
-        m->status = DRIVE_OK;
+        m->changed = 0;
+        show(m, m->s, m->io);
     }
-    return result;
+    return failed;
 }
 
-/* Parameters that were changed between two ticks. */
-static int retune(unit_state *m)
+/* The next tick, with the keys and the inputs that hold now. */
+static void begin_tick(unit_state *m)
 {
-    const int result = derive(m);
-
-    if (result == UNIT_OK) {
+    if (m->changed != 0) { /* they have been found to be allowed when they were set */
+        (void)follow(m, m->keys, m->p);
+        drive_derive(m->p, m->s);
         drive_retune(m->p, m->s);
         if (m->p[DRIVE_OVERLOAD] <= 0.0) {
             m->s[DRIVE_S_CURRENT_LIMIT] = m->p[DRIVE_CURRENT_LIMIT];
         }
+        m->changed = 0;
     }
-    return result;
-}
-
-static void supply(unit_state *m)
-{
+    m->io[DRIVE_IN_COMMAND] = m->inputs[INPUT_COMMAND];
+    m->io[DRIVE_IN_LOAD] = m->inputs[INPUT_MOMENT];
     if (m->p[DRIVE_SUPPLY] > 0.0) {
         m->p[DRIVE_SUPPLY_VOLTAGE] = m->inputs[INPUT_SUPPLY];
     } else {
         m->s[DRIVE_S_VOLTAGE_LIMIT] = m->inputs[INPUT_SUPPLY];
     }
+    m->under_way = 1;
 }
 
-static int advance(unit_state *m, double until)
+/* The tick under way up to tau seconds behind its beginning, to look at; it is run as a whole later. */
+static int look(unit_core *m, double tau)
 {
-    const double ticks = floor(((until - m->start) / m->p[DRIVE_PERIOD]) + PART_OF_TICK);
-    int64_t target;
+    unit_state *o = &m->state;
+    double io[DRIVE_IO_LENGTH];
+    int status;
 
-    if (!(ticks >= 0.0) || !(ticks < 9e15)) {
-        return UNIT_TIME;
-    }
-    target = (int64_t)ticks;
-    if (m->changed != 0) {
-        const int result = retune(m);
-        if (result != UNIT_OK) {
-            return result;
+    (void)memcpy(m->q, o->p, sizeof(m->q));
+    (void)memcpy(m->view, o->s, sizeof(m->view));
+    (void)memcpy(io, o->io, sizeof(io));
+    status = drive_part_of_tick(o->p, m->q, m->view, io, tau);
+    show(o, m->view, io);
+    return status;
+}
+
+static int advance(unit_core *m, double until, int64_t target, double tau)
+{
+    unit_state *o = &m->state;
+    int status = DRIVE_OK;
+
+    while ((o->ticks < target) && (status == DRIVE_OK)) {
+        if (o->under_way == 0) {
+            begin_tick(o);
         }
+        status = drive_tick(o->p, o->s, o->io);
+        o->under_way = 0;
+        o->ticks += 1;
     }
-    m->io[DRIVE_IN_COMMAND] = m->inputs[INPUT_COMMAND];
-    m->io[DRIVE_IN_LOAD] = m->inputs[INPUT_MOMENT];
-    while ((m->ticks < target) && (m->status == DRIVE_OK)) {
-        supply(m);
-        m->status = drive_tick(m->p, m->s, m->io);
-        m->ticks += 1;
+    if ((status == DRIVE_OK) && (tau > 0.0)) {
+        if (o->under_way == 0) {
+            begin_tick(o);
+        }
+        status = look(m, tau);
+    } else {
+        show(o, o->s, o->io);
     }
-    return (m->status == DRIVE_OK) ? UNIT_OK : UNIT_TICK_FAILED;
+    o->now = until;
+    return status;
 }
 
-static int get_real(unit_state *m, unsigned int reference, double *value)
+static int get_real(const unit_state *m, unsigned int reference, double *value)
 {
-    const double *p = m->p;
-    const double *s = m->s;
-    const int elastic = (p[DRIVE_ELASTIC_DRIVE] > 0.0) ? 1 : 0;
-
     if ((reference >= FMU_FIRST_KEY) && (reference < FMU_FIRST_KEY + FMU_KEYS)) {
         *value = m->keys[reference - FMU_FIRST_KEY];
         return 1;
@@ -113,126 +164,211 @@ static int get_real(unit_state *m, unsigned int reference, double *value)
         *value = fmu_constants[reference - FMU_FIRST_CONSTANT];
         return 1;
     }
+    if ((reference >= FIRST_OUTPUT) && (reference < FIRST_OUTPUT + UNIT_OUTPUTS)) {
+        *value = m->outputs[reference - FIRST_OUTPUT];
+        return 1;
+    }
     switch (reference) {
-    case 0U: *value = m->start + ((double)m->ticks * p[DRIVE_PERIOD]); break;
+    case 0U: *value = m->now; break;
     case 1U: *value = m->inputs[INPUT_COMMAND]; break;
     case 2U: *value = m->inputs[INPUT_MOMENT]; break;
     case 3U: *value = m->inputs[INPUT_SUPPLY]; break;
-    case 10U: *value = (elastic != 0) ? s[DRIVE_S_OUTPUT] : (s[DRIVE_S_ANGLE] / p[DRIVE_RATIO]); break;
-    case 11U: *value = (elastic != 0) ? s[DRIVE_S_OUTPUT_SPEED] : (s[DRIVE_S_SPEED] / p[DRIVE_RATIO]); break;
-    case 12U: *value = s[DRIVE_S_CURRENT]; break;
-    case 13U: *value = s[DRIVE_S_VOLTAGE]; break;
-    case 14U:
-        *value = (p[DRIVE_TORQUE_CONSTANT] * s[DRIVE_S_CURRENT]) + (p[DRIVE_SOURCE_GAIN] * s[DRIVE_S_HELD]);
-        break;
-    case 15U: *value = s[DRIVE_S_ANGLE]; break;
-    case 16U: *value = s[DRIVE_S_SPEED]; break;
-    case 17U: *value = s[DRIVE_S_CURRENT_REFERENCE]; break;
-    case 18U: *value = s[DRIVE_S_SPEED_REFERENCE]; break;
     case 90U: *value = m->initial_angle; break;
     default: return 0;
     }
     return 1;
 }
 
-static int set_real(unit_state *m, unsigned int reference, double value)
+const char *unit_set_start(unit_core *m, double start)
 {
-    if (!isfinite(value)) {
-        return 0;
+    const char *failed = unit_in(m, UNIT_INSTANTIATED);
+
+    if ((failed == NULL) && !isfinite(start)) {
+        failed = "the start time is not finite";
     }
-    if ((reference >= FMU_FIRST_KEY) && (reference < FMU_FIRST_KEY + FMU_KEYS)) {
-        const fmu_key *key = &fmu_keys[reference - FMU_FIRST_KEY];
-        if ((value < key->low) || (value > key->high) || ((key->fixed != 0) && (m->phase != 0))) {
-            return 0;
-        }
-        m->keys[reference - FMU_FIRST_KEY] = value;
-        m->changed = 1;
-        m->touched = 1;
-        return 1;
+    if (failed == NULL) {
+        m->state.start = start;
+        m->state.now = start;
     }
-    if ((reference == 90U) && (m->phase == 0)) {
-        m->initial_angle = value;
-        return 1;
-    }
-    if ((reference < 1U) || (reference > UNIT_INPUTS) || ((reference == 3U) && (value < 0.0))) {
-        return 0;
-    }
-    m->inputs[reference - 1U] = value;
-    return 1;
+    return failed;
 }
 
-static const char *message(int result)
+const char *unit_enter_initialization(unit_core *m)
 {
-    switch (result) {
-    case UNIT_TICK_FAILED: return "the drive failed: too many events in a tick, or the speed is not finite";
-    case UNIT_STRUCTURE: return "these parameters ask for another structure: export the changed design again";
-    case UNIT_TIME: return "the communication point lies before the last one, or is not finite";
-    default: return NULL;
+    const char *failed = unit_in(m, UNIT_INSTANTIATED);
+
+    if (failed == NULL) {
+        m->state.phase = UNIT_INITIALIZING;
     }
+    return failed;
 }
 
-const char *unit_set_start(unit_state *m, double start)
+const char *unit_exit_initialization(unit_core *m)
 {
-    if (!isfinite(start)) {
-        return "the start time is not finite";
+    const char *failed = unit_in(m, UNIT_INITIALIZING);
+
+    if (failed == NULL) {
+        failed = begin(&m->state);
     }
-    m->start = start;
+    if (failed == NULL) {
+        m->state.phase = UNIT_STEPPING;
+    }
+    return failed;
+}
+
+const char *unit_terminate(unit_core *m)
+{
+    const char *failed = unit_in(m, UNIT_STEPPING);
+
+    if (failed == NULL) {
+        m->state.phase = UNIT_TERMINATED;
+    }
+    return failed;
+}
+
+const char *unit_step(unit_core *m, double now, double step)
+{
+    unit_state *o = &m->state;
+    const double period = o->p[DRIVE_PERIOD];
+    const double until = now + step;
+    const double ticks = (until - o->start) / period;
+    const double whole = floor(ticks + PART_OF_TICK);
+    const char *failed = unit_in(m, UNIT_STEPPING);
+
+    if (failed != NULL) {
+        return failed;
+    }
+    if (!isfinite(until) || !(step > 0.0) || !(whole < 9e15)) {
+        return "the communication step is not above 0, or not finite";
+    }
+    if (!(fabs(now - o->now) <= (PART_OF_TICK * period) + (4.0 * DBL_EPSILON * fabs(now)))) {
+        return "the communication step does not begin where the last one ended";
+    }
+    if (advance(m, until, (int64_t)whole, (ticks - whole > PART_OF_TICK) ? ((ticks - whole) * period) : 0.0) != DRIVE_OK) {
+        o->phase = UNIT_FAILED;
+        return FAILED;
+    }
     return NULL;
 }
 
-const char *unit_ready(unit_state *m)
+const char *unit_get_reals(unit_core *m, const unsigned int *references, size_t n, double *values)
 {
-    return (m->phase == 0) ? message(begin(m)) : NULL;
-}
+    const char *failed = unit_in(m, ~UNIT_INSTANTIATED);
 
-const char *unit_step(unit_state *m, double now, double step)
-{
-    return (step >= 0.0) ? message(advance(m, now + step)) : "a step that is negative or not a number";
-}
-
-const char *unit_get_reals(unit_state *m, const unsigned int *references, size_t n, double *values)
-{
-    const char *failed = unit_ready(m);
-
+    if ((failed == NULL) && (m->state.phase == UNIT_INITIALIZING)) {
+        failed = begin(&m->state);
+    }
     for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
-        if (get_real(m, references[j], &values[j]) == 0) {
+        if (get_real(&m->state, references[j], &values[j]) == 0) {
             failed = "there is no such real variable";
         }
     }
     return failed;
 }
 
-const char *unit_set_reals(unit_state *m, const unsigned int *references, size_t n, const double *values)
+static int is_key(unsigned int reference)
 {
-    for (size_t j = 0U; j < n; j += 1U) {
-        if (set_real(m, references[j], values[j]) == 0) {
-            return "no such input or parameter, not now, or a value that is not allowed";
-        }
-    }
-    return NULL;
+    return ((reference >= FMU_FIRST_KEY) && (reference < FMU_FIRST_KEY + FMU_KEYS)) ? 1 : 0;
 }
 
-const char *unit_get_boolean(const unit_state *m, unsigned int reference, int *value)
+/* Whether a variable may have this value now. */
+static int allowed(const unit_state *m, unsigned int reference, double value)
+{
+    const int before = ((m->phase & (UNIT_INSTANTIATED | UNIT_INITIALIZING)) != 0) ? 1 : 0;
+
+    if (!isfinite(value)) {
+        return 0;
+    }
+    if (is_key(reference) != 0) {
+        const fmu_key *key = &fmu_keys[reference - FMU_FIRST_KEY];
+        return ((value >= key->low) && (value <= key->high) && ((key->fixed == 0) || (before != 0))) ? 1 : 0;
+    }
+    if (reference == 90U) {
+        return before;
+    }
+    return ((reference >= 1U) && (reference <= UNIT_INPUTS) && ((reference != 3U) || (value >= 0.0))) ? 1 : 0;
+}
+
+/* The keys as they would be are tried in the work space; none of them is changed. */
+static const char *tried(unit_core *m, const unsigned int *references, size_t n, const double *values)
+{
+    unit_state *o = &m->state;
+    const int32_t touched = o->touched;
+    const char *failed;
+
+    (void)memcpy(m->keys, o->keys, sizeof(m->keys));
+    (void)memcpy(m->q, o->p, sizeof(m->q));
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (is_key(references[j]) != 0) {
+            m->keys[references[j] - FMU_FIRST_KEY] = values[j];
+            o->touched = 1;
+        }
+    }
+    failed = follow(o, m->keys, m->q);
+    o->touched = touched;
+    return failed;
+}
+
+static void set_real(unit_state *m, unsigned int reference, double value)
+{
+    if (is_key(reference) != 0) {
+        m->keys[reference - FMU_FIRST_KEY] = value;
+        m->changed = 1;
+        m->touched = 1;
+    } else if (reference == 90U) {
+        m->initial_angle = value;
+    } else {
+        m->inputs[reference - 1U] = value;
+    }
+}
+
+const char *unit_set_reals(unit_core *m, const unsigned int *references, size_t n, const double *values)
+{
+    const char *failed = unit_in(m, UNIT_INSTANTIATED | UNIT_INITIALIZING | UNIT_STEPPING);
+    int keys = 0;
+
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
+        if (allowed(&m->state, references[j], values[j]) == 0) {
+            failed = "no such input or parameter, not now, or a value that is not allowed";
+        }
+        keys |= is_key(references[j]);
+    }
+    if ((failed == NULL) && (keys != 0) && (m->state.phase == UNIT_STEPPING)) {
+        failed = tried(m, references, n, values);
+    }
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
+        set_real(&m->state, references[j], values[j]);
+    }
+    return failed;
+}
+
+const char *unit_get_boolean(unit_core *m, unsigned int reference, int *value)
 {
     static const int bits[] = {@BITS@};
     const unsigned int count = (unsigned int)(sizeof(bits) / sizeof(bits[0]));
+    const char *failed = unit_in(m, ~UNIT_INSTANTIATED);
 
-    if ((reference < 30U) || (reference >= 30U + count)) {
-        return "there is no such Boolean variable";
+    if ((failed == NULL) && ((reference < 30U) || (reference >= 30U + count))) {
+        failed = "there is no such Boolean variable";
     }
-    *value = (((int)m->io[DRIVE_IO_FLAGS] & bits[reference - 30U]) != 0) ? 1 : 0;
-    return NULL;
+    if (failed == NULL) {
+        *value = ((m->state.flags & bits[reference - 30U]) != 0) ? 1 : 0;
+    }
+    return failed;
 }
 
-const char *unit_get_strings(const unsigned int *references, size_t n, const char **values)
+const char *unit_get_strings(const unit_core *m, const unsigned int *references, size_t n, const char **values)
 {
-    for (size_t j = 0U; j < n; j += 1U) {
+    const char *failed = unit_in(m, ~UNIT_INSTANTIATED);
+
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
         if ((references[j] < FMU_FIRST_TEXT) || (references[j] >= FMU_FIRST_TEXT + FMU_TEXTS)) {
-            return "there is no such string variable";
+            failed = "there is no such string variable";
+        } else {
+            values[j] = fmu_texts[references[j] - FMU_FIRST_TEXT];
         }
-        values[j] = fmu_texts[references[j] - FMU_FIRST_TEXT];
     }
-    return NULL;
+    return failed;
 }
 
 const char *unit_keep(const unit_state *m, void **kept)
@@ -244,6 +380,15 @@ const char *unit_keep(const unit_state *m, void **kept)
         return "no memory";
     }
     (void)memcpy(*kept, m, sizeof(unit_state));
+    return NULL;
+}
+
+const char *unit_restore(unit_core *m, const void *kept)
+{
+    if (kept == NULL) {
+        return "there is no state to go back to";
+    }
+    (void)memcpy(&m->state, kept, sizeof(unit_state));
     return NULL;
 }
 

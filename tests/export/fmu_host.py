@@ -1,0 +1,103 @@
+"""A host for the units under test: FMPy's instance, kept in steps of any length."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from ctypes import CFUNCTYPE, c_char_p, c_int, c_void_p, cast
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
+
+
+@dataclass
+class Host:
+    """A unit of either version with its variables by name, and what it has logged."""
+
+    unit: Any
+    references: dict[str, int]
+    said: list[str] = field(default_factory=list)
+
+    def get(self, *names: str) -> list[float]:
+        """Values of real variables."""
+        return list(self._call("get", "Real", "Float64", names))
+
+    def set(self, **values: float) -> None:
+        """Set real variables, all in one call."""
+        self.put(values)
+
+    def put(self, values: dict[str, float], kind: str = "Real") -> None:
+        """Set variables of one type by their dotted names, all in one call."""
+        new = {"Real": "Float64", "Integer": "Int32"}[kind]
+        self._call("set", kind, new, list(values), list(values.values()))
+
+    def _call(self, verb: str, old: str, new: str, names: Sequence[str], *more: Any) -> Any:
+        known = getattr(self.unit, verb + (old if isinstance(self.unit, fmi2.FMU2Slave) else new))
+        return known([self.references[name] for name in names], *more)
+
+    def start(self, **values: float) -> Host:
+        """Go through the initialization."""
+        if isinstance(self.unit, fmi2.FMU2Slave):
+            self.unit.setupExperiment()
+        self.unit.enterInitializationMode()
+        self.put(values)
+        self.unit.exitInitializationMode()
+        return self
+
+    def step(self, now: float, step: float) -> None:
+        """One communication step."""
+        self.unit.doStep(now, step)
+
+    def run(
+        self, step: float, stop: float, names: Sequence[str], inputs: Callable[[float], dict[str, float]]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Communication points and what is read there, inputs set at the beginning of each step."""
+        times = np.arange(1, int(stop / step) + 1) * step
+        rows = []
+        for n in range(times.size):
+            self.put(inputs(n * step))
+            self.step(n * step, step)
+            rows.append(self.get(*names))
+        return times, np.array(rows)
+
+
+@contextmanager
+def hosted(path: Path, count: int = 1) -> Iterator[tuple[Host, ...]]:
+    """Instances of one unit, each instantiated only."""
+    description = fmpy.read_model_description(str(path))
+    folder = fmpy.extract(str(path))
+    hosts = tuple(_instance(description, folder, f"unit{n}") for n in range(count))
+    try:
+        yield hosts
+    finally:
+        for host in hosts:
+            host.unit.freeInstance()
+        shutil.rmtree(folder)
+
+
+# the text of a message comes behind its format, "%s"
+_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
+
+
+def _instance(description: Any, folder: str, name: str) -> Host:
+    said: list[str] = []
+    about = {"guid": description.guid, "unzipDirectory": folder, "modelIdentifier": "drive"}
+    unit: Any
+    if description.fmiVersion == "2.0":
+        unit = fmi2.FMU2Slave(instanceName=name, **about)
+        callbacks = fmi2.fmi2CallbackFunctions()
+        logger = _LOGGER(lambda *a: said.append(f"{a[3].decode()}: {a[5].decode()}"))
+        callbacks.logger = cast(logger, fmi2.fmi2CallbackLoggerTYPE)
+        unit.kept = logger  # ctypes keeps no reference
+        unit.instantiate(callbacks=callbacks)
+    else:
+        unit = fmi3.FMU3Slave(instanceName=name, **about)
+        unit.instantiate(logMessage=lambda *a: said.append(f"{a[2].decode()}: {a[3].decode()}"))
+    return Host(unit, {item.name: item.valueReference for item in description.modelVariables}, said)
