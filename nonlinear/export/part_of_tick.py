@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_lti.compiled import kernel
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.motion import closely, count_events, hold, quick
 from nonlinear._kernels.start import derive

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fmu_host import hosted
-from nonlinear.export.build import system_compiler
+from actuator_lti.compiled.compiler import system_compiler
 from random_drives import random_drive, random_elastic_drive
 from scipy.optimize import brentq
 
