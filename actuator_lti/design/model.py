@@ -65,6 +65,7 @@ from actuator_lti.design.plant import (
     STANDARD_GRAVITY_m_s2,
     Temperature,
 )
+from actuator_lti.faces import draw
 
 __all__ = [
     "FILTER_KEYS",
@@ -212,9 +213,7 @@ class Design:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from actuator_lti.notebook import design_html
-
-        return design_html(self)
+        return draw("design_html", self)
 
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""

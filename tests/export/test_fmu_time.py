@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 import pytest
 from fmu_host import hosted
-from actuator_lti.compiled.compiler import system_compiler
 from random_drives import random_drive, random_elastic_drive
 from scipy.optimize import brentq
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
 from nonlinear.export import fmu_bytes
