@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from actuator_lti.design.model import ControllerObject, ControllerObjects, ObjectFamily
 from actuator_lti.design.object_dictionary import OBJECTS
-from actuator_lti.design.settings_checks import checked_objects
+from actuator_lti.design.objects import checked_objects
 from actuator_lti.design.settings_xml import read_settings_xml
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, parse_toml, read_bytes, shown
