@@ -88,9 +88,9 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
         if current is None or round(current / step) != item.value:
             changes.update(dict.fromkeys(known.paths, item.value * step))
     design = with_values(base, changes, check=False) if changes else base
-    source = {"source": f"controller settings {where}", "grade": "B"}
-    named = {path: replace(design.parameters[path], **source) for path in changes}
-    design = replace(design, objects=objects, parameters=FrozenMap({**design.parameters, **named}))
+    source, old = f"controller settings {where}", design.parameters
+    named = {path: replace(old[path], source=source, grade="B") for path in changes}
+    design = replace(design, objects=objects, parameters=FrozenMap({**old, **named}))
     check_design(design, where)
     notes = _import_notes(given, objects.velocity_gain_factor, design)
     return Imported(design=design, changed=tuple(changes), kept=tuple(kept), notes=notes)
