@@ -26,6 +26,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
+from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
@@ -103,7 +104,7 @@ def _bare(field: Field, value: Any, part: Any, structure: Structure) -> Any:
     if isinstance(value, tuple):
         return [_bare(field, item, part, structure) for item in value]
     unit = part.unit if field.kind == "limit" else field.unit(structure)
-    return value if isinstance(value, str | bool) or unit == "1" else f"{value!r} {unit}"
+    return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)
 
 
 def _written(text: str) -> str | int | float:
@@ -135,8 +136,8 @@ def _tolerance(tolerance: Tolerance, unit: str) -> Any:
     return {"kind": tolerance.kind, "std": text, **{key: _si(value, unit) for key, value in bounds.items()}}
 
 
-def _si(value: float | None, unit: str) -> Any:
-    return value if unit == "1" else f"{value!r} {unit}"
+def _si(value: Any, unit: str) -> Any:
+    return value if unit == "1" else si_text(value, unit)
 
 
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
@@ -190,7 +191,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
-        result[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+        result[path] = si_text(float(value), unit) if plain and unit != "1" else value
     return result
 
 
