@@ -42,6 +42,9 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
     InputError
         If there is no such key, or the design has no such stage.
     """
+    if not isinstance(design, Design) or not isinstance(path, str):
+        given = f"design = {shown(design)}, key = {shown(path)}"
+        raise InputError(f"{given}: allowed: a Design (load_design) and a dotted key")
     field = field_of(path)
     if field is None or field.kind not in ("quantity", "integer"):
         hint = nearest(path, paths_of(design))

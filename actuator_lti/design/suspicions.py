@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from math import isfinite, pi
 
 from actuator_lti.design.checks_elastic import elastic_warnings
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 
 _BARE_AMPERE = re.compile(r"[0-9 /](?:[kmuµ]?A)\b(?![ _]?(?:rms|eff|peak|pk|dc)\b)", re.IGNORECASE)
@@ -22,6 +23,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     >>> warnings_of(load_design("ilr33-amber"))
     ()
     """
+    design = as_design(design)
     result: list[str] = []
     checks = (
         _sampling,

@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import Any
 
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
-from actuator_lti.design.loader import design_from_tree
+from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.model import (
     Controller,
     ControllerObjects,
@@ -52,7 +52,7 @@ def write_design(design: Design) -> str:
     """
     import tomli_w
 
-    return tomli_w.dumps(design_tree(design))
+    return tomli_w.dumps(design_tree(as_design(design)))
 
 
 def design_tree(design: Design) -> Tree:
@@ -185,6 +185,8 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
 
 def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
+    if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
+        raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
     structure = Structure.of(design)
     result: Tree = {}
     for path, value in values.items():
@@ -234,6 +236,7 @@ def design_hash(design: Design) -> str:
 
     It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
     """
+    design = as_design(design)
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}
