@@ -20,6 +20,7 @@ from markupsafe import Markup
 from actuator_lti.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
+from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
 from reports.scripts import asset, bundled
 from reports.verdict_summary import role, verdict_lines, why
@@ -111,7 +112,14 @@ def environment() -> Environment:
     )
     made.filters["show"] = show
     made.filters["show_signed"] = show_signed
+    made.globals["term"] = _term
     return made
+
+
+def _term(heading: str) -> Markup:
+    """The attribute by which a heading says its line of the glossary; nothing for a word that has none."""
+    line = meaning(heading)
+    return Markup(' title="{}"').format(line) if line else Markup("")
 
 
 def _seen(value: Any) -> Any:

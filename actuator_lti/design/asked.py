@@ -40,13 +40,13 @@ class Failure:
         "detection_time", "s", "", "from a failure to its detection; default 0.1 s", high=1e4,
         example="50 ms")] = None
     load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "moment that pushes the output forward; default none",
+        "load", "{torque}", "", "load torque that pushes the output forward; default none",
         example="4 N*m")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DutyCycle:
-    """The duty that the drive has to do for ever; ``None`` is what `analyses.duty.Asked` takes for it."""
+    """The duty within the continuous rating; ``None`` is what `analyses.duty.Asked` takes for it."""
 
     amplitude_rad: Annotated[float | None, positive(
         "amplitude", "{angle}", "", "peak of the sine, output side; default half the full deflection",
@@ -54,7 +54,7 @@ class DutyCycle:
     frequency_rad_s: Annotated[float | None, positive(
         "frequency", "rad/s", "", "of the sine; default 1 Hz", example="0.5 Hz")] = None
     load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "moment at the output, all the time; default the largest of validation.loads",
+        "load", "{torque}", "", "load torque, all the time; default the largest of validation.loads",
         example="4 N*m")] = None
     share: Annotated[float | None, positive(
         "share", "1", "", "share of the time in motion; default 1", high=1.0, example="0.4")] = None
@@ -77,7 +77,7 @@ class Validation:
         "amplitude_fractions", "1", "amplitudes as fractions of the full deflection", low=1e-09,
         high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
     loads_Nm: Annotated[tuple[float, ...], quantities(
-        "loads", "{torque}", "load moments to look at", low=-BIG, high=BIG)] = (0.0,)
+        "loads", "{torque}", "load torques to look at", low=-BIG, high=BIG)] = (0.0,)
 
 
 @dataclass(frozen=True, kw_only=True)

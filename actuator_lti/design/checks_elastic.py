@@ -51,7 +51,7 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     if design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
         free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
         if free:
-            yield "coupling.damping: 0, and no load.friction: with the motor at rest the load rings for ever"
+            yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
     least = 1.0 / design.total_ratio
     loaded = design.load.moment_max_Nm > 0.0
     rigid = design.coupling is None and design.load.path == "self-locking"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -129,14 +130,10 @@ def quantity(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field
     return Field(path=key, kind="quantity", unit_template=unit, symbol=symbol, description=words, **settings)
 
 
-def positive(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
-    """A number above 0."""
-    return quantity(key, unit, symbol, words, **{"low": SMALL, **more})
-
-
-def not_negative(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
-    """A number of at least 0."""
-    return quantity(key, unit, symbol, words, **{"low": 0.0, **more})
+positive = partial(quantity, low=SMALL)
+"""A number above 0."""
+not_negative = partial(quantity, low=0.0)
+"""A number of at least 0."""
 
 
 def degrees(key: str, words: str, example: str) -> Field:
@@ -164,21 +161,12 @@ def flag(key: str, words: str) -> Field:
     return Field(path=key, kind="flag", description=words)
 
 
-def text(words: str) -> Field:
-    """Any text; the key is the attribute's name."""
-    return Field(path="", kind="text", description=words)
+def _named(kind: Kind, words: str) -> Field:
+    """A value whose key is the attribute's name."""
+    return Field(path="", kind=kind, description=words)
 
 
-def label(words: str) -> Field:
-    """A text that is not empty."""
-    return Field(path="", kind="label", description=words)
-
-
-def day(words: str) -> Field:
-    """A date."""
-    return Field(path="", kind="day", description=words)
-
-
-def limit(words: str) -> Field:
-    """A limit of a requirement, in the unit of its quantity."""
-    return Field(path="", kind="limit", description=words)
+text, label = partial(_named, "text"), partial(_named, "label")
+"""Any text; one that is not empty."""
+day, limit = partial(_named, "day"), partial(_named, "limit")
+"""A date; a limit of a requirement, in the unit of its quantity."""

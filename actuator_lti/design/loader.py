@@ -40,7 +40,7 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     >>> load_design("ilr33-amber").total_ratio
     2376.0
     """
-    name = fspath(name_or_path)
+    name = _name_of(name_or_path)
     if name in shipped_designs():
         return _shipped(name)
     return read_design_text(design_text(name), shown(name, 200)[1:-1])
@@ -54,13 +54,16 @@ def as_design(design: Design | str | PathLike[str]) -> Design:
     InputError
         As :func:`load_design`, and for anything else that is no design.
     """
-    if isinstance(design, Design):
-        return design
-    if isinstance(design, str | PathLike):
-        return load_design(design)
-    raise InputError(
-        f"design = {shown(design)}: allowed: a Design, a shipped name, or the path of a design file"
-    )
+    return design if isinstance(design, Design) else load_design(design)
+
+
+def _name_of(given: object) -> str:
+    """A name or path as text."""
+    name = fspath(given) if isinstance(given, str | PathLike) else None
+    if not isinstance(name, str):
+        allowed = "allowed: a Design, a shipped name, or the path of a design file"
+        raise InputError(f"design = {shown(given)}: {allowed}")
+    return name
 
 
 def design_text(name_or_path: str | PathLike[str]) -> str:
@@ -71,7 +74,7 @@ def design_text(name_or_path: str | PathLike[str]) -> str:
     InputError
         If there is no such design, or the file is too large or not UTF-8.
     """
-    name = fspath(name_or_path)
+    name = _name_of(name_or_path)
     if name in shipped_designs():
         return shipped_path(name).read_text(encoding="utf-8")
     path = Path(name)
@@ -102,6 +105,8 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     InputError
         As :func:`load_design`.
     """
+    if not isinstance(text, str):
+        raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
     tree = parse_toml(text, origin)
     if not tree:
         raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)

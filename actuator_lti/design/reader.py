@@ -21,7 +21,7 @@ from actuator_lti.design.quantities import QUANTITIES, parse_limit
 from actuator_lti.design.sections import RECORDS, Section, children
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import parse_quantity
+from actuator_lti.design.units import parse_quantity, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
@@ -150,7 +150,7 @@ class Reader:
         unit = field.unit(self.structure)
         self.parameters[path] = model.Parameter(
             path=path,
-            text=_written(table["value"], unit),
+            text=raw if isinstance(raw := table["value"], str) else si_text(raw, unit),
             value=value,
             unit=unit,
             symbol=field.symbol,
@@ -344,11 +344,6 @@ def _example(field: Field | None) -> str:
         return ""
     example = f'example: {field.key} = "{field.example}" ({field.description})'
     return f"; {example if field.example else f'it is the {field.description}'}"
-
-
-def _written(value: object, unit: str) -> str:
-    """A value as text."""
-    return value if isinstance(value, str) else f"{value!r}" + ("" if unit == "1" else f" {unit}")
 
 
 def _turned(path: str, text: Any, unit: str) -> float | None:

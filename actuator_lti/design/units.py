@@ -14,8 +14,9 @@ from decimal import Decimal
 from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
-from math import isfinite, nan, pi
+from math import isfinite, pi
 
+from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
@@ -65,40 +66,14 @@ _DERIVED = {
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "count cpr": ("1", "1"),
 }
-_WORD = 4  # letters from which a name may stand in the plural: "volts", but "Nms" and "As" are no units
+_WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
 _TOKEN = re.compile(
     r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))"
 )
-_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
-_THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
-_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
-_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'}) | {
-    ord(raised): f"^{digit}" for raised, digit in zip("²³", "23", strict=True)
-}
-# How data sheets write what is not a product of names: each becomes one, in this order.
-_SPELLINGS = (
-    (re.compile(r"\*\*"), "^"),
-    (re.compile(r"°C"), " degC"),
-    (re.compile(r"°"), " deg"),
-    (re.compile(r"%"), " percent"),
-    (re.compile(r"''|\""), " arcsec"),
-    (re.compile(r"'"), " arcmin"),
-    (re.compile(r"(?<=[AV]) ?_?(?:DC|dc)\b"), ""),  # of the motor that the model has: direct
-    (re.compile(r"(?<=[A-Za-z])\^?-([123])\b"), r"^-\1"),  # min-1
-    (re.compile(r"(?<=[A-Za-z])([23])(?![0-9])"), r"^\1"),  # cm2
-    (re.compile(r"(?<=[A-Za-z23])-(?=[A-Za-z])"), "*"),  # oz-in
-    (re.compile(r"\b(?:r|U|tr|rev)/min\b"), "rpm"),
-    (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
-    (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2
-)
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
-_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*[x×·*]\s*10\s*\^?\s*([+-]?[0-9]{1,3})\b")
-_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
-_MAX_TEXT = 120
 
 Dimension = tuple[tuple[str, int], ...]
 Exact = tuple[Fraction, Counter[str]]  # a factor to SI, and exponents
@@ -123,16 +98,9 @@ class UnitValue:
         return tuple(item for item in self.dimension if item[0] != "[angle]")
 
 
-def _tidy(unit: str) -> str:
-    text = unit.strip().translate(_SIGNS)
-    for spelling, product in _SPELLINGS:
-        text = spelling.sub(product, text)
-    return text.rstrip()
-
-
 def _tokens(unit: str) -> deque[str]:
     """Names, powers, signs and parentheses, with a sign between two factors."""
-    text, position = _tidy(unit), 0
+    text, position = tidy(unit), 0
     found: deque[str] = deque()
     while position < len(text):
         match = _TOKEN.match(text, position)
@@ -220,7 +188,7 @@ def parse_unit(unit: str) -> UnitValue:
     ValueError
         If it is no unit, with the nearest known one where there is one.
     """
-    if len(unit) > _MAX_TEXT:
+    if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
     if unit.strip() in ("", "1"):
         return UnitValue(1.0, ())
@@ -303,29 +271,6 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     return ""
 
 
-def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit of a written quantity; ``43:1`` and ``343/8`` are numbers without one."""
-    if over := _OVER.match(text) if len(text) <= _MAX_TEXT else None:
-        above, below = float(over[1]), float(over[3])
-        if over[2] == ":" and above < below:
-            raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
-        return above / below if below else nan, ""
-    text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
-    match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
-    if match is None:
-        raise ValueError("a number and a unit are wanted")
-    if _THOUSANDS.match(text):
-        raise ValueError(
-            f"a comma; write {shown(text.replace(',', '', 1))} or {shown(text.replace(',', '.', 1))}"
-        )
-    if _COMMA.match(text):
-        raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
-    number = float(match.group(1))
-    if not isfinite(number):
-        raise ValueError("must be finite")
-    return number, match.group(2).strip()
-
-
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:
     """Whether a unit may stand for another; a radian in the denominator may be left out."""
     if value.dimension == wanted.dimension:
@@ -344,8 +289,8 @@ def _as_meant(written: str, wanted: UnitValue) -> UnitValue:
         turns = -value.minutes
         dimension = tuple(sorted((*value.dimension, ("[angle]", turns))))
         value = UnitValue(value.factor * (2.0 * pi) ** turns, dimension)
-    if not compatible(value, wanted) and _WEIGHTS.search(_tidy(written)):
-        force = parse_unit(_WEIGHTS.sub(r"\1\2f", _tidy(written)))
+    if not compatible(value, wanted) and _WEIGHTS.search(tidy(written)):
+        force = parse_unit(_WEIGHTS.sub(r"\1\2f", tidy(written)))
         return force if compatible(force, wanted) else value
     return value
 
@@ -394,6 +339,17 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")
     return value
+
+
+def si_text(value: float, unit: str) -> str:
+    """A value in its own SI unit as text.
+
+    Examples
+    --------
+    >>> si_text(0.06, "ohm"), si_text(66.0, "1")
+    ('0.06 ohm', '66.0')
+    """
+    return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
 def convert(value: float, unit: str, to: str) -> float:

@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import Any
 
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
-from actuator_lti.design.loader import design_from_tree
+from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.model import (
     Controller,
     ControllerObjects,
@@ -26,6 +26,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
+from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
@@ -51,7 +52,7 @@ def write_design(design: Design) -> str:
     """
     import tomli_w
 
-    return tomli_w.dumps(design_tree(design))
+    return tomli_w.dumps(design_tree(as_design(design)))
 
 
 def design_tree(design: Design) -> Tree:
@@ -103,7 +104,7 @@ def _bare(field: Field, value: Any, part: Any, structure: Structure) -> Any:
     if isinstance(value, tuple):
         return [_bare(field, item, part, structure) for item in value]
     unit = part.unit if field.kind == "limit" else field.unit(structure)
-    return value if isinstance(value, str | bool) or unit == "1" else f"{value!r} {unit}"
+    return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)
 
 
 def _written(text: str) -> str | int | float:
@@ -135,8 +136,8 @@ def _tolerance(tolerance: Tolerance, unit: str) -> Any:
     return {"kind": tolerance.kind, "std": text, **{key: _si(value, unit) for key, value in bounds.items()}}
 
 
-def _si(value: float | None, unit: str) -> Any:
-    return value if unit == "1" else f"{value!r} {unit}"
+def _si(value: Any, unit: str) -> Any:
+    return value if unit == "1" else si_text(value, unit)
 
 
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
@@ -184,13 +185,15 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
 
 def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
+    if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
+        raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
     structure = Structure.of(design)
     result: Tree = {}
     for path, value in values.items():
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
-        result[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+        result[path] = si_text(float(value), unit) if plain and unit != "1" else value
     return result
 
 
@@ -233,6 +236,7 @@ def design_hash(design: Design) -> str:
 
     It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
     """
+    design = as_design(design)
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -80,9 +81,13 @@ def command_quantity(option: str, words: str | None, drive: Design) -> float | N
         return None
     unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
     try:
-        return float(words)
+        value = float(words)
     except ValueError:
         pass
+    else:
+        if not isfinite(value):
+            raise InputError(f"{option} {words}: must be a finite number")
+        return value
     try:
         return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
     except InputError as error:

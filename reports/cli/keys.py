@@ -47,7 +47,7 @@ def keys(
     if not result:
         raise InputError(f"{match!r}: no key has it in its name or meaning; allowed: see actuator-lti keys")
     if as_json:
-        print_json({"schema": "actuator-lti/keys", "version": 1, "keys": [key.as_dict() for key in result]})
+        print_json({"schema": "actuator-lti/keys", "version": 1, "keys": [asdict(key) for key in result]})
         return
     out = console()
     section = ""
