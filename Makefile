@@ -121,13 +121,16 @@ lock: $(RELEASE)
 	$(COMPILE) $(EXTRAS) --all-build-deps --output-file $(VENV)/all.lock pyproject.toml
 	awk '/^[^ ]/ {new = !($$1 in core)} NR == FNR {core[$$1]; next} new' requirements.lock $(VENV)/all.lock > requirements-all.lock
 
-# Wheel, sources and the bill of materials of what they need to run.
+# A wheel for each kind of machine with the compiled simulator inside, sources, and the bill of materials of what
+# they need to run.
 release: $(RELEASE)
 	rm -rf dist && mkdir dist
 	$(COMPILE) --output-file dist/runtime.lock pyproject.toml
 	$(BIN)/cyclonedx-py requirements --output-reproducible --pyproject pyproject.toml \
 	  --output-file dist/actuator-lti.cdx.json dist/runtime.lock
-	$(BIN)/python -m build --no-isolation --outdir dist
+	$(BIN)/python -m build --sdist --no-isolation --outdir dist
+	set -e; for target in $$($(BIN)/python -m actuator_lti.compiled.compiler); do \
+	  ACTUATOR_LTI_TARGET=$$target $(BIN)/python -m build --wheel --no-isolation --outdir dist; done
 
 wasm: $(ALL)
 	$(BIN)/python -m nonlinear.export.wasm_module

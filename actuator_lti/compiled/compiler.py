@@ -134,3 +134,7 @@ def compile_files(
             raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
         data = (folder / output).read_bytes()
     return without_time(data) if output.endswith(".dll") else data
+
+
+if __name__ == "__main__":  # for the makefile
+    sys.stdout.write(" ".join(TARGETS))
