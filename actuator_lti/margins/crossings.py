@@ -20,8 +20,8 @@ def gain_crossings(loop: RationalLoop, levels: LevelCrossings | None = None) -> 
 
 
 def _exact_gain_crossings(loop: RationalLoop) -> Real:
-    from actuator_lti.margins.exact_findings import findings  # python-flint only where it is needed
+    from actuator_lti.margins.exact_findings import crossings  # python-flint only where it is needed
     from actuator_lti.margins.exact_loop import exact_loop
 
-    w = np.array([c.w for c in findings(exact_loop(loop.given())).gains if not c.touch])
+    w = np.array([c.w for c in crossings(exact_loop(loop.given()))[0] if not c.touch])
     return unwarped(w, loop.in_z)
