@@ -104,21 +104,6 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     return within(result, band)
 
 
-def gain_crossovers(loop: RationalLoop) -> Real:
-    """Where the gain is one (x of the loop), in order.
-
-    Raises
-    ------
-    Doubtful
-        It could not be checked.
-    """
-    with np.errstate(all="ignore"):
-        response = Response(loop)
-        factors = factored(response, sorted_poles(loop.A, loop.in_z))
-        parts, _ = _parts(factors, None)
-        return response.polished(_merged(parts)[0], gain=True)[0]
-
-
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
     if delay_s:
         if loop.period_s is None and abs(loop.d) >= 1.0:

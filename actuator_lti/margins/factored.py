@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.margins.factors_on_axis import Factored, half_turn
-from actuator_lti.margins.level_crossings import shifted, unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
@@ -40,7 +39,7 @@ class Response:
 
     def x(self, w: Real) -> Real:
         """The argument of the loop."""
-        return unwarped(w, self.loop.in_z)
+        return 2.0 * np.arctan(w) if self.loop.in_z else w
 
     def frequency(self, w: float) -> float:
         """Angular frequency in rad/s."""
@@ -213,8 +212,13 @@ def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
         return _in_s(loop, polynomial_roots(loop.numerator))
     size = np.abs(poles[poles != 0.0])
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
-    system = shifted(loop, shift)
-    sigma = eigenvalues(system.W_plus + np.outer(system.b_plus / system.l_plus, system.c_plus))
+    eye = np.eye(loop.order)
+    # sigma = 1/(s - shift): L = l - c inverse (sigma - W)^-1 inverse b, whose zeros are plain eigenvalues
+    scale = 1.0 - shift if loop.in_z else 1.0
+    inverse = np.linalg.inv(scale * loop.A - ((1.0 + shift) if loop.in_z else shift) * eye)
+    W, size = (inverse + loop.A @ inverse, 2.0) if loop.in_z else (inverse, 1.0)
+    b, c = inverse @ loop.b, loop.c @ inverse
+    sigma = eigenvalues(W + np.outer((size / (loop.d - scale * float(loop.c @ b))) * b, c))
     zeros = shift + 1.0 / sigma[sigma != 0.0]
     if loop.in_z or loop.d or zeros.size < loop.order:
         return zeros

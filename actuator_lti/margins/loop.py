@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
+from scipy.linalg.lapack import dgebal
 
 from actuator_lti.margins.given import Given, Real, given_of
 
@@ -114,27 +113,6 @@ class RationalLoop:
             residual = self.b - p[:, None] * X + X @ A.T
             X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
         return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
-
-    def derivatives(self, x: float) -> tuple[complex, complex, complex]:
-        """L and its first two derivatives by x at one point."""
-        if self.order == 0:
-            return complex(self.d), 0j, 0j
-        lu, pivots, _ = zgetrf(self._resolvent(self._variable(np.array([x])))[0], overwrite_a=1)
-        first = zgetrs(lu, pivots, self.b)[0]
-        second = zgetrs(lu, pivots, first)[0]
-        third = zgetrs(lu, pivots, second)[0]
-        L = complex(self.d + first @ self.c)
-        d_point, dd_point = -complex(second @ self.c), 2.0 * complex(third @ self.c)
-        if self.in_z:
-            point = cmath.exp(1j * x)
-            return L, 1j * point * d_point, -point * (d_point + point * dd_point)
-        return L, 1j * d_point, -dd_point
-
-    def given(self) -> Given:
-        """The same loop as data for exact arithmetic; a loop from z keeps its s-plane."""
-        if self.numerator is not None and self.denominator is not None:
-            return Given(None if not self.in_z else self.period_s, self.numerator, self.denominator)
-        return Given(self.period_s if self.in_z else None, A=self.A, b=self.b, c=self.c, d=self.d)
 
     def delayed(self, samples: int) -> RationalLoop:
         """The loop behind whole samples of delay (z-plane only), each a further state."""
