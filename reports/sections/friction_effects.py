@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.model import Command
 from analyses.settling import largest_swing
 from analyses.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, VerdictItem
+from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
+from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
@@ -40,12 +42,13 @@ def section(result: FrictionEffects) -> Section:
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
     )
-    failed = any(item["verdict"] == "not met" for item in items)
+    status: Status = tally(items).role
+    severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
     words, more = _summary(result, fine, small)
     blocks += [doc.text(more)] if more else []
     return doc.section(
-        "friction-effects", title, blocks, result=words, intro=intro, status="fail" if failed else "info",
-        findings=[Finding(severity="fail" if failed else "info", text=words, where="friction-effects")],
+        "friction-effects", title, blocks, result=words, intro=intro, status=status,
+        findings=[Finding(severity=severity, text=words, where="friction-effects")],
     )  # fmt: skip
 
 
@@ -122,6 +125,8 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         else "No controller integrates: a step below the threshold never moves the output. Each "
         "reversal loses 2 Tc over the stiffness."
     )
+    if result.design.command != Command():
+        note += " Steps as they come behind the profile and filter of the command."
     return doc.table("Threshold of motion and lost motion", columns, rows, note)
 
 

@@ -33,7 +33,11 @@ BOUND_COLOURS = {
 def section(result: Specification) -> Section:
     """Make the section from `analyses.specification.specification`."""
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
-    intro = "Closed form and simulation side by side; output side unless a column says motor."
+    intro = (
+        "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
+        "with it. "
+        "Output side unless a column says motor."
+    )
     findings = _findings(result)
     return doc.section(
         "specification", "Actuator figures", blocks, result=_result(result), intro=intro, findings=findings
@@ -51,8 +55,16 @@ def _result(result: Specification) -> str:
     parts += [f"{significant(scale * push)} {unit}/s²"] if push is not None and math.isfinite(push) else []
     return (
         f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the output reaches "
-        f"{' and '.join(parts)}."
+        f"{' and '.join(parts)}.{_commanded(result.design)}"
     )
+
+
+def _commanded(design: Design) -> str:
+    """What the profile of the command asks for at most."""
+    scale, unit = output_unit(design)
+    limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
+    parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
+    return f" The profile of its command asks for at most {' and '.join(parts)}." if parts else ""
 
 
 def _findings(result: Specification) -> list[Finding]:
