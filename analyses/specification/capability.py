@@ -46,8 +46,11 @@ class Capability:
 
 
 def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
-    """Run the command away from the output, behind its profile, and read what the drive makes of it."""
-    design = replace(design, command=Command())
+    """Run the command away from the output and read what the drive makes of it.
+
+    Behind the profile of the command, and without what depends on the angle: at one load, as the figures are.
+    """
+    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current = figures.motor_current_A

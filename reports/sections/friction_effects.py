@@ -44,8 +44,7 @@ def section(result: FrictionEffects) -> Section:
     )
     status: Status = tally(items).role
     severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
-    words, more = _summary(result, fine, small)
-    blocks += [doc.text(more)] if more else []
+    words = _summary(result, fine, small)
     return doc.section(
         "friction-effects", title, blocks, result=words, intro=intro, status=status,
         findings=[Finding(severity=severity, text=words, where="friction-effects")],
@@ -220,23 +219,23 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     return doc.figure("hysteresis", chart, caption=caption, alt=caption)
 
 
-def _summary(result: FrictionEffects, fine: float, small: str) -> tuple[str, str]:
-    """Say what becomes of the steady-state error, and a remark."""
+def _summary(result: FrictionEffects, fine: float, small: str) -> str:
+    """Say what becomes of the steady-state error, as the steps show it."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = largest_swing(settlings)
     if swing is not None:
-        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}.", ""
-    if result.integrator:
-        left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
-        if left:
-            most = max(abs(one.rest.error) for one in left)
-            words = f"an error of up to {fine * most:.3g} {small} is left at rest"
-            return f"The {result.integrator} controller integrates; {words}.", ""
-        return (
-            f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
-            "integrator removes the error.",
-            "With breakaway above sliding friction the drive may hunt. A describing function of dry friction "
-            "cannot "
-            "predict that, as a sinusoid spends no time at rest.",
-        )
-    return "No controller integrates: a steady-state error of up to the threshold remains.", ""
+        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}."
+    left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
+    does = (
+        f"The {result.integrator} controller integrates" if result.integrator else "No controller integrates"
+    )
+    if left:
+        most = max(left, key=lambda one: abs(one.rest.error))
+        under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
+        return f"{does}; an error of up to {fine * abs(most.rest.error):.3g} {small} is left at rest{under}."
+    if not result.integrator:
+        return f"{does}; the steps leave no error at rest."
+    return (
+        f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
+        "integrator removes the error."
+    )

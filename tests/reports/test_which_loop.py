@@ -56,6 +56,18 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115(screw
     assert "rate and acceleration" not in to_reference.reason
 
 
+def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal(screw: Design) -> None:
+    """|L/(1 + L)| = 1/sqrt(2) at 16.18 Hz, from L alone; the feed-forward takes the reference to 114.8 Hz."""
+    loops = assemble_loops(screw)
+    assert loops.position is not None
+    hz = closed_loop_bandwidth(loops.position.closed_loop).minus3db_hz
+    assert hz == pytest.approx(16.18, abs=0.005)
+    z = np.exp(2j * np.pi * hz * loops.position.period_s)
+    L = complex(loops.position.open_loop(z))
+    assert abs(L / (1.0 + L)) == pytest.approx(np.sqrt(0.5), rel=1e-9)
+    assert closed_loop_bandwidth(loops.reference_to_output).minus3db_hz == pytest.approx(114.8, abs=0.05)
+
+
 def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
     """The sentence beside the requirement, against a run of the simulator read by hand."""
     (verdict,) = evaluate_requirements(asking(screw, to="command"))

@@ -101,7 +101,7 @@ def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
     assert (
         made["result"]
-        == "The drive as it is comes to rest after every step; 0 of 1 foreseen cycles confirmed."
+        == "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
     )
     design: Design = load_design("fin")
     with pytest.raises(InputError, match="position loop"):
