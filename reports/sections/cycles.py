@@ -1,4 +1,4 @@
-"""Limit cycles of play and quantisation: foreseen by describing function, then sought by simulation."""
+"""Limit cycles of play and quantisation: predicted by describing function, then sought by simulation."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def section(result: LimitCycles) -> Section:
     )
     blocks: list[Block] = []
     if result.confirmations:
-        blocks.append(_foreseen(result, fine, small))
+        blocks.append(_predicted(result, fine, small))
     else:
         causes = (
             " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
@@ -61,7 +61,7 @@ def summary(result: LimitCycles) -> str:
     return f"The drive as it is does not come to rest: {words(swing.rest, fine, small)} under {at}{tail}."
 
 
-def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
+def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
     columns = [
         doc.column("cause", "Cause"),
         doc.column("friction", "Dry friction"),

@@ -52,14 +52,14 @@ def section(result: FrictionEffects) -> Section:
 
 
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
-    """Say whether friction keeps the drive hunting, and whether that was foreseen."""
+    """Say whether friction keeps the drive hunting, and whether that was predicted."""
     cycles, swing = point.cycles, point.cycles.hunting
-    foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
+    predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
         result = end_words(swing.rest, fine, small)
-    agree = "as predicted" if cycles.as_foreseen else "not as predicted"
+    agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
@@ -71,29 +71,27 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         distance=None,
         passed=swing is None,
         comparison="<=",
-        reason=f"{foreseen}; simulated: {result}; {agree}",
+        reason=f"{predicted}; simulated: {result}; {agree}",
     )
 
 
-def _foreseen_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the describing function foresees and what the simulator makes of it."""
+def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
+    """Say what the describing function predicts and what the simulator makes of it."""
     if not cycles.confirmations:
         return "describing function of the whole loop: none"
     parts = []
     for item in cycles.confirmations:
-        one = item.foreseen
+        one = item.cycle
         kind = "stable" if one.stable else "unstable, the border of what friction damps"
-        seen = (
-            "refuted" if item.simulated_ratio is None else f"simulated at {item.simulated_ratio:.2f} of that"
-        )
-        hz = "" if item.simulated_hz is None else f", {item.simulated_hz:.4g} Hz"
-        size = fine * one.output_amplitude_rad
+        seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
+        hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
+        size = fine * one.output_rad
         parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
     return "describing function of the whole loop: " + "; ".join(parts)
 
 
 def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the analysis of stick and slip foresees."""
+    """Say what the analysis of stick and slip predicts."""
     one = cycles.stick_slip
     if one is None:
         return "stick-slip analysis: none"

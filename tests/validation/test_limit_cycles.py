@@ -16,7 +16,7 @@ from actuator_lti.drive.operating import dead_zone
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.limit_cycles import limit_cycles
-from analyses.limit_cycles.foreseen import (
+from analyses.limit_cycles.describing import (
     cycles_of_play,
     cycles_of_quantisation,
     without_nonlinearities,
