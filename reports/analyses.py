@@ -204,9 +204,9 @@ ANALYSES = (
         also=True,
         function="analyses.limit_cycles.limit_cycles",
         words="""
-        Foresee limit cycles of play and of a quantised output sensor, and seek them in the simulator.
+        Predict limit cycles of play and of a quantised output sensor, and seek them in the simulator.
 
-        Each is foreseen by describing function in the exact sampled loop, then the simulator is
+        Each is predicted by describing function in the exact sampled loop, then the simulator is
         started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
         waited for. The exit status is 1 where such a step ends in a cycle.
         """,

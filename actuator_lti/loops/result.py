@@ -68,7 +68,11 @@ class Loop:
 
     @cached_property
     def closed_loop(self) -> Any:
-        """T = L/(1 + L) as a python-control system, without the feed-forward."""
+        """T = L/(1 + L) as a python-control system: the feedback loop alone, without the feed-forward.
+
+        Its bandwidth is not that of the drive: see ``Loops.reference_to_output`` for the response to the
+        reference, and `actuator_lti.commanded` for that to the command, behind the mean of its profile.
+        """
         return as_control(self.plain_closed)
 
     @cached_property

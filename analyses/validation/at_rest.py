@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from analyses.responses import response_at
@@ -130,8 +131,9 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
 
     point = "sliding" if speed_rad_s is None else "describing-function"
     at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
-    wired = wire(design, at)
-    return response_at(reference_to_output(wired), 2.0 * np.pi * frequency_hz)
+    omega, mean = 2.0 * np.pi * frequency_hz, command_mean(design)
+    response = response_at(reference_to_output(wire(design, at)), omega)
+    return response if mean is None else response * mean.response(omega)
 
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:

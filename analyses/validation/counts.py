@@ -117,7 +117,7 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
     settle_ticks : int
         In which the linear position loop settles.
     """
-    from analyses.limit_cycles.foreseen import counts_matter
+    from analyses.limit_cycles.describing import counts_matter
 
     there: list[Sensor] = []
     if counts_matter(design, "motor-quantisation"):
@@ -137,7 +137,7 @@ def without_counts(design: Design, *sensors: Sensor) -> Design:
 
 
 def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.foreseen import cycles_of_quantisation
+    from analyses.limit_cycles.describing import cycles_of_quantisation
     from analyses.limit_cycles.run import confirm
 
     cause = "motor-quantisation" if sensor == "motor" else "quantisation"
@@ -219,7 +219,7 @@ def _linearity(
     design: Design, ideal: Design, loops: Loops, sensor: Sensor, quantum: float, settle_ticks: int
 ) -> Floats:
     """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
-    from analyses.limit_cycles.foreseen import without_nonlinearities
+    from analyses.limit_cycles.describing import without_nonlinearities
 
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:

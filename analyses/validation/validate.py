@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.verdict import Verdict
 from analyses.isolation import attempt
@@ -205,6 +206,16 @@ class _Work:
     def _loops(self) -> Any:
         return self.bench.loops("command")
 
+    @cached_property
+    def _whole(self) -> Any:
+        """The same with the profile and the filter of the command in front."""
+        from actuator_lti.loops.assemble import loops_at
+
+        if self.bench.model.command == self._loops.design.command:
+            return self._loops
+        at = self.bench.setup("command").bias.operating(self.bench.drive)
+        return loops_at(replace(self.bench.linear, command=self.bench.model.command), at)
+
     def _settle(self, longest: int) -> int:
         """Ticks in which the position loop settles."""
         closed = self._loops.present["position"].plain_closed
@@ -214,7 +225,8 @@ class _Work:
     @cached_property
     def _commanded(self) -> LoopFigures:
         """Figures of the response to the command, with feed-forward and filters."""
-        return loop_figures(self._loops.present["position"], self._loops.plain_response)
+        mean = command_mean(self.bench.model)
+        return loop_figures(self._whole.present["position"], self._whole.plain_response, mean=mean)
 
     def _rest(self) -> tuple[RestSweep | None, RestSteps]:
         """Sines and steps from rest."""
@@ -228,7 +240,7 @@ class _Work:
             near = np.outer(marks, NEAR).ravel()
             asked = np.sort(np.concatenate([asked, near[near < top]]))
             part = min(design.validation.amplitude_fractions)
-            amplitude = free_amplitude(design, self._loops, asked, part)
+            amplitude = free_amplitude(design, self._whole, asked, part)
             dry = design.friction.dry_Nm(0.0) > 0.0
             settle = self._settle(400_000)
             sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)
@@ -252,7 +264,7 @@ class _Work:
     def _large(self) -> Any:
         from analyses.large_signal import large_signals
 
-        return large_signals(self.design, self._loops, counts=self.settings.map_counts)
+        return large_signals(self.design, self._whole, counts=self.settings.map_counts)
 
     def _friction(self) -> Any:
         from analyses.friction_effects import friction_effects

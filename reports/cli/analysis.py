@@ -96,6 +96,7 @@ def answer(
     **chosen: Any,
 ) -> None:
     """Ask, then print the section or the result, and leave with the verdict."""
+    from actuator_lti.design import warnings_of
     from analyses.isolation import isolated
     from reports import document as doc
     from reports.build import notices
@@ -104,7 +105,7 @@ def answer(
     from reports.cli.progress import progress
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
-    for warning in _warnings(drive) if one.warns else ():
+    for warning in warnings_of(drive) if one.warns else ():
         print_warning(f"{drive.name}: {warning}")
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
@@ -127,12 +128,6 @@ def answer(
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
-
-
-def _warnings(drive: Design) -> tuple[str, ...]:
-    from actuator_lti.design import warnings_of
-
-    return warnings_of(drive)
 
 
 def _study(path: str | None, changes: list[str] | None) -> Study | None:

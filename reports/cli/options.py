@@ -71,30 +71,6 @@ def read_load(text: str) -> float:
     raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
 
 
-LoadOption = Annotated[
-    float,
-    typer.Option(
-        "--load",
-        metavar="LOAD",
-        parser=read_load,
-        help='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N).',
-    ),
-]
-FormOption = Annotated[
-    str, typer.Option("--form", metavar="FORM", help="Linear form: sampled, continuous or ideal.")
-]
-OperatingPointOption = Annotated[
-    str,
-    typer.Option(
-        "--operating-point",
-        metavar="POINT",
-        help="Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
-        "load's share of the friction) and gap (in the play).",
-    ),
-]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
 ]

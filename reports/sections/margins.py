@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypedDict, cast
+from typing import TYPE_CHECKING
 
 from actuator_lti.quantities import Quantity
+from actuator_lti.tree import Tree
 from actuator_lti.verdict import Verdict
 from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import OperatingPointFigures
 from analyses.weakest import Spread, spread
 from reports import document as doc
-from reports.document_schema import Block, Mark, Row, Section, State, Status
+from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus
 from reports.sections import requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
@@ -256,48 +257,16 @@ def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
 
-class MarginRow(TypedDict):
-    """The margins of one loop, by column."""
-
-    stable: State
-    evidence: Mark
-    gain_margin_db: float | None
-    gain_margin_hz: float | None
-    phase_margin_deg: float | None
-    crossover_hz: float | None
-    crossover_rad_s: float | None
-    delay_margin_ms: float | None
-    delay_margin_samples: float | None
-    modulus_margin: float | None
-    s_peak_db: float | None
-    disk_margin: float | None
-
-
-class ResponseRow(TypedDict):
-    """Bandwidth, resonance and step of one loop, by column."""
-
-    minus3db_hz: float | None
-    minus90deg_hz: float | None
-    resonance_db: float | None
-    resonance_hz: float | None
-    t_peak_db: float | None
-    rise_ms: float | None
-    overshoot_percent: float | None
-    settling_ms: float | None
-    dc: float | None
-
-
-def margin_row(figures: LoopFigures) -> MarginRow:
+def margin_row(figures: LoopFigures) -> Tree:
     """Give the margins of one loop by column; an unstable loop has none, only the crossings listed below."""
     m = figures.margins
     row = _stable_row(figures)
     if m.stable is not False:
         return row
-    blank = dict.fromkeys(MarginRow.__annotations__)
-    return cast(MarginRow, {**blank, "stable": row["stable"], "evidence": row["evidence"]})
+    return {key: row[key] if key in ("stable", "evidence") else None for key in row}
 
 
-def _stable_row(figures: LoopFigures) -> MarginRow:
+def _stable_row(figures: LoopFigures) -> Tree:
     """Give the figures of one loop by column, whatever they are margins of."""
     m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
@@ -359,7 +328,7 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     ]
 
 
-def response_row(figures: LoopFigures) -> ResponseRow:
+def response_row(figures: LoopFigures) -> Tree:
     """Give bandwidth, resonance and step of one loop by column."""
     band, peaks, step = figures.bandwidth, figures.peaks, figures.step
     return {
@@ -379,11 +348,6 @@ def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
     value = None if figures.margins.stable is False else quantity.raw(figures)
     return times(value, quantity.shown[1])
-
-
-def cells(*rows: MarginRow | ResponseRow) -> Row:
-    """The same rows as cells of one table."""
-    return {key: cast(doc.Cell, value) for row in rows for key, value in row.items()}
 
 
 def _crossings(name: str, figures: LoopFigures) -> list[Row]:

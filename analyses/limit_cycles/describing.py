@@ -37,12 +37,12 @@ _STEPS = 60  # of the fixed point between the amplitudes of both speeds
 
 
 @dataclass(frozen=True)
-class _Mode:
-    """The least damped oscillation of the loop over a position period."""
+class Mode:
+    """The least damped oscillation of the loop over a position period, of any size."""
 
     radius: float
     frequency_hz: float
-    shape: dict[str, complex]  # for a twist of 1
+    shape: dict[str, complex]
 
 
 def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
@@ -52,7 +52,7 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
         return ()
     half = 0.5 * coupling.play_rad
     grid = np.geomspace(LEAST * half, MOST * half, POINTS)
-    modes: list[_Mode | None] = []
+    modes: list[Mode | None] = []
     for A in grid:
         modes.append(_at_twist(design, float(A), friction, modes[-1] if modes else None))
     result = []
@@ -67,11 +67,11 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
 
 
 def _border(
-    design: Design, friction: bool, ends: tuple[float, float], near: _Mode
-) -> tuple[float, _Mode] | None:
+    design: Design, friction: bool, ends: tuple[float, float], near: Mode
+) -> tuple[float, Mode] | None:
     """The twist between two amplitudes at which the oscillation keeps its size, and its shape there."""
 
-    def mode(log_A: float) -> _Mode | None:
+    def mode(log_A: float) -> Mode | None:
         return _at_twist(design, exp(log_A), friction, near)
 
     def excess(log_A: float) -> float:
@@ -86,14 +86,14 @@ def _border(
     return None if there is None else (exp(root), there)
 
 
-def _at_twist(design: Design, A: float, friction: bool, near: _Mode | None) -> _Mode | None:
+def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mode | None:
     """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
 
     With friction a fixed point, begun with the shape of an oscillation ``near``.
     """
     speeds = _speeds(near, A)
     for _ in range(_STEPS):
-        mode = _mode(_equivalent(design, A, *speeds, friction))
+        mode = mode_at(_equivalent(design, A, *speeds, friction), Operating())
         if mode is None or not friction:
             return mode
         now = _speeds(mode, A)
@@ -103,11 +103,12 @@ def _at_twist(design: Design, A: float, friction: bool, near: _Mode | None) -> _
     return mode
 
 
-def _speeds(mode: _Mode | None, A: float) -> tuple[float, float]:
+def _speeds(mode: Mode | None, A: float) -> tuple[float, float]:
     """Amplitudes of the motor's and the load's speed at a twist of amplitude A."""
     if mode is None:
         return 1.0, 1.0
-    return max(A * abs(mode.shape["w"]), 1e-12), max(A * abs(mode.shape["W"]), 1e-12)
+    size = A / abs(mode.shape["twist"])
+    return max(size * abs(mode.shape["w"]), 1e-12), max(size * abs(mode.shape["W"]), 1e-12)
 
 
 def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) -> Design:
@@ -133,18 +134,10 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     )
 
 
-def _mode(design: Design) -> _Mode | None:
-    """The largest eigenvalue off the positive real axis; None without any."""
-    program = TickProgram(wire(design, Operating()), "position")
-    values, vectors = np.linalg.eig(_over_a_period(program))
-    turning = np.flatnonzero(np.angle(values) > _TURNS)
-    if not turning.size:
-        return None
-    k = int(turning[np.argmax(np.abs(values[turning]))])
-    names = program.states
-    shape = vectors[:, k] / vectors[names.index("twist"), k]
-    frequency = float(np.angle(values[k])) / (2.0 * pi * program.ticks * design.controller.period_s)
-    return _Mode(float(abs(values[k])), frequency, dict(zip(names, map(complex, shape), strict=True)))
+def mode_at(design: Design, at: Operating) -> Mode | None:
+    """The least damped oscillation of the linear loop at an operating point; None without any."""
+    program = TickProgram(wire(design, at), "position")
+    return _oscillation(_over_a_period(program), program.states, design)
 
 
 def _over_a_period(program: TickProgram) -> np.ndarray:
@@ -154,14 +147,14 @@ def _over_a_period(program: TickProgram) -> np.ndarray:
     return A
 
 
-def _cycle(design: Design, A: float, mode: _Mode, friction: bool, *, stable: bool) -> Cycle:
+def _cycle(design: Design, A: float, mode: Mode, friction: bool, *, stable: bool) -> Cycle:
     """The cycle at its amplitude; phi = th/N_c - twist."""
-    state = {name: A * value for name, value in mode.shape.items()}
-    output = abs(_output(design, state))
+    state = {name: A / mode.shape["twist"] * value for name, value in mode.shape.items()}
+    output = abs(output_of(design, state))
     return Cycle("play", friction, output, A, mode.frequency_hz, stable, state)
 
 
-def _output(design: Design, state: dict[str, complex]) -> complex:
+def output_of(design: Design, state: dict[str, complex]) -> complex:
     if design.coupling is None:
         return state["th"] / design.total_ratio
     phi = state["th"] / design.ratio_to_coupling - state["twist"]
@@ -200,13 +193,13 @@ def _of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
         return ()
     border, mode = found
     amplitude = 2.0 * q / (pi * border)
-    seen = _output(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
+    seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
     state = {name: amplitude / seen * value for name, value in mode.shape.items()}
-    output = abs(_output(free, state))
+    output = abs(output_of(free, state))
     return (Cycle(cause, False, output, amplitude, mode.frequency_hz, True, state),)
 
 
-def _border_at_output(free: Design) -> tuple[float, _Mode] | None:
+def _border_at_output(free: Design) -> tuple[float, Mode] | None:
     """Gain of a sensor at the output that brings the loop to its border, and the oscillation there.
 
     Where the speed is made of that angle too, all that is behind it goes through the velocity controller: its
@@ -227,10 +220,10 @@ def _border_at_output(free: Design) -> tuple[float, _Mode] | None:
     return None if mode is None else (border, mode)
 
 
-def _border_of_speed(free: Design) -> tuple[float, _Mode] | None:
+def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
     """Gain of the speed made of the motor's angle that brings the loop to its border."""
 
-    def mode(log_gain: float) -> _Mode | None:
+    def mode(log_gain: float) -> Mode | None:
         velocity = free.controller.velocity
         assert velocity is not None
         gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(0.0,))
@@ -256,7 +249,7 @@ def _border_of_speed(free: Design) -> tuple[float, _Mode] | None:
 
 def _oscillation(
     A: np.ndarray, states: Sequence[str], design: Design, *, at_border: bool = False
-) -> _Mode | None:
+) -> Mode | None:
     """The largest eigenvalue that turns, or that nearest to the unit circle; None without any."""
     values, vectors = np.linalg.eig(A)
     turning = np.flatnonzero(np.angle(values) > _TURNS)
@@ -267,7 +260,7 @@ def _oscillation(
     period = wire(design, Operating()).period_s("position")
     frequency = float(np.angle(values[k])) / (2.0 * pi * period)
     shape = dict(zip(states, map(complex, vectors[:, k]), strict=True))
-    return _Mode(float(abs(values[k])), frequency, shape)
+    return Mode(float(abs(values[k])), frequency, shape)
 
 
 def without_nonlinearities(design: Design) -> Design:
